@@ -124,7 +124,8 @@ def _spread(points: Floats) -> Floats:
         chosen = np.unique(np.floor(points / size), axis=0, return_index=True)[1]
         if len(chosen) <= POINTS:
             break
-    return points[np.random.default_rng(0).permutation(chosen)]
+    shuffled: Floats = points[np.random.default_rng(0).permutation(chosen)]
+    return shuffled
 
 
 def _pyramid(likelihoods: Likelihoods) -> Likelihoods:
