@@ -46,7 +46,7 @@ class Client:
 
 
 class Node:
-    """What the example uses of a node of rclpy."""
+    """The part of a node of rclpy that the example uses."""
 
     def __init__(self, name: str) -> None:
         self.name, self.topics, self.logged, self.published = name, dict[str, Any](), list[str](), list[Any]()
