@@ -6,7 +6,11 @@ and on all floors together; then on all floors but its own.
 
 Another floor explains a scan where a search on that floor alone scores within `AS_WELL` nats of the right floor.
 
-``python -m benchmarks floors``, or with sizes ``python -m benchmarks.floors --floors 2 5 12 --scans 4 --buildings 1``
+The times are those of one search on all floors, and of one on the right floor alone. A campus of public floor plans is
+searched as one map for each plan, and as one map.
+
+``python -m benchmarks floors``, or with sizes ``python -m benchmarks.floors --floors 2 5 12 --scans 4 --buildings 1``;
+without a number after ``--floors`` the times alone
 """
 
 from __future__ import annotations
@@ -15,7 +19,7 @@ import argparse
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from statistics import median
 
@@ -33,14 +37,19 @@ from association import (
     associate_on_maps,
     map_set,
 )
-from registration import RigidTransform, Segments, wrap_angle
+from registration import MeasuredSegments, RigidTransform, Segments, wrap_angle
 from simulation import FLOOR_KINDS, FloorKind, Scanner, draw_floors, free_places, scan
 
+from .collection import SIGMA
+from .growth import campus_plans, draw_query
 from .outcomes import progress
+from .queries import data_found
 from .table import Row, at_least, at_most, mean, print_rows
 
 FLOORS = (2, 5, 12)
-SIZES = (2, 8, 32)  # floors of the times
+SIZES = (2, 8, 32, 128)  # floors of the times
+TIMED = replace(FLOOR_KINDS["offices"], size=(80.0, 15.0))  # about 400 segments
+CAMPUS = 20_000  # segments
 SCANNER = Scanner(beams=720, sigma=0.01, range_max=30.0)
 DISTANCE, ANGLE = 0.3, math.radians(5.0)
 SEED = 20261126
@@ -147,23 +156,62 @@ def try_floor(building: Building, floor: int, scans: int, found: Floors, rng: np
             found.equal.append(not same.usable and (same.pose is None or poses == {"a", "b"}))
 
 
-def times(sizes: Sequence[int], repeats: int) -> list[tuple[int, float, float, float, float]]:
-    """Return floors, and ms in the median and p95: of one search on the right floor, and of one on all floors."""
+def time_rows(sizes: Sequence[int], repeats: int) -> list[Row]:
+    """Return the rows of the times of buildings with so many floors, and of a campus."""
     rows = []
     for count in sizes:
-        rng = np.random.default_rng(SEED)
-        building = Building.draw(FLOOR_KINDS["offices"], count, rng)
-        one: list[float] = []
-        all_floors: list[float] = []
-        for number in range(repeats):
-            floor = number % count
-            ((x, y),) = free_places(building.floors[floor], building.kind, 1, rng)
-            seen = take(building.floors[floor], RigidTransform(x, y, float(rng.uniform(-3.0, 3.0))), rng)
-            # By turns, so that what else the machine does counts for both.
-            one.append(_milliseconds(partial(associate, building.alone[floor], seen)))
-            all_floors.append(_milliseconds(partial(associate_on_maps, building.together, seen)))
-        rows.append((count, *_both(one), *_both(all_floors)))
+        one, every = building_times(count, repeats)
+        what = (
+            f"{count} floors of 400 segments: {_told(every)}, on the right floor alone {_told(one)}; ratio of medians"
+        )
+        rows.append(at_most(what, median(every) / median(one), 8.0 if count == 32 else None, form=".2f"))
+        progress("times", len(rows), len(sizes) + 1)
+    if sizes and data_found():
+        plans, one, every, whole = campus_times(repeats)
+        what = f"a campus of {CAMPUS:,} segments as {plans} maps: {_told(every)}, on the right map alone {_told(one)}"
+        rows.append(at_most(f"{what}; ratio of medians", median(every) / median(one), form=".2f"))
+        rows.append(
+            at_most(
+                f"the campus as one map: {_told(whole)}; ratio to all maps", median(whole) / median(every), form=".2f"
+            )
+        )
     return rows
+
+
+def building_times(count: int, repeats: int) -> tuple[list[float], list[float]]:
+    """Return ms of searches on the right floor, and on all floors."""
+    rng = np.random.default_rng(SEED)
+    building = Building.draw(TIMED, count, rng)
+    one: list[float] = []
+    every: list[float] = []
+    for number in range(repeats + 1):
+        floor = number % count
+        ((x, y),) = free_places(building.floors[floor], building.kind, 1, rng)
+        seen = take(building.floors[floor], RigidTransform(x, y, float(rng.uniform(-3.0, 3.0))), rng)
+        # By turns, so that what else the machine does counts for both.
+        one.append(_milliseconds(partial(associate, building.alone[floor], seen)))
+        every.append(_milliseconds(partial(associate_on_maps, building.together, seen)))
+    return one[1:], every[1:]  # without the first search, which warms up
+
+
+def campus_times(repeats: int) -> tuple[int, list[float], list[float], list[float]]:
+    """Return the number of plans, and ms of searches on the right plan, on all as maps, and on all as one map."""
+    rng = np.random.default_rng(SEED)
+    plans = [Segments.from_array(one) for one in campus_plans(CAMPUS)]
+    segments = Segments.from_array(np.vstack([one.endpoints for one in plans]))
+    index, alone, all_plans = MapIndex.build(segments), list(map(MapIndex.build, plans)), together(plans)
+    one: list[float] = []
+    every: list[float] = []
+    whole: list[float] = []
+    for _ in range(repeats + 1):
+        pose, drawn = draw_query(segments, rng)
+        nearest = int(np.linalg.norm(segments.midpoints - [pose.x, pose.y], axis=1).argmin())
+        plan = int(np.searchsorted(np.cumsum([len(part) for part in plans]), nearest, side="right"))
+        seen = Scan(MeasuredSegments.from_segments(drawn, SIGMA))
+        one.append(_milliseconds(partial(associate, alone[plan], seen)))
+        every.append(_milliseconds(partial(associate_on_maps, all_plans, seen)))
+        whole.append(_milliseconds(partial(associate, index, seen)))
+    return len(plans), one[1:], every[1:], whole[1:]
 
 
 def _milliseconds(call: Callable[[], object]) -> float:
@@ -172,14 +220,19 @@ def _milliseconds(call: Callable[[], object]) -> float:
     return 1e3 * (time.process_time() - begun)
 
 
-def _both(values: list[float]) -> tuple[float, float]:
-    return median(values), float(np.quantile(values, 0.95))
+def _told(values: list[float]) -> str:
+    return f"{median(values):.1f} ms (p95 {np.quantile(values, 0.95):.1f})"
 
 
 def floors(
     counts: Sequence[int] = FLOORS, scans: int = 8, buildings: int = 2, sizes: Sequence[int] = SIZES, repeats: int = 20
 ) -> list[Row]:
-    """Return the rows of all buildings, each floor scanned `scans` times."""
+    """Return the rows of all buildings, each floor scanned `scans` times, and those of the times."""
+    return [*(answer_rows(counts, scans, buildings) if counts else []), *time_rows(sizes, repeats)]
+
+
+def answer_rows(counts: Sequence[int], scans: int, buildings: int) -> list[Row]:
+    """Return the rows of the answers."""
     found, rng = Floors(), np.random.default_rng(SEED)
     plans = [(name, count) for name in FLOOR_KINDS for count in counts for _ in range(buildings)]
     for done, (name, count) in enumerate(plans):
@@ -187,7 +240,7 @@ def floors(
         for floor in range(count):
             try_floor(building, floor, scans, found, rng)
         progress("floors", done + 1, len(plans))
-    rows = [
+    return [
         at_least(_counted("usable and right, where one search on its floor is usable and no other floor explains it",
                           found.wanted), mean(found.wanted), 0.95),
         at_most(_counted("wrong, of usable", found.wrong), mean(found.wrong), 0.001, form=".4f"),
@@ -199,12 +252,6 @@ def floors(
                 mean(found.absent_explained), form=".4f"),
         at_least(_counted("a floor twice: said so, and both listed", found.equal), mean(found.equal), 1.0),
     ]  # fmt: skip
-    for count, one, one_p95, every, every_p95 in times(sizes, repeats):
-        told = (
-            f"{count} floors: {every:.1f} ms (p95 {every_p95:.1f}), one search {one:.1f} ms (p95 {one_p95:.1f}); times"
-        )
-        rows.append(at_most(told, every / one, 8.0 if count == 32 else None, form=".2f"))
-    return rows
 
 
 def _counted(what: str, values: list[bool]) -> str:
@@ -214,10 +261,10 @@ def _counted(what: str, values: list[bool]) -> str:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--floors", type=int, nargs="+", default=list(FLOORS), help="floors of a building")
+    parser.add_argument("--floors", type=int, nargs="*", default=list(FLOORS), help="floors of a building")
     parser.add_argument("--scans", type=int, default=8, help="scans a floor")
     parser.add_argument("--buildings", type=int, default=2, help="buildings of each kind and number of floors")
-    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES), help="floors of the times")
+    parser.add_argument("--sizes", type=int, nargs="*", default=list(SIZES), help="floors of the times")
     parser.add_argument("--repeats", type=int, default=20, help="scans of the times")
     asked = parser.parse_args()
     print_rows("Floors", floors(asked.floors, asked.scans, asked.buildings, asked.sizes, asked.repeats))
