@@ -64,8 +64,10 @@ class Floors:
     wanted : list of bool
         Of each scan that its floor alone makes usable, and that no other floor explains: whether the answer on all
         floors is usable and right.
-    wrong : list of bool
-        Of each usable answer: whether the floor is wrong, or the pose on it.
+    exact : list of bool
+        The same of the answer where the maps declare that they are exact, as the drawn ones are.
+    wrong, exact_wrong : list of bool
+        Of each usable answer, without and with that: whether the floor is wrong, or the pose on it.
     one_by_one : list of bool
         Of each scan of which exactly one floor, searched alone, is usable: whether that floor is wrong.
     absent : list of bool
@@ -77,7 +79,9 @@ class Floors:
     """
 
     wanted: list[bool] = field(default_factory=list)
+    exact: list[bool] = field(default_factory=list)
     wrong: list[bool] = field(default_factory=list)
+    exact_wrong: list[bool] = field(default_factory=list)
     one_by_one: list[bool] = field(default_factory=list)
     absent: list[bool] = field(default_factory=list)
     absent_explained: list[bool] = field(default_factory=list)
@@ -92,21 +96,22 @@ class Building:
     floors: tuple[Segments, ...]
     alone: tuple[MapIndex, ...]
     together: MapSet
+    exact: MapSet
 
     @classmethod
     def draw(cls, kind: FloorKind, count: int, rng: np.random.Generator) -> Building:
         """Draw one of `count` floors."""
         floors = tuple(draw_floors(kind, count, rng))
-        return cls(kind, floors, tuple(map(MapIndex.build, floors)), together(floors))
+        return cls(kind, floors, tuple(map(MapIndex.build, floors)), together(floors), together(floors, 0.0))
 
     def without(self, floor: int) -> MapSet:
         """Return all floors but one."""
         return map_set({str(k): MapPart(one) for k, one in enumerate(self.floors) if k != floor})
 
 
-def together(floors: Sequence[Segments]) -> MapSet:
+def together(floors: Sequence[Segments], sigma: float | None = None) -> MapSet:
     """Return floors as maps that are searched together, named by their numbers."""
-    return map_set({str(k): MapPart(one) for k, one in enumerate(floors)})
+    return map_set({str(k): MapPart(one, sigma) for k, one in enumerate(floors)})
 
 
 def take(floor: Segments, pose: RigidTransform, rng: np.random.Generator) -> Scan:
@@ -142,12 +147,16 @@ def try_floor(building: Building, floor: int, scans: int, found: Floors, rng: np
             found.one_by_one.append(usable[0] != floor)
         least = score_of(alone[floor]) - AS_WELL
         explained = any(score_of(one) >= least for k, one in enumerate(alone) if k != floor)
-        answer = associate_on_maps(building.together, seen)
-        right = answer.map_id == str(floor) and is_right(answer, truth)
-        if answer.usable:
-            found.wrong.append(not right)
-        if alone[floor].usable and not explained:
-            found.wanted.append(answer.usable and right)
+        for maps, wanted, wrong in (
+            (building.together, found.wanted, found.wrong),
+            (building.exact, found.exact, found.exact_wrong),
+        ):
+            answer = associate_on_maps(maps, seen)
+            right = answer.map_id == str(floor) and is_right(answer, truth)
+            if answer.usable:
+                wrong.append(not right)
+            if alone[floor].usable and not explained:
+                wanted.append(answer.usable and right)
         if without is not None:
             (found.absent_explained if explained else found.absent).append(associate_on_maps(without, seen).usable)
         if number == 0:
@@ -243,7 +252,10 @@ def answer_rows(counts: Sequence[int], scans: int, buildings: int) -> list[Row]:
     return [
         at_least(_counted("usable and right, where one search on its floor is usable and no other floor explains it",
                           found.wanted), mean(found.wanted), 0.95),
+        at_least(_counted("the same, where the maps declare sigma 0", found.exact), mean(found.exact)),
         at_most(_counted("wrong, of usable", found.wrong), mean(found.wrong), 0.001, form=".4f"),
+        at_most(_counted("the same, where the maps declare sigma 0", found.exact_wrong), mean(found.exact_wrong), 0.001,
+                form=".4f"),
         at_most(_counted("the same, floor by floor, where exactly one floor is usable", found.one_by_one),
                 mean(found.one_by_one), form=".4f"),
         at_most(_counted("floor not in the set: usable, where no other floor explains it", found.absent),
