@@ -48,7 +48,7 @@ from .table import Row, at_least, at_most, mean, print_rows
 
 FLOORS = (2, 5, 12)
 SIZES = (2, 8, 32, 128)  # floors of the times
-TIMED = replace(FLOOR_KINDS["offices"], size=(80.0, 15.0))  # about 400 segments
+TIMED = replace(FLOOR_KINDS["offices"], size=(80.0, 15.0))  # 400 segments a floor
 CAMPUS = 20_000  # segments
 SCANNER = Scanner(beams=720, sigma=0.01, range_max=30.0)
 DISTANCE, ANGLE = 0.3, math.radians(5.0)
@@ -167,23 +167,17 @@ def try_floor(building: Building, floor: int, scans: int, found: Floors, rng: np
 
 def time_rows(sizes: Sequence[int], repeats: int) -> list[Row]:
     """Return the rows of the times of buildings with so many floors, and of a campus."""
-    rows = []
-    for count in sizes:
+    rows: list[Row] = []
+    for done, count in enumerate(sizes):
         one, every = building_times(count, repeats)
-        what = (
-            f"{count} floors of 400 segments: {_told(every)}, on the right floor alone {_told(one)}; ratio of medians"
-        )
-        rows.append(at_most(what, median(every) / median(one), 8.0 if count == 32 else None, form=".2f"))
-        progress("times", len(rows), len(sizes) + 1)
+        rows += [*_times(f"{count} floors: right floor alone", one), *_times(f"{count} floors: all", every)]
+        rows.append(_ratio(f"{count} floors: all, over one", every, one, 8.0 if count == 32 else None))
+        progress("times", done + 1, len(sizes) + 1)
     if sizes and data_found():
         plans, one, every, whole = campus_times(repeats)
-        what = f"a campus of {CAMPUS:,} segments as {plans} maps: {_told(every)}, on the right map alone {_told(one)}"
-        rows.append(at_most(f"{what}; ratio of medians", median(every) / median(one), form=".2f"))
-        rows.append(
-            at_most(
-                f"the campus as one map: {_told(whole)}; ratio to all maps", median(whole) / median(every), form=".2f"
-            )
-        )
+        rows += [*_times("campus: right map alone", one), *_times("campus: all maps", every)]
+        rows += [*_times("campus: as one map", whole), at_least("campus: maps", plans, form=".0f")]
+        rows += [_ratio("campus: all maps, over one", every, one), _ratio("campus: as one map, over one", whole, one)]
     return rows
 
 
@@ -229,8 +223,13 @@ def _milliseconds(call: Callable[[], object]) -> float:
     return 1e3 * (time.process_time() - begun)
 
 
-def _told(values: list[float]) -> str:
-    return f"{median(values):.1f} ms (p95 {np.quantile(values, 0.95):.1f})"
+def _times(what: str, values: list[float]) -> list[Row]:
+    p95 = float(np.quantile(values, 0.95))
+    return [at_most(f"{what}, median ms", median(values), form=".1f"), at_most(f"{what}, p95 ms", p95, form=".1f")]
+
+
+def _ratio(what: str, some: list[float], others: list[float], goal: float | None = None) -> Row:
+    return at_most(f"{what}, ratio of medians", median(some) / median(others), goal, form=".2f")
 
 
 def floors(
@@ -249,25 +248,23 @@ def answer_rows(counts: Sequence[int], scans: int, buildings: int) -> list[Row]:
         for floor in range(count):
             try_floor(building, floor, scans, found, rng)
         progress("floors", done + 1, len(plans))
+    fine, rare = partial(_counted, at_least, form=".3f"), partial(_counted, at_most, form=".4f")
     return [
-        at_least(_counted("usable and right, where one search on its floor is usable and no other floor explains it",
-                          found.wanted), mean(found.wanted), 0.95),
-        at_least(_counted("the same, where the maps declare sigma 0", found.exact), mean(found.exact)),
-        at_most(_counted("wrong, of usable", found.wrong), mean(found.wrong), 0.001, form=".4f"),
-        at_most(_counted("the same, where the maps declare sigma 0", found.exact_wrong), mean(found.exact_wrong), 0.001,
-                form=".4f"),
-        at_most(_counted("the same, floor by floor, where exactly one floor is usable", found.one_by_one),
-                mean(found.one_by_one), form=".4f"),
-        at_most(_counted("floor not in the set: usable, where no other floor explains it", found.absent),
-                mean(found.absent), 0.01, form=".4f"),
-        at_most(_counted("floor not in the set: usable, where another floor explains it", found.absent_explained),
-                mean(found.absent_explained), form=".4f"),
-        at_least(_counted("a floor twice: said so, and both listed", found.equal), mean(found.equal), 1.0),
-    ]  # fmt: skip
+        fine("usable and right, where its floor alone is usable and no other floor explains it", found.wanted, 0.95),
+        fine("the same with sigma 0: usable and right", found.exact),
+        rare("wrong, of usable", found.wrong, 0.001),
+        rare("the same with sigma 0: wrong, of usable", found.exact_wrong, 0.001),
+        rare("wrong, floor by floor, where exactly one floor is usable", found.one_by_one),
+        rare("floor not in the set: usable, where no other floor explains it", found.absent, 0.01),
+        rare("floor not in the set: usable, where another floor explains it", found.absent_explained),
+        fine("a floor twice: not usable, and both listed", found.equal, 1.0),
+    ]
 
 
-def _counted(what: str, values: list[bool]) -> str:
-    return f"{what} ({sum(values)} of {len(values)})"
+def _counted(row: Callable[..., Row], what: str, values: list[bool], goal: float | None = None, *, form: str) -> Row:
+    """Return a row of a fraction, with its count."""
+    made = row(what, mean(values), goal, form=form)
+    return replace(made, measured=f"{made.measured} ({sum(values)} of {len(values)})")
 
 
 def main() -> None:

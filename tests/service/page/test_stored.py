@@ -30,7 +30,7 @@ def test_a_late_example_does_not_replace_an_opened_map(page: Page, client: httpx
 
 
 def test_a_virtual_robot_waits_for_its_map(page: Page, client: httpx.Client) -> None:
-    """Whoever is quicker than the map is read, or starts with the robot, has not to tick twice."""
+    """A robot that is switched on while its map is read stays on."""
     walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
     client.put("/v1/maps/page-late", json=walls).raise_for_status()
     page.goto("/")
