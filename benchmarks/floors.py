@@ -72,8 +72,10 @@ class Floors:
         Of each scan of which exactly one floor, searched alone, is usable: whether that floor is wrong.
     absent : list of bool
         Of each scan without its floor that no other floor explains: whether the answer is usable.
+    absent_exact : list of bool
+        The same where the maps declare that they are exact.
     absent_explained : list of bool
-        The same of scans that another floor explains.
+        Of such scans that another floor explains, without that.
     equal : list of bool
         Of each scan of a floor that is there twice: whether the answer is not usable and lists both.
     """
@@ -84,6 +86,7 @@ class Floors:
     exact_wrong: list[bool] = field(default_factory=list)
     one_by_one: list[bool] = field(default_factory=list)
     absent: list[bool] = field(default_factory=list)
+    absent_exact: list[bool] = field(default_factory=list)
     absent_explained: list[bool] = field(default_factory=list)
     equal: list[bool] = field(default_factory=list)
 
@@ -104,9 +107,9 @@ class Building:
         floors = tuple(draw_floors(kind, count, rng))
         return cls(kind, floors, tuple(map(MapIndex.build, floors)), together(floors), together(floors, 0.0))
 
-    def without(self, floor: int) -> MapSet:
+    def without(self, floor: int, sigma: float | None = None) -> MapSet:
         """Return all floors but one."""
-        return map_set({str(k): MapPart(one) for k, one in enumerate(self.floors) if k != floor})
+        return map_set({str(k): MapPart(one, sigma) for k, one in enumerate(self.floors) if k != floor})
 
 
 def together(floors: Sequence[Segments], sigma: float | None = None) -> MapSet:
@@ -136,7 +139,7 @@ def score_of(result: AssociationResult) -> float:
 
 def try_floor(building: Building, floor: int, scans: int, found: Floors, rng: np.random.Generator) -> None:
     """Scan one floor of a building, and count the answers."""
-    without = building.without(floor) if len(building.floors) > 2 else None
+    without = [building.without(floor, sigma) for sigma in (None, 0.0)] if len(building.floors) > 2 else []
     twice = map_set({"a": MapPart(building.floors[floor]), "b": MapPart(building.floors[floor])})
     for number, (x, y) in enumerate(free_places(building.floors[floor], building.kind, scans, rng)):
         truth = RigidTransform(x, y, float(rng.uniform(-math.pi, math.pi)))
@@ -157,8 +160,11 @@ def try_floor(building: Building, floor: int, scans: int, found: Floors, rng: np
                 wrong.append(not right)
             if alone[floor].usable and not explained:
                 wanted.append(answer.usable and right)
-        if without is not None:
-            (found.absent_explained if explained else found.absent).append(associate_on_maps(without, seen).usable)
+        for maps, absent in zip(without, (found.absent, found.absent_exact), strict=False):
+            if not explained:
+                absent.append(associate_on_maps(maps, seen).usable)
+        if without and explained:
+            found.absent_explained.append(associate_on_maps(without[0], seen).usable)
         if number == 0:
             same = associate_on_maps(twice, seen)
             poses = {one.map_id for one in same.maps if one.pose is not None}
@@ -256,6 +262,7 @@ def answer_rows(counts: Sequence[int], scans: int, buildings: int) -> list[Row]:
         rare("the same with sigma 0: wrong, of usable", found.exact_wrong, 0.001),
         rare("wrong, floor by floor, where exactly one floor is usable", found.one_by_one),
         rare("floor not in the set: usable, where no other floor explains it", found.absent, 0.01),
+        rare("the same with sigma 0: floor not in the set, usable", found.absent_exact, 0.01),
         rare("floor not in the set: usable, where another floor explains it", found.absent_explained),
         fine("a floor twice: not usable, and both listed", found.equal, 1.0),
     ]
