@@ -202,7 +202,6 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
 
     if names.namespace is None and not any(rule.startswith("__ns:=") for rule in ros.remap or []):
         _require_one_robot(ros.params_file)
-    on = source.on or []
     scans = tuple(sources.scan or ("scan",))
     try:
         where, remappings = _names(scans, names.namespace, ros.remap or [])
@@ -211,7 +210,7 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             together_s=sources.together_s,
             odometry=sources.odom,
             motion=sources.motion,
-            map_topic=None if on else source.map_topic,
+            map_topic=None if source.on else source.map_topic,
             base_frame=names.base,
             odom_frame=names.odom_frame,
             namespace=where,
@@ -225,7 +224,7 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             domain=domain_of(os.environ),
             hardware_id=publishing.hardware_id,
         )
-        maps = _maps_at(on) if on else None
+        maps = _maps_at(source.on) if source.on else None
         node = Node(options, maps)
     except (OptionError, ConnectionRefusedError) as error:
         raise WrongUseError(str(error)) from None
