@@ -82,7 +82,7 @@ def _analyze(quick: int) -> list[Row]:
 
 
 def _floors(quick: int) -> list[Row]:
-    rows = floors(scans=max(2, 8 // quick), buildings=2 if quick == 1 else 1, repeats=max(5, 20 // quick))
+    rows = floors(scans=max(2, 8 // quick), buildings=2 if quick == 1 else 1, repeats=max(10, 100 // quick))
     print_rows("Floors", rows)
     return rows
 

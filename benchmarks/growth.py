@@ -77,11 +77,16 @@ def campus(size: int) -> Segments:
     Each plan comes once as it is. When all have been laid they come mirrored and stretched by up to a tenth, so that no
     place has an exact copy.
     """
-    rng = np.random.default_rng(SEED)
     if not data_found():
         plan = OfficePlan(rooms=8, corridors=3)
-        world = campus_of_offices(rng, 1 + size // 250, plan)
+        world = campus_of_offices(np.random.default_rng(SEED), 1 + size // 250, plan)
         return world.segments.take(np.arange(min(size, len(world.segments))))
+    return Segments.from_array(np.vstack(campus_plans(size)))
+
+
+def campus_plans(size: int) -> list[np.ndarray]:
+    """Return the floor plans of a campus, each (n, 4); they need the data folder."""
+    rng = np.random.default_rng(SEED)
     plans = [s.endpoints for key, s in sorted(floor_plans().maps.items()) if key[0] in FLOOR_PLANS]
     if size < 1000:
         plans = [p for p in plans if len(p) <= size]
@@ -103,7 +108,7 @@ def campus(size: int) -> Segments:
             if left == 0:
                 break
         lap += 1
-    return Segments.from_array(np.vstack(pieces))
+    return pieces
 
 
 def draw_query(

@@ -6,6 +6,7 @@ import math
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -14,17 +15,18 @@ import typer
 
 from service.work.warmup import warm_up
 
-from .asking import document_at
+from .contract import Json
 from .errors import RefusedError, WrongUseError
 from .inputs import needing_formats
 from .options import grouped
 from .ros2_parameters import parameters_of, robots_of
+from .several import read_maps
 
 if TYPE_CHECKING:
-    import linefix
-    from ros2 import NodeOptions
+    from ros2 import Maps, NodeOptions
 
 MAX_FRAME = 255  # characters
+SHOWN_MAPS = 5  # of several maps, in the line of the start
 CHOSEN, FILE = "linefix.ros2.namespace", "linefix.ros2.file"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "help")
 
@@ -63,12 +65,15 @@ def _take_defaults(context: typer.Context) -> None:
 
 @dataclass(frozen=True, slots=True)
 class MapSource:
-    """The source of the map, as options."""
+    """The source of the map, or of several, as options."""
 
     on: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            "--map", metavar="MAP", help="A map file, or the id of a stored map. Default: the topic of --map-topic."
+            "--map",
+            metavar="MAP",
+            help="A map file, a folder of map files, or the id of a stored map; repeat for more maps, which are "
+            "searched together. Default: the topic of --map-topic.",
         ),
     ] = None
     map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of an OccupancyGrid, without --map.")] = "map"
@@ -197,7 +202,6 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
 
     if names.namespace is None and not any(rule.startswith("__ns:=") for rule in ros.remap or []):
         _require_one_robot(ros.params_file)
-    on = source.on
     scans = tuple(sources.scan or ("scan",))
     try:
         where, remappings = _names(scans, names.namespace, ros.remap or [])
@@ -206,7 +210,7 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             together_s=sources.together_s,
             odometry=sources.odom,
             motion=sources.motion,
-            map_topic=None if on else source.map_topic,
+            map_topic=None if source.on else source.map_topic,
             base_frame=names.base,
             odom_frame=names.odom_frame,
             namespace=where,
@@ -220,11 +224,11 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             domain=domain_of(os.environ),
             hardware_id=publishing.hardware_id,
         )
-        index, frame = (None, "map") if on is None else _map_at(on)
-        node = Node(options, index, frame)
+        maps = _maps_at(source.on) if source.on else None
+        node = Node(options, maps)
     except (OptionError, ConnectionRefusedError) as error:
         raise WrongUseError(str(error)) from None
-    _run(node, options, on)
+    _run(node, options, maps)
 
 
 def _require_one_robot(file: Path | None) -> None:
@@ -233,23 +237,27 @@ def _require_one_robot(file: Path | None) -> None:
         raise WrongUseError(f"{file}: found parameters of {', '.join(robots)}, expected one; add --namespace")
 
 
-def _run(node: Any, options: NodeOptions, on: str | None) -> None:
+def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
     warm_up()  # or the first scans would wait for it
     node.wait_until_ready()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.end())
-    print(f"linefix: {_started(options, on)}", file=sys.stderr, flush=True)
+    print(f"linefix: {_started(options, maps)}", file=sys.stderr, flush=True)
     node.run()
     if not node.close():
         sys.stderr.flush()
         os._exit(0)  # a search does not end in time, and Python would wait for it
 
 
-def _started(options: NodeOptions, on: str | None) -> str:
+def _started(options: NodeOptions, maps: Maps | None) -> str:
     scans = ", ".join(options.topic(name) for name in options.scans)
-    source = on if on is not None else f"the topic {options.topic(options.map_topic or 'map')}"
+    source = f"map from the topic {options.topic(options.map_topic or 'map')}"
+    if maps is not None:
+        names = list(maps.frames)
+        more = f" and {len(names) - SHOWN_MAPS} more" if len(names) > SHOWN_MAPS else ""
+        source = f"{'maps' if maps.several else 'map'} {', '.join(names[:SHOWN_MAPS])}{more}"
     return (
-        f"subscribed to {scans} in domain {options.domain}; map from {source}; base frame {options.base_frame}; "
+        f"subscribed to {scans} in domain {options.domain}; {source}; base frame {options.base_frame}; "
         f"{options.topic('initialpose')} when {options.agree} scans agree"
     )
 
@@ -265,16 +273,23 @@ def _names(scans: tuple[str, ...], namespace: str | None, rules: list[str]) -> t
     return checked_namespace(namespace_of(scans) if chosen is None else chosen), remappings
 
 
-def _map_at(name: str) -> tuple[linefix.MapIndex, str]:
+def _maps_at(names: Sequence[str]) -> Maps:
     import linefix
+    from ros2 import Maps
 
-    document = document_at(name, None)
-    with needing_formats(name):
-        index = linefix.index_map(document)
+    documents = read_maps(names)
+    frames = {name: _frame_of(document, name) for name, document in documents.items()}
+    several = len(documents) > 1
+    with needing_formats("a map"):
+        index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
+    return Maps(index, frames)
+
+
+def _frame_of(document: Json, name: str) -> str:
     frame = document.get("frame_id") or "map"
     if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
         raise RefusedError(
             f"{name}: found a frame_id that is not a name, expected at most "
             f"{MAX_FRAME} printable characters; correct it in the map file"
         )
-    return index, frame
+    return frame

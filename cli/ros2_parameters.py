@@ -40,8 +40,24 @@ def parameters_of(file: Path, namespace: str | None = None) -> dict[str, Any]:
         )
     values: dict[str, Any] = {}
     for key in keys:
-        values.update(sections.get(key, {}))
-    return {("on" if key == "map" else key): value for key, value in values.items() if value is not None}
+        values.update(_with_maps(sections.get(key, {}), file))
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:
+    """Return a section with `map`, a text, or `maps`, a list, as the option that takes both; raises `WrongUseError`."""
+    given = {name: value for name in ("map", "maps") if (value := section.get(name)) is not None}
+    others = {name: value for name, value in section.items() if name not in ("map", "maps")}
+    if not given:
+        return others
+    if len(given) == 2:
+        raise WrongUseError(f"{file}: found map and maps in one section, expected one of them")
+    (name, value), *_ = given.items()
+    maps = [value] if name == "map" else value
+    if not (isinstance(maps, list) and all(isinstance(one, str) for one in maps)):
+        expected = "the name of a map" if name == "map" else "a list of names of maps, such as [hq-1.yaml, hq-2.yaml]"
+        raise WrongUseError(f"{file}: {name}: found {str(value)[:80]!r}, expected {expected}")
+    return {**others, "on": maps}
 
 
 def robots_of(file: Path) -> list[str]:

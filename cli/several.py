@@ -30,14 +30,43 @@ def read_target(names: Sequence[str]) -> Json:
     RefusedError
         When a file is not taken.
     """
-    single = [name for one in names for name in _files_of(one)]
-    if len(single) == 1:
-        return {"map": read_map_or_id(single[0])}
-    maps: list[Json] = []
-    for name in single:
-        document, taken = read_map_or_id(name), {one["map_id"] for one in maps}
-        maps.append(document if "segments" not in document else {**document, "map_id": _name_of(name, taken)})
-    return {"maps": maps}
+    named = _named(names)
+    if len(named) == 1:
+        return {"map": named[0][1]}
+    return {"maps": [{**one, "map_id": name} if "segments" in one else one for name, one in named]}
+
+
+def read_maps(names: Sequence[str]) -> dict[str, Json]:
+    """Return the maps of this machine themselves, by name.
+
+    Parameters
+    ----------
+    names : sequence of str
+        As of `read_target`.
+
+    Raises
+    ------
+    WrongUseError
+        Likewise, and when a stored map is named twice.
+    RefusedError
+        When a file is not taken, or a stored map is gone.
+    """
+    maps: dict[str, Json] = {}
+    for name, document in _named(names):
+        if name in maps:
+            raise WrongUseError(f"found the map {name} twice, expected each map once; omit one of them")
+        maps[name] = _whole(document, None)
+    return maps
+
+
+def _named(names: Sequence[str]) -> list[tuple[str, Json]]:
+    """Return the map of each file by the name of the file, and ids of stored maps."""
+    named: list[tuple[str, Json]] = []
+    for name in (name for one in names for name in _files_of(one)):
+        document, taken = read_map_or_id(name), {one for one, _ in named}
+        stored = document.get("map_id") if "segments" not in document else None
+        named.append((stored or _name_of(name, taken), document))
+    return named
 
 
 def _files_of(name: str) -> list[str]:

@@ -14,6 +14,7 @@
     gathering         scans of several scanners that belong together
     locating          one scan to the robot's pose
     searching         the thread of the searches
+    maps              the maps that are searched
     map_conversion    an OccupancyGrid to a map, in a process of its own
     localization      results of scans to the published poses
     agreement         several scans that agree through odometry
@@ -27,12 +28,14 @@
 """
 
 from .connecting import ConnectionRefusedError, domain_of
+from .maps import Maps
 from .names import OptionError, checked_namespace, namespace_of, remapping_of
 from .node import Node
 from .options import NodeOptions
 
 __all__ = [
     "ConnectionRefusedError",
+    "Maps",
     "Node",
     "NodeOptions",
     "OptionError",

@@ -1,6 +1,6 @@
 """Several scans that agree through odometry: only their pose is published. No DDS in here.
 
-The state is a list of hypotheses, each a pose of the robot in the map that odometry carries along:
+The state is a list of hypotheses, each a pose of the robot in a map that odometry carries along:
 
 1. A usable scan that agrees with the prediction of a hypothesis supports it; with none, it starts a new one.
 2. A usable scan that disagrees counts against a hypothesis; so does one that is not usable, where the prediction is
@@ -46,6 +46,22 @@ HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A pose on a map.
+
+    Attributes
+    ----------
+    pose : RigidTransform
+        map_from_base.
+    map_id : str or None
+        Of several maps the one that the pose is on.
+    """
+
+    pose: RigidTransform
+    map_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Observation:
     """The result of one scan, and odometry at its time.
 
@@ -60,10 +76,12 @@ class Observation:
     usable : bool
     odometry : RigidTransform or None
         odom_from_base at `stamp`; None: no odometry, the robot is taken to rest.
-    others : sequence of RigidTransform
-        Other poses, map_from_base, that explain the scan.
+    others : sequence of Place
+        Other poses that explain the scan.
     conclusive : bool
         True when every pose that explains the scan about as well is `pose` or one of `others`.
+    map_id : str or None
+        Of several maps the one that `pose` is on.
     """
 
     stamp: int
@@ -71,8 +89,9 @@ class Observation:
     covariance: Floats | None
     usable: bool
     odometry: RigidTransform | None = None
-    others: Sequence[RigidTransform] = ()
+    others: Sequence[Place] = ()
     conclusive: bool = False
+    map_id: str | None = None
 
 
 class Event(StrEnum):
@@ -245,15 +264,21 @@ def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> floa
 
 
 def _verdict(begin: Observation, scan: Observation) -> bool | None:
-    """Return whether a scan agrees with what odometry predicts; None where that is undecided."""
+    """Return whether a scan agrees with what odometry predicts; None where that is undecided.
+
+    Poses of different maps never agree.
+    """
     step = step_between(begin, scan)
     if step is None or scan.pose is None:
         return None
     predicted, covariance = predict(begin, step)
+    if scan.usable and scan.map_id != begin.map_id:
+        return False
     if scan.usable:
         both = covariance + (0.0 if scan.covariance is None else scan.covariance)
         return chi_square(predicted, scan.pose, both) <= AGREEING_CHI_SQUARE
     if not scan.conclusive:
         return None
-    near = any(chi_square(predicted, pose, covariance) <= AGREEING_CHI_SQUARE for pose in (scan.pose, *scan.others))
+    places = [one.pose for one in (Place(scan.pose, scan.map_id), *scan.others) if one.map_id == begin.map_id]
+    near = any(chi_square(predicted, pose, covariance) <= AGREEING_CHI_SQUARE for pose in places)
     return None if near else False

@@ -64,6 +64,7 @@ class Health:
     _published: dict[str, float] = field(default_factory=dict)
     _logged: dict[str, float] = field(default_factory=dict)
     _state: State | None = None
+    _map: str | None = None
     _beat: float = 0.0
 
     def problem(self, problem: str, stamp: Time | None = None) -> None:
@@ -93,12 +94,12 @@ class Health:
         self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [status]))
 
     def beat(self, state: State, stamp: Time, values: Mapping[str, str]) -> None:
-        """Publish the state: at once where it has changed, else once a second."""
+        """Publish the state: at once where it or the map has changed, else once a second."""
         now = time.monotonic()
-        changed = state is not self._state
-        if not changed and now - self._beat < 1.0:
+        changed, map_changed = state is not self._state, values.get("map") != self._map
+        if not changed and not map_changed and now - self._beat < 1.0:
             return
-        self._beat = now
+        self._beat, self._map = now, values.get("map")
         values = {"state": state.value, **values}
         self.publish("localization", stamp, STATES[state], values)
         prefix, hardware_id = self.names

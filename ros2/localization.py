@@ -13,10 +13,11 @@ from .deciding import InitialPose
 from .frames import Frames
 from .health import Health, State, current_time
 from .locating import Located
-from .messages import PoseWithCovarianceStamped, Time
+from .maps import UNNAMED, Maps
+from .messages import PoseWithCovarianceStamped, String, Time
 from .odometry import OdometryHistory, nanoseconds
 from .options import NodeOptions
-from .reporting import at_least, stamped_pose, transform_of
+from .reporting import at_least, map_marker, stamped_pose, transform_of
 from .requests import Requests
 from .topics import Topics
 from .transforms import NS, planar
@@ -35,16 +36,14 @@ class Localization:
     frames : Frames
     odometry : OdometryHistory
         The node owns both.
-
-    Attributes
-    ----------
-    map_frame : str
     """
 
     def __init__(
         self, options: NodeOptions, topics: Topics, health: Health, frames: Frames, odometry: OdometryHistory
     ) -> None:
-        self.map_frame = "map"
+        self._maps: Maps | None = None
+        self._map_name = UNNAMED  # of the last agreed pose
+        self._localizer_map: str | None = None  # of the last pose that was published to a localizer
         self._options, self._topics, self._health = options, topics, health
         self._frames, self._odometry = frames, odometry
         self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
@@ -53,6 +52,21 @@ class Localization:
         self._pending: tuple[Time, Observation, str] | None = None
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
         self._transformed = 0  # the time of the last transform that was published, nanoseconds
+
+    def use(self, maps: Maps) -> None:
+        """Take other maps, and forget the pose; the walls of a single map are published at once."""
+        self._maps, self._map_name, self._localizer_map = maps, UNNAMED, None
+        self.begin_again()
+        if not maps.several:
+            self._publish_walls(None)
+
+    def _publish_walls(self, map_id: str | None) -> None:
+        if self._maps is not None:
+            walls, frame = self._maps.walls_of(map_id), self._maps.frame_of(map_id)
+            self._topics.walls.publish(map_marker(walls, frame))
+
+    def _frame_of(self, scan: Observation | None) -> str:
+        return "map" if scan is None or self._maps is None else self._maps.frame_of(scan.map_id)
 
     @property
     def odom_frame(self) -> str:
@@ -94,17 +108,35 @@ class Localization:
             self._health.note("the agreed pose is contradicted by a scan")
         if event not in (Event.AGREED, Event.CONFIRMED):
             return
-        names = self.map_frame, self.odom_frame
-        agrees = self._watch.compare(scan, names, self._frames, self._odometry)
+        self._follow(scan.map_id)
+        names = self._frame_of(scan), self.odom_frame
+        # The same coordinates on another map are another place, and the map of the localizer is known by what it got.
+        agrees = None
+        if scan.map_id == self._localizer_map:
+            agrees = self._watch.compare(scan, names, self._frames, self._odometry)
+        else:
+            self._initial.want()
         reason = self._initial.decide(event, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
         self._publish_agreed(located.stamp, scan, reason)
+
+    def _follow(self, map_id: str | None) -> None:
+        """Publish the map of the agreed pose where it is another one than before."""
+        name = UNNAMED if self._maps is None else self._maps.name_of(map_id)
+        if name == self._map_name:
+            return
+        changed = f"the map changed from {self._map_name} to {name}" if self._map_name else f"the map is {name}"
+        self._map_name = name
+        self._topics.map_id.publish(String(name))
+        if map_id is not None:
+            self._publish_walls(map_id)
+            self._health.log(changed)
 
     def _publish_agreed(self, stamp: Time, scan: Observation, reason: str | None) -> None:
         if scan.pose is None or scan.covariance is None:
             return
-        agreed = stamped_pose(stamp, scan.pose, scan.covariance, self.map_frame)
+        agreed = stamped_pose(stamp, scan.pose, scan.covariance, self._frame_of(scan))
         self._topics.agreed.publish(agreed)
-        self._requests.answer(agreed)
+        self._requests.answer(agreed, self._map_name)
         if reason is not None:
             self._pending = stamp, scan, reason
             self.publish_initial()
@@ -130,11 +162,13 @@ class Localization:
         self._watch.reset()
         x, y, degrees = scan.pose.x, scan.pose.y, math.degrees(scan.pose.theta)
         name, place = self._topics.initial.name, f"x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
+        place = place if scan.map_id is None else f"{place} on {scan.map_id}"
         if not subscribed:
             self._health.note(f"not published, because {name} has no subscriber ({reason}): {place}", "no subscriber")
             return
         widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
-        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self.map_frame))
+        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame_of(scan)))
+        self._localizer_map = scan.map_id
         self._health.note(f"published {name} ({reason}): {place}")
 
     def _odometry_at(self, stamp: int) -> linefix.RigidTransform | None:
@@ -159,7 +193,7 @@ class Localization:
             return
         self._transformed = stamp
         ahead = stamp + TRANSFORM_TOLERANCE_NS
-        frames = self.map_frame, self.odom_frame
+        frames = self._frame_of(self._agreement.latest), self.odom_frame
         self._topics.tf.publish(transform_of(Time(ahead // NS, ahead % NS), frames, map_from_odom))
 
     def state(self, *, searched: bool) -> State:
@@ -182,4 +216,5 @@ class Localization:
         if latest is not None and latest.pose is not None:
             values["pose"] = f"{latest.pose.x:.3f} {latest.pose.y:.3f} {latest.pose.theta:.4f}"
             values["stamp"] = f"{latest.stamp / 1e9:.3f}"
+            values["map"] = self._map_name
         return values

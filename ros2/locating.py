@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import linefix
 from registration import RigidTransform
 
-from .agreement import Observation
+from .agreement import Observation, Place
 from .looking import Look
 from .messages import Time
 from .tuning import INCONCLUSIVE_NATS
@@ -47,8 +47,10 @@ class Located:
     def observation(self, odometry: RigidTransform | None, stamp: int) -> Observation:
         """Return the result for the agreement, with odom_from_base at its stamp (nanoseconds)."""
         answer = self.answer
-        others = tuple(one.pose for one in answer.alternatives)
-        return Observation(stamp, answer.pose, answer.covariance, answer.usable, odometry, others, self._conclusive)
+        others = tuple(Place(one.pose, one.map_id) for one in answer.alternatives)
+        return Observation(
+            stamp, answer.pose, answer.covariance, answer.usable, odometry, others, self._conclusive, answer.map_id
+        )
 
     @property
     def _conclusive(self) -> bool:
@@ -61,7 +63,9 @@ class Located:
         return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 
 
-def locate(index: linefix.MapIndex, looks: Sequence[Look], deadline: linefix.Deadline | None = None) -> Located:
+def locate(
+    index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], deadline: linefix.Deadline | None = None
+) -> Located:
     """Find where the robot is by one scan, or several together, at the time of the first beam of the first."""
     together = linefix.assemble([look.view for look in looks])
     return Located(looks[0].stamp, linefix.locate(index, together, options=OPTIONS, deadline=deadline))

@@ -23,6 +23,7 @@ import numpy as np
 
 import linefix
 
+from .maps import UNNAMED, Maps
 from .messages import Header, MapMetaData, OccupancyGrid, SerializedGrid
 from .names import MAX_NAME
 from .tuning import CONVERSION_BYTES, CONVERSION_IDLE, CONVERSION_PATIENCE, CONVERSION_SECONDS, MAX_GRID_BYTES
@@ -34,18 +35,15 @@ class Converted:
 
     Attributes
     ----------
-    index : MapIndex or None
+    maps : Maps or None
         None where the grid is not used.
-    frame : str
-        Of the map.
     size : str
         Of the grid, to be logged.
     problem : str
         Why the grid is not used.
     """
 
-    index: linefix.MapIndex | None = None
-    frame: str = "map"
+    maps: Maps | None = None
     size: str = ""
     problem: str = ""
 
@@ -207,7 +205,7 @@ def convert(serialized: bytes) -> Converted:
     except linefix.InputError as error:
         return Converted(problem=str(error))
     size = f"{grid.info.width} x {grid.info.height} cells of {grid.info.resolution:.3g} m"
-    return Converted(index, frame, size)
+    return Converted(Maps(index, {UNNAMED: frame}), size)
 
 
 def digest_of(serialized: bytes) -> bytes:

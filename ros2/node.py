@@ -15,11 +15,12 @@ from .health import Health, State, current_time
 from .localization import Localization
 from .looking import HERE
 from .map_conversion import MapConverter
+from .maps import Maps
 from .messages import LaserScan, Odometry
 from .names import quoted
 from .odometry import OdometryHistory
 from .options import NodeOptions
-from .reporting import answer_marker, map_marker, stamped_pose, values_of, verdict_of
+from .reporting import answer_marker, stamped_pose, values_of, verdict_of
 from .searching import Found, Searcher
 from .silence import Silence
 from .topics import Topics
@@ -41,10 +42,8 @@ class Node:
     Parameters
     ----------
     options : NodeOptions
-    index : MapIndex, optional
+    maps : Maps, optional
         None: the map comes over `options.map_topic`.
-    frame : str
-        Of the map; a map that comes over its topic brings its own.
     log : callable
         Takes a line.
 
@@ -59,11 +58,10 @@ class Node:
     def __init__(
         self,
         options: NodeOptions,
-        index: linefix.MapIndex | None = None,
-        frame: str = "map",
+        maps: Maps | None = None,
         log: Callable[[str], None] = _to_stderr,
     ) -> None:
-        self._options, self._index, self._generation = options, index, 0
+        self._options, self._maps, self._generation = options, maps, 0
         self._frames, self._odometry = Frames(), OdometryHistory()
         self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
@@ -76,12 +74,11 @@ class Node:
         self._health = Health(self._topics.diagnostics, self._topics.status, names, log)
         self._silence = Silence(options, self._topics, self._health.note)
         self._localization = Localization(options, self._topics, self._health, self._frames, self._odometry)
-        self._localization.map_frame = frame
         self._waiting = Waiting(participant, self._topics.subscriptions)
         self._searcher = Searcher(self._waiting.wake)
         self._converter = MapConverter(self._waiting.wake) if options.map_topic else None
-        if index is not None:
-            self._topics.walls.publish(map_marker(index, frame))
+        if maps is not None:
+            self._localization.use(maps)
 
     def wait_until_ready(self) -> None:
         """Return when a map that comes would be converted at once."""
@@ -148,15 +145,14 @@ class Node:
         if converted is None:
             return
         topic = self._topics.maps[0].name
-        if converted.index is None:
+        if converted.maps is None:
             self._health.problem(f"the map on {topic} is not used: {converted.problem}")
             return
-        self._index, self._localization.map_frame = converted.index, converted.frame
+        self._maps = converted.maps
         self._generation += 1
-        self._localization.begin_again()
-        walls = len(self._index.segments)
-        self._health.note(f"map from {topic}: {converted.size}, {walls} walls, frame {quoted(converted.frame)}")
-        self._topics.walls.publish(map_marker(self._index, converted.frame))
+        self._localization.use(self._maps)
+        walls, frame = len(self._maps.walls_of(None)), self._maps.frame_of(None)
+        self._health.note(f"map from {topic}: {converted.size}, {walls} walls, frame {quoted(frame)}")
 
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
@@ -171,7 +167,7 @@ class Node:
             self._next[0] = ready
         while self._next and not self._searcher.busy:
             self._search(self._next.pop(next(iter(self._next))))
-        self._silence.look(has_map=self._index is not None)
+        self._silence.look(has_map=self._maps is not None)
 
     def _turn_results(self) -> None:
         """Take results; each waits until odometry has reached its stamp, or long enough.
@@ -214,7 +210,7 @@ class Node:
 
     def _search(self, scans: Sequence[LaserScan]) -> None:
         stamp = scans[0].header.stamp
-        if self._index is None:
+        if self._maps is None:
             converting = self._converter is not None and self._converter.busy
             problem = "the map is being converted" if converting else "no map has been published"
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
@@ -228,15 +224,16 @@ class Node:
         self._searched = bool(looks)
         if looks:
             self._silence.searched()
-            self._searcher.submit(self._index, looks, self._generation)
+            self._searcher.submit(self._maps.index, looks, self._generation)
 
     def _take_result(self, found: Found) -> None:
         if found.located is None:
             self._health.problem(found.problem, found.stamp)
             return
-        if found.generation != self._generation:
+        if found.generation != self._generation or self._maps is None:
             return  # the map has changed meanwhile
-        located, milliseconds, frame = found.located, 1e3 * found.seconds, self._localization.map_frame
+        located, milliseconds = found.located, 1e3 * found.seconds
+        frame = self._maps.frame_of(located.answer.map_id)
         if located.answer.usable and located.pose is not None and located.covariance is not None:
             pose = stamped_pose(located.stamp, located.pose, located.covariance, frame)
             self._topics.pose.publish(pose)
@@ -246,4 +243,4 @@ class Node:
 
     @property
     def _state(self) -> State:
-        return State.NO_MAP if self._index is None else self._localization.state(searched=self._searched)
+        return State.NO_MAP if self._maps is None else self._localization.state(searched=self._searched)

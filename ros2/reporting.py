@@ -80,9 +80,9 @@ def transform_of(stamp: Time, frames: tuple[str, str], pose: linefix.RigidTransf
     return TFMessage([TransformStamped(Header(stamp, frames[0]), frames[1], transform)])
 
 
-def map_marker(index: linefix.MapIndex, frame: str) -> MarkerArray:
+def map_marker(walls: linefix.Segments, frame: str) -> MarkerArray:
     """Return the walls of a map, to be shown once."""
-    ends = index.segments.endpoints[: index.directed].reshape(-1, 2)
+    ends = walls.endpoints.reshape(-1, 2)
     points = [Point(x, y, 0.0) for x, y in ends.tolist()]
     return MarkerArray([_marker(frame, Time(), "map", LINES, GREY, points=points)])
 
@@ -111,6 +111,7 @@ def values_of(located: Located, milliseconds: float) -> dict[str, str]:
     """Return the verdict of a scan as keys and values."""
     answer = located.answer
     return {
+        **({} if answer.map_id is None else {"map": answer.map_id}),
         "status": answer.status.value,
         "usable": str(answer.usable).lower(),
         "probability": "" if answer.probability is None else f"{answer.probability:.4f}",

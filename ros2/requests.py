@@ -45,12 +45,13 @@ class Requests:
                 self._waiting[name] = time.monotonic()
         return bool(messages)
 
-    def answer(self, agreed: PoseWithCovarianceStamped) -> None:
-        """Answer all open requests with a pose."""
+    def answer(self, agreed: PoseWithCovarianceStamped, map_name: str) -> None:
+        """Answer all open requests with a pose, and the name of its map."""
         if not self._waiting:
             return
         place, turn = agreed.pose.pose.position, agreed.pose.pose.orientation
         values = {
+            "map": map_name,
             "frame_id": agreed.header.frame_id,
             "x": f"{place.x:.4f}",
             "y": f"{place.y:.4f}",

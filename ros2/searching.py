@@ -44,7 +44,7 @@ class Found:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    index: linefix.MapIndex
+    index: linefix.MapIndex | linefix.MapSet
     looks: Sequence[Look]
     generation: int
 
@@ -67,7 +67,7 @@ class Searcher:
         self._thread = threading.Thread(target=self._run, name="searches", daemon=True)
         self._thread.start()
 
-    def submit(self, index: linefix.MapIndex, looks: Sequence[Look], generation: int) -> None:
+    def submit(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> None:
         """Search a scan; only while not `busy`."""
         self.busy = True
         self._tasks.put(_Task(index, looks, generation))

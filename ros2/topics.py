@@ -93,6 +93,7 @@ class Topics:
         # On a topic of its own: behind robots the map would be no longer latched.
         self.walls: Publisher[MarkerArray] = publish("linefix/map_markers", MarkerArray, NEWEST)
         self.markers: Publisher[MarkerArray] = publish("linefix/markers", MarkerArray, NEWEST)
+        self.map_id: Publisher[String] = publish("linefix/map_id", String, NEWEST)
         self.status: Publisher[DiagnosticStatus] = publish("linefix/status", DiagnosticStatus, NEWEST)
         self.results: Publisher[DiagnosticStatus] = publish("linefix/locate_result", DiagnosticStatus, LATCHED)
         self.diagnostics: Publisher[DiagnosticArray] = publish("/diagnostics", DiagnosticArray, RELIABLE)

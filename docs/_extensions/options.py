@@ -23,7 +23,9 @@ def parameters() -> Iterator[tuple[str, str, str, str]]:
     for option in command.params:
         if option.name in NOT_PARAMETERS:
             continue
-        name = "map" if option.name == "on" else str(option.name)
+        if option.name == "on":
+            yield "map", "text", "", "The same as `maps` with one map."
+        name = "maps" if option.name == "on" else str(option.name)
         default = option.default
         shown = "" if default in (None, "", []) else str(default).lower() if isinstance(default, bool) else str(default)
         yield name, _kind(option), shown, " ".join((option.help or "").split())

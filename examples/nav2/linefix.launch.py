@@ -19,9 +19,9 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 
 OPTIONS = {
-    "map": ("", "the map that map_server serves, as a file; empty: the topic map"),
+    "map": ("", "the map that map_server serves, as a file; with commas, several; empty: the topic map"),
     "map_topic": ("", "topic of an OccupancyGrid, without a map"),
-    "scan": ("", "topic of scans"),
+    "scan": ("", "topic of scans; with commas, several"),
     "odom": ("", "topic of odometry"),
     "base": ("", "base frame of the robot"),
     "odom_frame": ("", "odometry frame"),
@@ -39,6 +39,7 @@ FLAGS = {
     "motion": ("", "true or false: correct scans for motion"),
     "publish_tf": ("", "true or false: publish the transform from the map to the odometry frame"),
 }
+SEVERAL = ("map", "scan")
 RESPAWN_DELAY = 3.0  # s
 
 
@@ -47,8 +48,9 @@ def command(context):
     words = ["linefix", "ros2"]
     for name in OPTIONS:
         value = LaunchConfiguration(name).perform(context)
-        if value:
-            words += [f"--{name.replace('_', '-')}", value]
+        for one in value.split(",") if name in SEVERAL else [value]:
+            if one:
+                words += [f"--{name.replace('_', '-')}", one]
     for name in FLAGS:
         value = LaunchConfiguration(name).perform(context).lower()
         if value:

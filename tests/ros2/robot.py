@@ -20,7 +20,7 @@ import numpy as np
 from cyclonedds.util import duration
 
 import linefix
-from ros2 import Node, NodeOptions, messages
+from ros2 import Maps, Node, NodeOptions, messages
 from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 ROOT = Path(__file__).parent.parent.parent
@@ -33,6 +33,10 @@ PATIENCE = 60.0  # s for what has to come about
 POLL = 0.05  # s between two looks whether it has
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
+UPSTAIRS = np.array(
+    [[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 3, 5], [3, 5, 3, 2.6], [3, 2.6, 0, 2.6], [0, 2.6, 0, 0]], dtype=float
+)
+FLOORS = {"hq-1": linefix.Segments.from_array(ROOM), "hq-2": linefix.Segments.from_array(UPSTAIRS)}
 MAP_FROM_BASE = linefix.RigidTransform(1.0, 1.5, 0.4)
 BASE_FROM_LASER = linefix.RigidTransform(0.3, -0.1, 2.0)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
@@ -75,12 +79,17 @@ def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:
     return messages.OccupancyGrid(messages.Header(frame_id=frame), info, cells)
 
 
+def floors(**frames: str) -> Maps:
+    """Return two floors that are searched together; the frame of each is `map` unless it is given."""
+    return Maps(linefix.index_maps(FLOORS), {name: frames.get(name, "map") for name in FLOORS})
+
+
 @contextmanager
 def running(
-    options: NodeOptions, index: linefix.MapIndex | None, log: Callable[[str], None] = lambda _: None
+    options: NodeOptions, maps: linefix.MapIndex | Maps | None, log: Callable[[str], None] = lambda _: None
 ) -> Iterator[Node]:
     """Run a bridge in a thread of this process, which takes no time to start."""
-    node = Node(options, index, log=log)
+    node = Node(options, Maps(maps, {"room": "map"}) if isinstance(maps, linefix.MapIndex) else maps, log)
     node.wait_until_ready()
     with ThreadPoolExecutor(1) as pool:
         ended = pool.submit(node.run)

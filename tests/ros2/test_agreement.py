@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from registration import RigidTransform
-from ros2.agreement import Agreement, Event, Observation
+from ros2.agreement import Agreement, Event, Observation, Place
 
 COVARIANCE = np.diag([0.005**2, 0.005**2, 0.002**2])
 SECOND = 1_000_000_000
 MAP_FROM_ODOM = RigidTransform(3.0, -2.0, 0.7)
 WRONG = RigidTransform(-4.0, 1.0, 2.6)  # moves a pose to a place that looks alike
+FAR = Place(RigidTransform(9.0, 9.0, 0.0))
 STILL = [RigidTransform(1.0, 1.0, 0.5)] * 12
 STRAIGHT = [RigidTransform(0.2 * k, 0.0, 0.0) for k in range(12)]
 TURNING = [RigidTransform(1.0, 1.0, math.radians(12.0 * k)) for k in range(12)]
@@ -91,7 +92,7 @@ def test_at_rest_nothing_may_contradict() -> None:
 def test_a_wrong_scan_and_ambiguous_ones_are_not_agreed() -> None:
     """The doorway of a round room: one scan is usable and wrong, the others are ambiguous and list other poses."""
     scans = drive(STRAIGHT)
-    after = [replace(scan, usable=False, conclusive=True, others=(RigidTransform(9.0, 9.0, 0.0),)) for scan in scans]
+    after = [replace(scan, usable=False, conclusive=True, others=(FAR,)) for scan in scans]
     assert first_agreed([wrong(scans[0]), *after[1:]]) is None
 
 
@@ -115,11 +116,45 @@ def test_scans_that_are_not_usable_contradict_only_where_they_list_all_poses() -
     assert agreement.take(elsewhere) is Event.NOTHING
     assert agreement.take(replace(elsewhere, conclusive=True)) is Event.CONTRADICTED
     assert scans[6].pose is not None
-    listed = replace(elsewhere, conclusive=True, others=(scans[6].pose,))
+    listed = replace(elsewhere, conclusive=True, others=(Place(scans[6].pose),))
     assert agreement.take(listed) is Event.NOTHING
     assert agreement.take(replace(elsewhere, pose=None, conclusive=True)) is Event.NOTHING
     assert agreement.take(scans[7]) is Event.CONFIRMED
     assert not agreement.contradicted
+
+
+def on_map(scan: Observation, map_id: str) -> Observation:
+    return replace(scan, map_id=map_id)
+
+
+def test_scans_agree_on_the_pose_and_on_the_map() -> None:
+    """Two floors that are equal around the robot: the poses agree, the maps alternate."""
+    scans = drive([RigidTransform(0.2 * k, 0.0, 0.0) for k in range(30)])
+    assert first_agreed([on_map(scan, "hq-1") for scan in scans]) == 3
+    assert first_agreed([on_map(scan, f"hq-{k % 2}") for k, scan in enumerate(scans)]) is None
+
+
+def test_another_map_has_to_be_agreed_as_the_first_one() -> None:
+    """The robot leaves a lift at the same coordinates of another floor."""
+    scans = drive([RigidTransform(0.2 * k, 0.0, 0.0) for k in range(20)])
+    agreement = Agreement()
+    ride = [on_map(scan, "hq-1" if k < 8 else "hq-2") for k, scan in enumerate(scans)]
+    assert [agreement.take(scan) for scan in ride][7:12] == [
+        Event.CONFIRMED, Event.CONTRADICTED, Event.CONTRADICTED, Event.CONTRADICTED, Event.AGREED,
+    ]  # fmt: skip
+    assert agreement.latest is ride[-1]
+
+
+def test_an_alternative_on_another_map_is_another_place() -> None:
+    scans = [on_map(scan, "hq-1") for scan in drive(STRAIGHT)]
+    agreement = Agreement()
+    for scan in scans[:6]:
+        agreement.take(scan)
+    elsewhere = replace(wrong(scans[6]), usable=False, conclusive=True)
+    assert scans[6].pose is not None
+    for map_id, event in (("hq-2", Event.CONTRADICTED), ("hq-1", Event.NOTHING)):
+        assert agreement.take(replace(elsewhere, others=(Place(scans[6].pose, map_id),))) is event
+    assert agreement.take(replace(scans[6], map_id="hq-2", usable=False, conclusive=True)) is Event.CONTRADICTED
 
 
 def test_old_scans_are_left_out_and_a_clock_that_is_set_back_begins_again() -> None:

@@ -20,7 +20,7 @@ import pytest
 import linefix
 from ros2 import NodeOptions
 
-from .robot import BASE_FROM_LASER, PATIENCE, POLL, ROOM, SCANNER, grid_of_room, running
+from .robot import BASE_FROM_LASER, FLOORS, PATIENCE, POLL, ROOM, SCANNER, floors, grid_of_room, running
 
 SOURCES = Path(__file__).parent / "fastdds"
 WALLS = linefix.Segments.from_array(ROOM)
@@ -69,12 +69,12 @@ class Peer:
     def mount(self) -> None:
         self.send("mount", BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta)
 
-    def drive(self, at: linefix.RigidTransform, second: float) -> None:
+    def drive(self, at: linefix.RigidTransform, second: float, walls: linefix.Segments = WALLS) -> None:
         """Publish odometry and a scan from a pose, map_from_base."""
         stamp = int(second), int(1e9 * (second % 1.0))
         self.send("odom", *stamp, at.x, at.y, at.theta)
         rng = np.random.default_rng(int(1e3 * second))
-        ranges = linefix.simulation.scan(WALLS, at.compose(BASE_FROM_LASER), SCANNER, rng).ranges
+        ranges = linefix.simulation.scan(walls, at.compose(BASE_FROM_LASER), SCANNER, rng).ranges
         self.send("scan", *stamp, SCANNER.angle_min, SCANNER.angle_increment, *ranges.round(4).tolist())
 
     def lines(self) -> list[str]:
@@ -126,11 +126,12 @@ class Way:
 
     def __init__(self, robot: Peer, second: float = 1.0) -> None:
         self.robot, self.second, self._driven = robot, second, 0.0
+        self.walls = WALLS
 
     def __call__(self) -> None:
         self.second += 0.5
         self._driven = min(2.4, self._driven + 0.15)
-        self.robot.drive(linefix.RigidTransform(0.8 + self._driven, 1.0, 0.1), self.second)
+        self.robot.drive(linefix.RigidTransform(0.8 + self._driven, 1.0, 0.1), self.second, self.walls)
 
     def rest(self) -> None:
         self.second += 0.5
@@ -223,6 +224,20 @@ def test_the_other_topics(domain: int, room: linefix.MapIndex, program: Path) ->
             robot.send("amcl", int(way.second), int(1e9 * (way.second % 1.0)), 0.5, 4.5, 1.0)
 
         robot.until("status 2 the pose of the localizer", elsewhere)
+
+
+def test_the_map_of_the_agreed_pose(domain: int, program: Path) -> None:
+    """The robot leaves a lift on another floor; a subscriber that comes later receives only the last map."""
+    with running(NodeOptions(domain=domain, namespace="/tower"), floors()), peer(program, domain, "/tower") as robot:
+        robot.mount()
+        way = Way(robot)
+        assert robot.until("map_id", way) == ["map_id", "hq-1"]
+        robot.until("initialpose", way)
+        way.walls, way._driven = FLOORS["hq-2"], 0.0
+        assert robot.until("map_id", way) == ["map_id", "hq-2"]
+        robot.until("initialpose", way)
+        with peer_without_bridge(program, domain, "/tower") as late:
+            assert late.until("map_id") == ["map_id", "hq-2"]
 
 
 def test_mounts_of_robots_with_prefixes_are_on_one_topic(domain: int, room: linefix.MapIndex, program: Path) -> None:

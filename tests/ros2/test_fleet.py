@@ -31,10 +31,12 @@ from .robot import (
 WALLS = linefix.Segments.from_array(ROOM)
 
 
-def scan_from(base: linefix.RigidTransform, second: float, frame: str = "laser") -> messages.LaserScan:
+def scan_from(
+    base: linefix.RigidTransform, second: float, frame: str = "laser", walls: linefix.Segments = WALLS
+) -> messages.LaserScan:
     """Return what a robot scans from a pose, map_from_base."""
     rng = np.random.default_rng(int(1e3 * second))
-    ranges = linefix.simulation.scan(WALLS, base.compose(BASE_FROM_LASER), SCANNER, rng).ranges
+    ranges = linefix.simulation.scan(walls, base.compose(BASE_FROM_LASER), SCANNER, rng).ranges
     stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
     return messages.LaserScan(
         messages.Header(stamp, frame),
@@ -57,13 +59,13 @@ class Fleet(Robot):
         )
         self.transforms = Subscription(self.net, "/tf", messages.TFMessage, RELIABLE)
 
-    def drive(self, at: linefix.RigidTransform, second: float) -> None:
+    def drive(self, at: linefix.RigidTransform, second: float, walls: linefix.Segments = WALLS) -> None:
         """Publish odometry and a scan; the odometry frame is where the map is, 1 m aside."""
         stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
         message = messages.Odometry(messages.Header(stamp, f"{self.prefix}odom"), f"{self.prefix}base_link")
         message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
         self.odometry.publish(message)
-        self.scans.publish(scan_from(at, second, f"{self.prefix}laser"))
+        self.scans.publish(scan_from(at, second, f"{self.prefix}laser", walls))
 
 
 def moved(second: float, speed: float = 0.3) -> linefix.RigidTransform:

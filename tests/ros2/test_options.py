@@ -67,11 +67,21 @@ def test_a_file_of_parameters_is_that_of_ros(tmp_path: Path) -> None:
         "/robot1/linefix:\n  ros__parameters:\n    agree: 5\n    map: hq.yaml\n    scan: [/a, /b]\n"
         "amcl:\n  ros__parameters:\n    agree: 9\n"
     )
-    assert parameters_of(file) == {"agree": 5, "base": "chassis", "on": "hq.yaml", "scan": ["/a", "/b"]}
+    assert parameters_of(file) == {"agree": 5, "base": "chassis", "on": ["hq.yaml"], "scan": ["/a", "/b"]}
     for text in ("", "[1]", "linefix: 3", "a: b: c", "\x00", "other:\n  ros__parameters: {}", "x: &a 1\ny: {<<: *a}"):
         file.write_text(text)
         with pytest.raises(WrongUseError, match="ros__parameters"):
             parameters_of(file)
+
+
+def test_maps_are_a_list_and_a_later_section_replaces_them(tmp_path: Path) -> None:
+    file = tmp_path / "linefix.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {maps: [hq-1.yaml, hq-2.yaml]}\n"
+        "/robot1/linefix:\n  ros__parameters: {map: hall.yaml}\n"
+    )
+    assert parameters_of(file, "/robot2") == {"on": ["hq-1.yaml", "hq-2.yaml"]}
+    assert parameters_of(file, "/robot1") == {"on": ["hall.yaml"]}
 
 
 FLEET = (
@@ -84,8 +94,8 @@ FLEET = (
 def test_a_file_may_have_the_parameters_of_several_robots(tmp_path: Path) -> None:
     file = tmp_path / "fleet.yaml"
     file.write_text(FLEET)
-    assert parameters_of(file, "/robot1") == {"agree": 4, "on": "one.yaml"}
-    assert parameters_of(file, "robot2/") == {"agree": 5, "on": "two.yaml"}
+    assert parameters_of(file, "/robot1") == {"agree": 4, "on": ["one.yaml"]}
+    assert parameters_of(file, "robot2/") == {"agree": 5, "on": ["two.yaml"]}
     assert parameters_of(file, "robot3") == parameters_of(file) == {"agree": 4}
     file.write_text("/robot1/linefix:\n  ros__parameters: {agree: 4}\n")
     with pytest.raises(WrongUseError, match=r"of /robot1, expected those of /robot2"):
@@ -120,6 +130,11 @@ def test_the_namespace_chooses_the_parameters_of_a_robot(
         ("agree: 0", "agree"),
         ("when: never", "when"),
         ("map: nowhere.yaml", "nowhere.yaml: there is no such file"),
+        ("maps: [nowhere.yaml]", "nowhere.yaml: there is no such file"),
+        ("map: [hq-1.yaml]", "map: found \"['hq-1.yaml']\", expected the name of a map"),
+        ("maps: hq-1.yaml", "maps: found 'hq-1.yaml', expected a list of names of maps"),
+        ("maps: [7]", "maps: found '[7]', expected a list of names of maps"),
+        ("{map: a.yaml, maps: [b.yaml]}", "found map and maps in one section, expected one of them"),
     ],
 )
 def test_a_wrong_parameter_ends_with_2(

@@ -51,10 +51,12 @@ function problemOf(status: number, answer: unknown): Problem {
 const JSON_TYPE = "application/json";
 const post = <T>(path: string, body: unknown, signal?: AbortSignal) => call<T>("POST", path, JSON.stringify(body), JSON_TYPE, signal);
 
+type Named = { map_id: string };
 export interface Asked {
-  map: MapDocument | { map_id: string };
+  map?: MapDocument | Named;
+  maps?: (Named | (MapDocument & Named))[];
   scan: Scan;
-  prior?: Record<string, number>;
+  prior?: Record<string, number | string>;
 }
 
 export const associate = (asked: Asked, signal: AbortSignal) => post<Answer>("/v1/associate", asked, signal);
@@ -62,8 +64,8 @@ export const analyze = (asked: Record<string, unknown>) => post<Analysis>("/v1/a
 export const example = <T>(name: string) => call<T>("GET", `/page/examples/${name}.json`);
 
 const pathOf = (id: string) => `/v1/maps/${encodeURIComponent(id)}`;
-export const listMaps = (cursor: string) =>
-  call<{ maps: StoredMap[]; next: string | null }>("GET", `/v1/maps?limit=50&cursor=${encodeURIComponent(cursor)}`);
+export const listMaps = (cursor: string, limit = 50) =>
+  call<{ maps: StoredMap[]; next: string | null }>("GET", `/v1/maps?limit=${limit}&cursor=${encodeURIComponent(cursor)}`);
 export const getMap = (id: string) => call<MapDocument>("GET", pathOf(id));
 export const putMap = (id: string, map: MapDocument) => call<StoredMap>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE);
 export const deleteMap = (id: string) => call<void>("DELETE", pathOf(id));

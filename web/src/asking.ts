@@ -23,8 +23,9 @@ export function request(): { asked: Asked; sentTo: number[] } | null {
   if (!scan) return null;
   const kept = state.walls.map((_, k) => k).filter((k) => !state.off.has(k));
   const map = asStored() ? { map_id: state.mapId! } : { ...state.map, segments: kept.map((k) => state.walls[k]) };
-  const asked: Asked = { map, scan: noisy(scan, state.noise) };
-  if (checked("#near")) asked.prior = { ...state.robot, ...NEAR };
+  const several = state.floors.map((map_id) => (map_id === state.mapId ? { ...map, map_id } : { map_id }));
+  const asked: Asked = { ...(several.length ? { maps: several } : { map }), scan: noisy(scan, state.noise) };
+  if (checked("#near")) asked.prior = { ...state.robot, ...NEAR, ...(several.length ? { map_id: state.mapId! } : {}) };
   return { asked, sentTo: kept };
 }
 
@@ -45,10 +46,12 @@ export async function ask(): Promise<boolean> {
   }
   running?.abort();
   const mine = (running = new AbortController());
+  const of = state.mapId;
   try {
     const answer = await associate(made.asked, mine.signal);
     answer.unmatched_scan = answer.unmatched_scan.map((one: number | { scan: number }) => (typeof one === "number" ? one : one.scan));
-    Object.assign(state, { answer, sent: made.asked, sentTo: made.sentTo, others: countedOf(answer), other: -1 });
+    const sentTo = state.floors.length && answer.map?.map_id !== of ? [] : made.sentTo;
+    Object.assign(state, { answer, sent: made.asked, sentTo, others: countedOf(answer), other: -1 });
   } catch (error) {
     if (mine !== running || (error instanceof DOMException && error.name === "AbortError")) return false;
     forget();

@@ -3,8 +3,8 @@
 import { place, placed, pointsOf } from "./geometry";
 import { drawGrid, drawPicture } from "./ground";
 import { drawHeat, kindOf } from "./heat";
-import { state } from "./state";
-import type { Answer, Pose, Scan, Segment } from "./types";
+import { answerHere, state, wallOf } from "./state";
+import type { Answer, LogLine, Pose, Scan, Segment } from "./types";
 import { toPixels, view } from "./view";
 import { drawWalls } from "./walls";
 
@@ -59,7 +59,7 @@ function draw(): void {
   if (state.log.length) drawLog();
   const scan = sent?.scan ?? state.scan;
   if (scan && !state.virtual && !state.log.length) drawScan(scan, state.robot, "robot", 0.35);
-  if (answer && sent) drawAnswer(answer, sent.scan);
+  if (answer && sent) drawAnswer(sent.scan);
   if ((scan && !state.log.length) || state.virtual) drawRobot(state.robot, "robot", true);
 }
 
@@ -85,18 +85,26 @@ function drawScan(scan: Scan, pose: Pose, name: string, alpha: number): void {
   context.globalAlpha = 1;
 }
 
-function drawAnswer(answer: Answer, scan: Scan): void {
-  if (state.other >= 0) {
-    const { pose } = state.others[state.other];
-    drawScan({ ...scan, segments: sentSegments() }, pose, "other", 0.9);
-    drawRobot(pose, "other", false);
-    return;
+/** The pose that is shown in place of the answer: an alternative, or the best on a map that is not the answer's. */
+export function otherPose(): Pose | null {
+  const { others, other, floors, mapId, answer } = state;
+  const chosen = others[other];
+  if (chosen && (!floors.length || chosen.map_id === mapId)) return chosen.pose;
+  return answerHere() ? null : (answer?.maps?.find((one) => one.map_id === mapId)?.pose ?? null);
+}
+
+function drawAnswer(scan: Scan): void {
+  const [other, answer] = [otherPose(), answerHere()];
+  if (other) {
+    drawScan({ ...scan, segments: sentSegments() }, other, "other", 0.9);
+    drawRobot(other, "other", false);
   }
-  for (const k of answer.missing_map) line(state.walls[state.sentTo[k]], colours.missing, 4, [8, 6]);
+  if (other || !answer) return;
+  for (const k of answer.missing_map) line(state.walls[wallOf(k)], colours.missing, 4, [8, 6]);
   const { pose } = answer;
   if (!pose) return;
   const segments = sentSegments();
-  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[state.sentTo[k]], colours.critical, 12);
+  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[wallOf(k)], colours.critical, 12);
   drawScan({ ...scan, segments: undefined }, pose, "scan", 0.75);
   for (const pair of answer.correspondences) line(placed(pose, segments[pair.scan]), colours.matched, 5);
   for (const k of answer.unmatched_scan) line(placed(pose, segments[k]), colours.unmatched, 4, [2, 6]);
@@ -133,7 +141,7 @@ function drawUncertainty(answer: Answer, pose: Pose): void {
 
 /** The factor by which the ellipse and the sector of the heading are drawn larger; null where there are none. */
 export function enlarged(): number | null {
-  const c = state.other < 0 ? state.answer?.covariance : null;
+  const c = otherPose() ? null : answerHere()?.covariance;
   if (!c) return null;
   const half = Math.hypot((c[0][0] - c[1][1]) / 2, c[0][1]);
   const long = 3 * Math.sqrt((c[0][0] + c[1][1]) / 2 + half) * view.scale;
@@ -167,9 +175,11 @@ function drawSimilar(from: Pose, to: Pose): void {
   drawRobot(to, "other", false);
 }
 
+const onPlan = (line: LogLine) => !line.map_id || line.map_id === state.mapId;
+
 function drawLog(): void {
   state.log.forEach((one, k) => {
-    if (!one?.pose) return;
+    if (!one?.pose || !onPlan(one)) return;
     const [px, py] = toPixels(one.pose.x, one.pose.y);
     context.fillStyle = colours[kindOf(one)];
     context.beginPath();
@@ -177,5 +187,5 @@ function drawLog(): void {
     context.fill();
   });
   const here = state.log[state.logAt];
-  if (here?.pose && !state.answer) drawRobot(here.pose, kindOf(here), false);
+  if (here?.pose && onPlan(here) && !state.answer) drawRobot(here.pose, kindOf(here), false);
 }

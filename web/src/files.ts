@@ -82,7 +82,10 @@ function take(name: string, text: string): void {
   if (Array.isArray(content)) return takeMap({ segments: content } as MapDocument);
   if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan. Expected a JSON object, or an array of segments.`);
   const fields = content as Record<string, unknown>;
-  if ("map" in fields && "scan" in fields) {
+  if ("maps" in fields && "scan" in fields) {
+    if (!state.floors.length) throw new Error(`${name} refers to several maps. Search on them first, under "Stored maps".`);
+    takeScan(fields.scan as Scan);
+  } else if ("map" in fields && "scan" in fields) {
     // A request as it is sent.
     const { map, scan } = fields as { map: MapDocument; scan: Scan };
     if (!("segments" in map)) throw new Error(`${name} refers to a stored map. Open that map first, then a file with the scan.`);

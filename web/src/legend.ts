@@ -1,13 +1,14 @@
 // The legend below the plan: only what is drawn there now.
 
-import { enlarged, KINDS } from "./drawing";
+import { enlarged, KINDS, otherPose } from "./drawing";
 import { kindOf, shownOf } from "./heat";
-import { onChange, state } from "./state";
+import { answerHere, onChange, state } from "./state";
 
 const box = document.querySelector<HTMLElement>("#legend")!;
 
 function entries(): [string, string][] {
-  const { answer, walls, own, off, log } = state;
+  const { walls, own, off, log } = state;
+  const [answer, other] = [answerHere(), otherPose()];
   const parts: [string, string][] = [];
   if (state.picture) parts.push(["picture", "imported grid"]);
   if (walls.length) parts.push(["wall", "wall"]);
@@ -15,8 +16,8 @@ function entries(): [string, string][] {
   if (off.size) parts.push(["off", "removed wall"]);
   if (state.virtual) parts.push(["robot", "true pose"]);
   else if (state.scan && !log.length) parts.push(["robot", "initial pose of the scan"]);
-  if (state.other >= 0 || (state.analysis && state.pointed?.similar_pose)) parts.push(["other", state.other >= 0 ? "alternative" : "similar place"]);
-  if (answer && state.other < 0) {
+  if (other || (state.analysis && state.pointed?.similar_pose)) parts.push(["other", !other ? "similar place" : state.other < 0 ? "best pose on this map" : "alternative"]);
+  if (answer && !other) {
     if (answer.missing_map.length) parts.push(["missing", "wall that the scan lacks"]);
     if (answer.pose) parts.push(...ofAnswer());
   }

@@ -74,7 +74,7 @@ function note(): void {
   const { answer, log, logAt, scans } = state;
   if (!answer || !scans.length) return;
   const { status, usable, probability, pose, reasons } = answer;
-  log[logAt] = { stamp: scans[logAt].stamp, status, usable, probability, pose, reasons };
+  log[logAt] = { map_id: state.floors.length ? answer.map?.map_id : null, stamp: scans[logAt].stamp, status, usable, probability, pose, reasons };
 }
 
 onChange(() => {

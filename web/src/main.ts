@@ -11,6 +11,7 @@ import "./stored";
 import "./trying";
 import { setKey } from "./api";
 import { readColours, redraw, resize } from "./drawing";
+import { update } from "./floors";
 import { drawInset } from "./inset";
 import { choose, FIRST } from "./scene";
 import { onChange } from "./state";
@@ -25,6 +26,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   readColours();
   redraw();
   drawInset();
+  update();
 });
 new ResizeObserver(resize).observe(document.querySelector("#plan")!);
 resize();

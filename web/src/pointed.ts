@@ -1,8 +1,8 @@
 // The text for the object under the mouse.
 
-import { sentSegments } from "./drawing";
+import { otherPose, sentSegments } from "./drawing";
 import { distance, placed, wrap } from "./geometry";
-import { state } from "./state";
+import { answerHere, state, wallOf } from "./state";
 import type { Place, Pose } from "./types";
 import { toMetres, view } from "./view";
 
@@ -12,20 +12,20 @@ const degrees = (radians: number) => (180 / Math.PI) * radians;
 export function describe(px: number, py: number): string {
   const [x, y] = toMetres(px, py);
   const near = 8 / view.scale;
-  const { answer } = state;
+  const answer = answerHere();
   const pose = answer?.pose;
-  if (answer && pose && state.other < 0) {
+  if (answer && pose && !otherPose()) {
     const segments = sentSegments();
     for (const pair of answer.correspondences)
       if (distance(x, y, placed(pose, segments[pair.scan])) < near)
         return (
-          `scan segment ${pair.scan}, wall ${state.sentTo[pair.map]}: offset ${(1000 * pair.offset).toFixed(1)} mm, ` +
+          `scan segment ${pair.scan}, wall ${wallOf(pair.map)}: offset ${(1000 * pair.offset).toFixed(1)} mm, ` +
           `angle ${degrees(pair.angle).toFixed(2)}°, overlap ${Math.round(100 * pair.overlap)} %`
         );
     for (const k of answer.unmatched_scan)
       if (distance(x, y, placed(pose, segments[k])) < near) return `scan segment ${k}: without a correspondence`;
     for (const k of answer.missing_map)
-      if (distance(x, y, state.walls[state.sentTo[k]]) < near) return `wall ${state.sentTo[k]}: should be visible, but the scan lacks it`;
+      if (distance(x, y, state.walls[wallOf(k)]) < near) return `wall ${wallOf(k)}: should be visible, but the scan lacks it`;
   }
   const place = placeAt(x, y);
   if (place) return describePlace(place);

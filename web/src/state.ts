@@ -5,6 +5,7 @@ import type { Alternative, Analysis, Answer, Example, LogLine, MapDocument, Plac
 export interface State {
   map: MapDocument | null;
   mapId: string | null; // of a stored map
+  floors: string[]; // the stored maps that are searched together, of which `map` is shown; else empty
   picture: Picture | null; // of the grid that the map was imported from
   example: string; // name of the example that is shown, empty for none
   walls: Segment[]; // all walls of the map, also those that were removed, and after them the walls of added boxes
@@ -16,7 +17,7 @@ export interface State {
   virtual: boolean; // whether the scan is simulated
   laser: Example["laser"];
   noise: number; // m
-  sent: { map: MapDocument | { map_id: string }; scan: Scan } | null; // the request that was answered
+  sent: { scan: Scan } | null; // the request that was answered
   answer: Answer | null;
   sentTo: number[]; // index of each wall that was sent, among all walls
   others: Alternative[]; // the alternatives that are counted and shown
@@ -41,6 +42,7 @@ export type Shown = "now" | "driven" | "landmark";
 export const state: State = {
   map: null,
   mapId: null,
+  floors: [],
   picture: null,
   example: "",
   walls: [],
@@ -77,15 +79,33 @@ export function changed(): void {
 
 /** Show another map, and forget what belongs to the one before; a log stays. */
 export function setMap(map: MapDocument, mapId: string | null = null): void {
-  const own = map.segments.length;
-  Object.assign(state, { map, mapId, walls: map.segments, own, off: new Set(), boxes: [], picture: null, example: "" });
+  take(map, mapId);
+  state.floors = [];
   if (state.scans.length) state.log = state.scans.map(() => null);
   else Object.assign(state, { log: [], logAt: 0 });
   forget();
-  state.analysis = state.pointed = null;
   const box = boundsOf(map.segments);
   state.robot = { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2, theta: 0 };
 }
+
+/** Show another of the maps that are searched together; their answer stays. */
+export function showFloor(map: MapDocument, mapId: string): void {
+  take(map, mapId);
+}
+
+function take(map: MapDocument, mapId: string | null): void {
+  Object.assign(state, { map, mapId, walls: map.segments, own: map.segments.length, off: new Set(), boxes: [] });
+  Object.assign(state, { picture: null, example: "", analysis: null, pointed: null });
+}
+
+/** The answer, where its pose is on the map that is shown. */
+export function answerHere(): Answer | null {
+  const { answer, floors, mapId } = state;
+  return answer && floors.length && answer.map?.map_id !== mapId ? null : answer;
+}
+
+/** The wall on the plan that has an index in the answer. */
+export const wallOf = (k: number) => state.sentTo[k] ?? k;
 
 /** Show no map: an example's is not that of a scan which is opened. */
 export function forgetMap(): void {

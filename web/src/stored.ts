@@ -2,8 +2,10 @@
 
 import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
 import { askSoon } from "./asking";
+import { openSeveral } from "./floors";
 import { kept, setMap, state } from "./state";
 import { isLatest, showAll, supersede } from "./scene";
+import type { StoredMap } from "./types";
 import { list } from "./verdict";
 
 const box = document.querySelector<HTMLDetailsElement>("#stored")!;
@@ -11,6 +13,7 @@ const maps = document.querySelector<HTMLUListElement>("#maps")!;
 const more = document.querySelector<HTMLButtonElement>("#more")!;
 const findings = document.querySelector<HTMLElement>("#findings")!;
 const name = document.querySelector<HTMLInputElement>("#map-id")!;
+const prefix = document.querySelector<HTMLInputElement>("#prefix")!;
 let cursor = "";
 
 function show(...lines: string[]): void {
@@ -43,9 +46,11 @@ async function load(from: string): Promise<void> {
 
 function row(id: string, segments: number): HTMLLIElement {
   const item = document.createElement("li");
-  const title = document.createElement("span");
-  title.textContent = `${id} (${segments} walls)`;
-  item.append(title);
+  const [choice, tick] = [document.createElement("label"), document.createElement("input")];
+  Object.assign(tick, { type: "checkbox", value: id });
+  choice.className = "check";
+  choice.append(tick, `${id} (${segments} walls)`);
+  item.append(choice);
   const actions: [string, () => Promise<void>][] = [
     ["Open", () => use(id)],
     ["Check", () => check(id)],
@@ -80,6 +85,7 @@ async function remove(id: string): Promise<void> {
   if (!confirm(`Delete the map ${id}? This cannot be undone.`)) return;
   await deleteMap(id);
   if (state.mapId === id) state.mapId = null;
+  if (state.floors.includes(id)) state.floors = [];
   await load("");
   show(`${id} is deleted.`);
 }
@@ -93,6 +99,22 @@ async function upload(): Promise<void> {
   show(`${stored.map_id} is stored, revision ${stored.revision}.`);
 }
 
+/** The ids of the maps that are ticked, or that begin with the prefix. */
+async function chosen(): Promise<string[]> {
+  const ticked = [...maps.querySelectorAll<HTMLInputElement>("input:checked")].map((one) => one.value);
+  if (ticked.length > 1) return ticked;
+  if (!prefix.value) throw new Error("Tick two maps at least, or enter how their names begin.");
+  const found: string[] = [];
+  for (let next: string | null = ""; next !== null; ) {
+    const page: { maps: StoredMap[]; next: string | null } = await listMaps(next, 1000);
+    found.push(...page.maps.map((one) => one.map_id).filter((id) => id.startsWith(prefix.value)));
+    next = page.next;
+  }
+  if (found.length < 2) throw new Error(`${found.length ? "One stored map begins" : "No stored map begins"} with ${prefix.value}. Expected two at least.`);
+  return found;
+}
+
+document.querySelector("#several")!.addEventListener("click", () => void trying(async () => openSeveral(await chosen())));
 box.addEventListener("toggle", () => {
   if (box.open) void trying(() => load(""));
 });

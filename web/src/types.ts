@@ -61,8 +61,17 @@ export interface Reason {
 
 export interface Alternative {
   pose: Pose;
+  map_id?: string | null; // of several maps
   score: number;
   probability: number | null;
+}
+
+/** Of several maps: the best pose on one of them. */
+export interface MapVerdict {
+  map_id: string;
+  status: Answer["status"];
+  probability: number | null;
+  pose: Pose | null;
 }
 
 export interface Answer {
@@ -81,6 +90,8 @@ export interface Answer {
   reasons: Reason[];
   warnings: Reason[];
   alternatives: Alternative[];
+  map: { map_id: string } | null; // of a stored map, and of several maps that of the pose
+  maps?: MapVerdict[] | null; // of several maps, the best first
   timing_ms: Record<string, number>;
 }
 
@@ -112,6 +123,7 @@ export interface Example {
 }
 
 export interface LogLine {
+  map_id?: string | null; // of several maps
   stamp: unknown;
   status: Answer["status"];
   usable: boolean;

@@ -1,6 +1,6 @@
 // The verdict in words and numbers, and the alternatives.
 
-import { changed, onChange, state } from "./state";
+import { changed, onChange, state, wallOf } from "./state";
 import type { Pose } from "./types";
 
 const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
@@ -48,6 +48,7 @@ function numbers(): void {
   const rows: [string, string][] = [];
   if (answer) {
     if (answer.probability !== null) rows.push(["probability", percent(answer.probability)]);
+    if (answer.maps && answer.map) rows.push(["map", answer.map.map_id]);
     if (answer.pose) rows.push(["pose", poseText(answer.pose)]);
     const c = answer.covariance;
     if (c) {
@@ -56,7 +57,7 @@ function numbers(): void {
     }
     const critical = answer.diagnostics?.critical_wall;
     if (critical) {
-      const walls = critical.map.map((k) => state.sentTo[k]).join(", ");
+      const walls = critical.map.map(wallOf).join(", ");
       rows.push(["critical wall", `${walls}: without it the pose may move by ${critical.displacement.toFixed(2)} m`]);
     }
     const seen = answer.correspondences.length + answer.unmatched_scan.length;
@@ -79,7 +80,7 @@ function others(): void {
   const shown = state.others[state.other];
   element("#others").hidden = count === 0;
   element("#other").textContent = shown
-    ? `Alternative ${state.other + 1} of ${count}: ${shown.probability === null ? "" : `probability ${percent(shown.probability)}, `}pose ${poseText(shown.pose)}`
+    ? `Alternative ${state.other + 1} of ${count}: ${shown.map_id ? `map ${shown.map_id}, ` : ""}${shown.probability === null ? "" : `probability ${percent(shown.probability)}, `}pose ${poseText(shown.pose)}`
     : `${count} ${count === 1 ? "alternative" : "alternatives"}`;
 }
 
@@ -96,7 +97,7 @@ for (const [id, by] of [["#before-other", -1], ["#next-other", 1]] as const)
   });
 
 const degrees = (radians: number) => (180 / Math.PI) * radians;
-const percent = (probability: number) => `${(100 * probability).toFixed(2)} %`;
+export const percent = (probability: number) => `${(100 * probability).toFixed(2)} %`;
 const poseText = ({ x, y, theta }: Pose) => `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`;
 
 onChange(show);

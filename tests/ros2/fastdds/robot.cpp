@@ -190,6 +190,9 @@ static void subscribe_others(Robot& robot) {
     }
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>(
         "linefix/agreed_pose", RELIABLE, printing_pose("agreed"));
+    using Text = std_msgs::msg::dds_::String_;
+    robot.reader<std_msgs::msg::dds_::String_PubSubType, Text>(
+        "linefix/map_id", LATCHED, [](const Text& message) { print("map_id " + message.data()); });
     using Status = diagnostic_msgs::msg::dds_::DiagnosticStatus_;
     robot.reader<diagnostic_msgs::msg::dds_::DiagnosticStatus_PubSubType, Status>(
         "linefix/locate_result", LATCHED, [](const Status& message) {
@@ -211,6 +214,7 @@ int main(int argc, char** argv) {
         robot.writer<g::PoseWithCovarianceStamped_PubSubType>("amcl_pose", LATCHED),
         robot.writer<std_msgs::msg::dds_::String_PubSubType>("linefix/locate_request", RELIABLE),
     };
+    print("ready");  // before any reader: what is latched comes at once, and counts
     subscribe_others(robot);
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("initialpose", RELIABLE, printing_pose("initialpose"));
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("linefix/pose", RELIABLE, printing_pose("pose"));
@@ -229,7 +233,6 @@ int main(int argc, char** argv) {
         "/diagnostics", RELIABLE, [](const Diagnostics& message) {
             for (const auto& one : message.status()) print("diagnostics " + one.name() + ": " + one.message());
         });
-    print("ready");
 
     std::string text;
     while (std::getline(std::cin, text)) {

@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Browser, Page, expect
 
 from service.schemas import examples
 from tests.running import RunningService
@@ -237,48 +237,6 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     client.delete("/v1/maps/page-rectangle")
 
 
-def test_a_late_example_does_not_replace_an_opened_map(page: Page, client: httpx.Client) -> None:
-    walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
-    client.put("/v1/maps/page-chosen", json=walls).raise_for_status()
-    on_the_way: list[Route] = []
-    page.route("**/page/examples/*.json", lambda route: on_the_way.append(route))
-    with page.expect_request("**/page/examples/*.json"):
-        page.goto("/")
-    page.locator("#stored summary").click()
-    page.get_by_role("button", name="Open page-chosen").click()
-    about = page.locator("#about")
-    expect(about).to_have_text("The stored map page-chosen.")
-    with page.expect_response("**/page/examples/*.json") as arrived:
-        on_the_way[0].continue_()
-    arrived.value.finished()
-    page.get_by_label("simulate the scan").check()
-    verdict(page, "usable")
-    expect(about).to_have_text("The stored map page-chosen.")
-    page.unroute("**/page/examples/*.json")
-    client.delete("/v1/maps/page-chosen")
-
-
-def test_a_virtual_robot_waits_for_its_map(page: Page, client: httpx.Client) -> None:
-    """Whoever is quicker than the map is read, or starts with the robot, has not to tick twice."""
-    walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
-    client.put("/v1/maps/page-late", json=walls).raise_for_status()
-    page.goto("/")
-    robot = page.get_by_label("simulate the scan")
-    verdict(page, "ambiguous")
-    robot.uncheck()
-    on_the_way: list[Route] = []
-    page.route("**/v1/maps/page-late", lambda route: on_the_way.append(route))
-    page.locator("#stored summary").click()
-    with page.expect_request("**/v1/maps/page-late"):
-        page.get_by_role("button", name="Open page-late").click()
-    robot.check()
-    on_the_way[0].continue_()
-    verdict(page, "usable")
-    expect(robot).to_be_checked()
-    page.unroute("**/v1/maps/page-late")
-    client.delete("/v1/maps/page-late")
-
-
 def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     svg = (
         '<svg xmlns="http://www.w3.org/2000/svg" width="6m" height="4m" viewBox="0 0 6 4">'
@@ -320,27 +278,6 @@ def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
     expect(told).to_contain_text("Scan 4 of 4: ok, usable")
     expect(told).to_contain_text("3 of 4 are usable")
     expect(page.get_by_role("button", name="Play")).to_be_enabled()
-
-
-def test_stored_maps(page: Page, client: httpx.Client) -> None:
-    shown(page, "flat", "usable")
-    page.locator("#stored summary").click()
-    page.get_by_label("Name").fill("a flat")
-    page.get_by_role("button", name="Store this map").click()
-    expect(page.locator("#findings")).to_contain_text("letters")
-    page.get_by_label("Name").fill("page-flat")
-    page.get_by_role("button", name="Store this map").click()
-    expect(page.locator("#findings")).to_contain_text("page-flat is stored")
-    assert client.get("/v1/maps/page-flat").status_code == 200
-    page.get_by_role("button", name="Open page-flat").click()
-    expect(page.locator("#about")).to_have_text("The stored map page-flat.")
-    expect(page.locator("#about")).to_have_text("The stored map page-flat.")
-    page.get_by_role("button", name="Check page-flat").click()
-    expect(page.locator("#findings")).not_to_contain_text("Checking", timeout=30_000)
-    page.once("dialog", lambda dialog: dialog.accept())
-    page.get_by_role("button", name="Delete page-flat").click()
-    expect(page.locator("#findings")).to_contain_text("page-flat is deleted")
-    assert client.get("/v1/maps/page-flat").status_code == 404
 
 
 def test_a_request_is_taken_along(page: Page, client: httpx.Client, tmp_path: Path) -> None:
