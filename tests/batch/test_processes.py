@@ -11,12 +11,6 @@ from batch.engine import ATTEMPTS, WorkerError
 from tests.batch.work import Noting, begun, raising
 
 
-def test_each_item_is_done_once_with_one_thread_a_worker(tmp_path: Path) -> None:
-    found = dict(Processes(2).run(Noting(str(tmp_path)), range(7)))
-    assert found == {item: (item * item, "1") for item in range(7)}
-    assert [begun(tmp_path, item) for item in range(7)] == [1] * 7
-
-
 def test_a_killed_worker_costs_what_it_was_at(tmp_path: Path) -> None:
     found = list(Processes(2).run(Noting(str(tmp_path), deadly=(3,)), range(7)))
     assert sorted(found) == [(item, (item * item, "1")) for item in range(7)]

@@ -207,19 +207,19 @@ def test_row_groups_larger_than_a_block_are_laid_out_anew(tmp_path: Path) -> Non
     assert [row["stamp"] for row in rows(tmp_path / "out.parquet")] == [*range(40), *range(40)]
 
 
-def test_workers_killed_on_the_way_cost_no_row(tmp_path: Path) -> None:
+def test_a_worker_killed_on_the_way_costs_no_row(tmp_path: Path) -> None:
     log, room, out = write_log(tmp_path / "a.parquet", 80), write_room(tmp_path), tmp_path / "out.parquet"
     killed: list[int] = []
 
     def kill_one(progress: Progress) -> None:
         children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
         workers = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-        if progress.stage == "searching" and progress.done > 0 and len(killed) < 3 and workers:
+        if progress.stage == "searching" and progress.done > 0 and not killed and workers:
             killed.append(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
     summary = associate_many([log], room, out, SMALL, Processes(2), kill_one)
-    assert len(killed) == 3
+    assert len(killed) == 1
     assert (summary.scans, summary.errors) == (80, 0)
     assert [row["index"] for row in rows(out)] == list(range(80))
 

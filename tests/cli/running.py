@@ -26,7 +26,7 @@ class Linefix:
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self._capsys = capsys
         monkeypatch.chdir(folder)
-        for name in [name for name in os.environ if name.startswith("LINEFIX_")]:
+        for name in [one for one in os.environ if one.startswith("LINEFIX_") and one != "LINEFIX_KERNELS"]:
             monkeypatch.delenv(name)
         monkeypatch.setenv("LINEFIX_DATA_DIR", str(folder / "data"))
         monkeypatch.setenv("COLUMNS", "200")

@@ -10,7 +10,10 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.running import RunningService, client_of, until
+from service.admission.errors import UnknownKeyError
+from service.admission.grants import Role
+from service.admission.key_file import KeyFile
+from service.admission.keys import Keyring
 from tests.service.issuing import key_lines
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
@@ -78,22 +81,17 @@ def exchange(folder: Path) -> None:
     ],
 )
 def test_a_key_is_refused_however_its_files_change(
-    lay: Callable[[Path], Path],
-    take_back: Callable[[Path], None],
-    start_service: Callable[..., RunningService],
-    tmp_path: Path,
+    lay: Callable[[Path], Path], take_back: Callable[[Path], None], tmp_path: Path
 ) -> None:
-    folder = tmp_path / "keys"
-    folder.mkdir()
-    running = start_service(keys_file=lay(folder))
-    with (
-        client_of(running.url, authorization="Bearer sesame") as client,
-        client_of(running.url, authorization="Bearer other") as other,
-    ):
-        assert client.get("/v1/maps").status_code == 200
-        take_back(folder)
-        until(lambda: client.get("/v1/maps").status_code == 403)
-        assert other.get("/v1/maps").status_code == 200
+    """A service that runs reads them again, too: test_roles."""
+    ring = Keyring([], KeyFile(lay(tmp_path)))
+    first, other = ([(b"authorization", b"Bearer " + key)] for key in (b"sesame", b"other"))
+    assert ring.grant(first).roles == {Role.READ}
+    take_back(tmp_path)
+    ring.refresh()
+    with pytest.raises(UnknownKeyError):
+        ring.grant(first)
+    assert ring.grant(other).roles == {Role.READ}
 
 
 def test_the_unit_reads_keys_where_they_are_changed() -> None:

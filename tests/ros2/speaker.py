@@ -1,7 +1,12 @@
-"""Joins a domain as the node does, publishes its name until its input ends, and prints the names that it receives."""
+"""Joins a domain as the node does, once for each name and its variables, each time in a process of its own.
+
+Each publishes its name until its input ends, and prints its name next to those that it receives.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 import sys
 import threading
 
@@ -11,7 +16,7 @@ from ros2.messages import String
 from ros2.wire import RELIABLE, Publisher, Subscription
 
 
-def main(name: str) -> None:
+def speak(name: str) -> None:
     net = connect(domain_of({}))
     ended = threading.Event()
 
@@ -21,11 +26,14 @@ def main(name: str) -> None:
 
     threading.Thread(target=read).start()
     publisher, subscription = Publisher(net, "names", String, RELIABLE), Subscription(net, "names", String, RELIABLE)
-    print("ready", flush=True)
     while not ended.wait(0.05):
         publisher.publish(String(name))
         for message in subscription.take():
-            print(message.data, flush=True)
+            print(name, message.data, flush=True)
 
 
-main(sys.argv[1])
+for name, variables in json.loads(sys.argv[1]).items():
+    if os.fork() == 0:
+        os.environ.update(variables)
+        speak(name)
+        sys.exit()

@@ -251,18 +251,3 @@ def test_mounts_of_robots_with_prefixes_are_on_one_topic(domain: int, room: line
         robot.send("global_mount", "robot1/", BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta)
         found = robot.until("initialpose", Way(robot))
         assert float(found[4]) == pytest.approx(1.0, abs=0.03)
-
-
-def test_robots_with_namespaces_do_not_hear_each_other(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    first, second = (NodeOptions(domain=domain, namespace=f"/robot{k}") for k in (1, 2))
-    with (
-        running(first, room), running(second, room),
-        peer(program, domain, "/robot1") as one, peer(program, domain, "/robot2") as other,
-    ):  # fmt: skip
-        one.mount()
-        other.mount()
-        found = one.until("initialpose", Way(one))
-        assert float(found[4]) == pytest.approx(1.0, abs=0.03)
-        other.until("diagnostics")
-        poses = [line for line in other.lines() if line.startswith(("pose", "initialpose"))]
-        assert poses == []

@@ -180,23 +180,14 @@ def test_who_subscribes_later_gets_an_initial_pose(domain: int, room: linefix.Ma
     assert again.header.stamp.sec == 3
 
 
-def test_a_robot_in_a_namespace(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(agree=1, namespace="/robot1", domain=domain), room):
-        stranger, robot = Robot(domain), Robot(domain, "/robot1")
-        stranger.mounts.publish(transform("base_link", "laser", translation=messages.Vector3(5.0)))
-        robot.mounts.publish(mount())
-        assert is_at_truth(robot.until(robot.poses, lambda: robot.scans.publish(scan(1))))
-        robot.until(robot.initial, lambda: robot.scans.publish(scan(2)))
-        assert stranger.initial.take() == []
-        assert stranger.poses.take() == []
-
-
 def tilted(degrees: float) -> messages.Quaternion:
     half = 0.5 * math.radians(degrees)
     return messages.Quaternion(0.0, math.sin(half), 0.0, math.cos(half))
 
 
 UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, str]] = {
+    "no mount": (messages.TFMessage, scan(1), 'no transform from "laser" to "base_link"'),
+    "no step": (mount, replace(scan(1), angle_increment=0.0), 'the scan of "laser" cannot be used'),
     "no frame": (mount, replace(scan(1), header=messages.Header(messages.Time(1))), "empty frame_id"),
     "optical": (
         lambda: transform("base_link", "laser", rotation=messages.Quaternion(-0.5, 0.5, -0.5, 0.5)),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,14 +60,14 @@ def odometry(second: int, nanosec: int = HALF, speed: Speed = SPEED) -> messages
     return message
 
 
-@pytest.mark.parametrize("arguments", [(), ("--no-motion",)], ids=["motion", "no motion"])
+@pytest.mark.parametrize("motion", [True, False])
 def test_a_turning_robot_is_where_it_was_at_the_first_beam(
-    domain: int, map_file: str, arguments: Sequence[str]
+    domain: int, room: linefix.MapIndex, map_file: str, motion: bool
 ) -> None:
     """A bridge that is not to reckon with motion does not know where it is."""
     broken, scan = odometry(1), moving_scan(10)
     broken.twist.twist.angular.z = math.inf
-    with bridge("--map", map_file, *arguments):
+    with running(NodeOptions(domain=domain), room) if motion else bridge("--map", map_file, "--no-motion"):
         robot = Robot(domain)
         driven = Publisher(robot.net, "/odom", messages.Odometry, SENSOR)
         robot.mounts.publish(mount())
@@ -84,7 +83,7 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
             lambda one: one.header.stamp == scan.header.stamp and "no transform" not in one.status[0].message,
         )
         found = robot.poses.take()
-    assert bool(found) == (not arguments)
+    assert bool(found) == motion
     assert all(is_at_truth(pose) for pose in found)
 
 

@@ -11,10 +11,11 @@ import pytest
 from rosbags.rosbag2 import Reader, Writer
 from rosbags.typesys import Stores, get_typestore
 
+import linefix
 from cli.entry import run
-from ros2 import messages
+from ros2 import NodeOptions, messages
 
-from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, grid_of_room, is_at_truth, mount, scan
+from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, grid_of_room, is_at_truth, mount, running, scan
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 
@@ -57,8 +58,8 @@ def test_a_bag_that_is_played_gives_an_initial_pose(domain: int, map_file: str, 
     assert (np.diag(covariance)[[2, 3, 4]] == 0.0).all()
 
 
-def test_it_is_silent_until_asked_again(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file, "--agree", "1"):
+def test_it_is_silent_until_asked_again(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, agree=1), room):
         robot = Robot(domain)
         robot.mounts.publish(mount())
         robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
@@ -70,46 +71,15 @@ def test_it_is_silent_until_asked_again(domain: int, map_file: str) -> None:
         assert {one.markers[0].ns for one in robot.walls.take()} == {"linefix/map"}
 
 
-def test_without_a_mount_it_says_what_is_missing(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file, "--agree", "1"):
-        robot = Robot(domain)
-        said = robot.until(
-            robot.diagnostics,
-            lambda: robot.scans.publish(scan(1)),
-            lambda one: 'no transform from "laser" to "base_link"' in one.status[0].message,
-        )
-        assert said.status[0].level == 2
-        assert robot.poses.take() == []
-
-
 def test_the_map_may_come_as_a_grid(domain: int) -> None:
     """And a scanner that has the robot's own frame needs no mount."""
-    with bridge("--base", "laser", "--agree", "1"):
+    with running(NodeOptions(domain=domain, agree=1, base_frame="laser", map_topic="map"), None):
         robot = Robot(domain)
         robot.maps.publish(grid_of_room("floor"))
         found = robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
     truth = MAP_FROM_BASE.compose(BASE_FROM_LASER)
     assert found.header.frame_id == "floor"
     assert math.hypot(found.pose.pose.position.x - truth.x, found.pose.pose.position.y - truth.y) < 0.05
-
-
-def test_what_is_broken_is_told_and_the_next_is_answered(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file, "--agree", "1"):
-        robot = Robot(domain)
-        turned = mount()
-        turned.transforms[0].transform.rotation = messages.Quaternion(0.0, 0.0, 0.0, 0.0)
-        robot.until(
-            robot.diagnostics, lambda: robot.mounts.publish(turned), lambda one: "quaternion" in one.status[0].message
-        )
-        robot.mounts.publish(mount())
-        broken = scan(1)
-        broken.angle_increment = 0.0
-        robot.until(
-            robot.diagnostics,
-            lambda: robot.scans.publish(broken),
-            lambda one: "cannot be used" in one.status[0].message,
-        )
-        robot.until(robot.initial, lambda: robot.scans.publish(scan(2)))
 
 
 def test_a_stored_map_is_taken_by_its_id(

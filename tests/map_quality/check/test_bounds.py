@@ -23,9 +23,9 @@ MOST_BETWEEN_LOOKS = 1.0  # s of this thread's processor time; estimating crossi
 MOST_HELD = 100_000_000  # bytes in addition to the index
 
 
-def scattered(width: float, length: float) -> Floats:
+def scattered(width: float, length: float, count: int = COUNT) -> Floats:
     rng = np.random.default_rng(5)
-    begins, angles = rng.uniform(0.0, width, (COUNT, 2)), rng.uniform(0.0, 2.0 * np.pi, COUNT)
+    begins, angles = rng.uniform(0.0, width, (count, 2)), rng.uniform(0.0, 2.0 * np.pi, count)
     return np.hstack([begins, begins + length * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
 
 
@@ -91,10 +91,10 @@ def warm() -> None:
 
 @pytest.mark.parametrize("kind", MAPS)
 def test_no_map_is_indexed_without_a_look_at_the_deadline(kind: str) -> None:
-    for oriented in (True, False):
-        looks = Looks()
-        MapIndex.build(Segments.from_array(MAPS[kind]()), oriented=oriented, deadline=looks)
-        assert looks.ended() < MOST_BETWEEN_LOOKS
+    """Without directions it has twice as many walls."""
+    looks = Looks()
+    MapIndex.build(Segments.from_array(MAPS[kind]()), oriented=False, deadline=looks)
+    assert looks.ended() < MOST_BETWEEN_LOOKS
 
 
 @pytest.mark.parametrize("kind", MAPS)
@@ -115,7 +115,7 @@ def test_every_stage_of_a_check_looks_at_the_deadline_and_holds_little(kind: str
 
 
 def test_an_index_is_given_up_wherever_the_deadline_passes() -> None:
-    segments = Segments.from_array(scattered(36.0, 0.5))
+    segments = Segments.from_array(scattered(12.0, 0.5, COUNT // 9))
     counting = Looks()
     MapIndex.build(segments, deadline=counting)
     assert counting.count > 6
@@ -125,7 +125,7 @@ def test_an_index_is_given_up_wherever_the_deadline_passes() -> None:
 
 
 def test_without_time_for_an_index_of_both_directions_the_check_says_that_it_is_incomplete() -> None:
-    index = MapIndex.build(Segments.from_array(scattered(36.0, 0.5)))
+    index = MapIndex.build(Segments.from_array(scattered(12.0, 0.5, COUNT // 9)))
     with pytest.raises(IndexingEndedError):
         index.undirected_by(Deadline(time.monotonic()))
     late = check_map(index, Deadline(time.monotonic()), oriented=False)

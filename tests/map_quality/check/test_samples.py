@@ -92,7 +92,7 @@ def test_a_map_the_wrong_way_round() -> None:
     assert report.advice.sigma is None
 
 
-@pytest.mark.parametrize("factor", [0.98, 1.01, 1.03, 1.0 / 0.3048, 0.5, 0.62, 2.0, 2.5])
+@pytest.mark.parametrize("factor", [0.98, 1.01, 1.0 / 0.3048, 0.62, 2.5])
 def test_a_map_that_is_not_to_scale(factor: float) -> None:
     report = told(faces() * factor)
     assert codes(report) == ["scale"]
@@ -104,8 +104,6 @@ def test_a_map_that_is_not_to_scale(factor: float) -> None:
     ("factor", "said"),
     [
         (25.4, "millimetres taken for inches"),
-        (1.0 / 25.4, "inches taken for millimetres"),
-        (100.0, "centimetres taken for metres"),
         (1.0 / 0.0254, "inches taken for metres"),
         (1e-3, "metres taken for millimetres"),
     ],

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import count
-from typing import Any
-
-import pytest
 
 from tests.running import RunningService, until
 from tests.service.searches import slow_to_index
@@ -15,19 +12,15 @@ RUNNING, BEGUN = "linefix_indexing_running", "linefix_map_cache_misses_total"
 SEEN = {"segments": [[0.0, 1.0, 2.0, 1.0]]}
 
 
-@pytest.mark.parametrize("path", ["/v1/associate", "/v1/associate:batch"])
-def test_an_index_that_is_not_done_in_time_is_504_and_goes_on(
-    start_service: Callable[..., RunningService], path: str
-) -> None:
+def test_an_index_that_is_not_done_in_time_is_504_and_goes_on(start_service: Callable[..., RunningService]) -> None:
     """The answer came when the map was indexed, seconds after the deadline; who asked for the same map waited, too."""
     running = start_service(searches=2)
     slow = slow_to_index(100_000)
-    sought: dict[str, Any] = {"scan": SEEN} if path == "/v1/associate" else {"scans": [SEEN]}
     tries = count(1)
 
     def ask(map_id: str, deadline_ms: float) -> int:
-        body = {"map": {"map_id": map_id}, **sought, "options": {"oriented": False, "deadline_ms": deadline_ms}}
-        return running.client.post(path, json=body).status_code
+        body = {"map": {"map_id": map_id}, "scan": SEEN, "options": {"oriented": False, "deadline_ms": deadline_ms}}
+        return running.client.post("/v1/associate", json=body).status_code
 
     def both_are_told_while_it_is_indexed() -> bool:
         """Where the map is not even read by then, or is indexed already, try again with another, and more time."""

@@ -21,7 +21,7 @@ from service.schemas import examples
 from tests.running import RunningService, running
 from tests.service.importing.forms import SQUARE, TYPE, form, room_grid
 
-CASES = int(os.environ.get("FUZZ_CASES", "2000"))
+CASES = int(os.environ.get("FUZZ_CASES", "1000"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
 HELD = [
     checks.status_code_conformance,
@@ -40,7 +40,7 @@ def fuzz(share: float) -> settings:
         deadline=None,
         suppress_health_check=list(HealthCheck),
         phases=[Phase.explicit, Phase.generate],
-        derandomize=CASES <= 2000,
+        derandomize=CASES <= 1000,
         database=None,
         print_blob=True,
     )

@@ -21,14 +21,9 @@ from PIL import Image
 from formats import read_map
 from service.schemas import examples
 from tests.running import RunningService, children_of, client_of, until
-from tests.service.importing.forms import SQUARE, TYPE, YAML, encoded, form, room_grid
+from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
 
 URL = "/v1/maps:import"
-LAUGHS = (
-    b'<!DOCTYPE svg [<!ENTITY a "ha">'
-    + b"".join(b'<!ENTITY %c "%b">' % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
-    + b']><svg xmlns="http://www.w3.org/2000/svg"><text>&j;</text></svg>'
-)
 
 
 @pytest.fixture
@@ -76,6 +71,11 @@ def test_a_grid_becomes_a_map_that_can_be_put(client: httpx.Client, tmp_path: Pa
     assert client.get("/v1/maps").json() == before
     assert client.put("/v1/maps/imported", json=found["map"]).status_code == 201
     client.delete("/v1/maps/imported")
+    picture = found["picture"]
+    image = Image.open(io.BytesIO(base64.b64decode(picture["png"])))
+    assert image.size == (200, 140)
+    assert [image.getpixel(at) for at in ((100, 30), (70, 60), (2, 2))] == [254, 0, 205]
+    assert (picture["pose"], picture["resolution"]) == ({"x": -1.0, "y": -2.0, "theta": 0.0}, 0.05)
 
 
 def test_fields_say_what_a_drawing_does_not(client: httpx.Client) -> None:
@@ -87,31 +87,6 @@ def test_fields_say_what_a_drawing_does_not(client: httpx.Client) -> None:
     lengths = np.hypot(*np.diff(np.reshape(found["map"]["segments"], (-1, 2, 2)), axis=1)[:, 0].T)
     assert found["map"]["oriented"]
     assert sorted(np.round(lengths / 0.3048).tolist()) == [10, 20, 20, 20, 30, 40]
-
-
-def test_a_bomb_of_xml(client: httpx.Client) -> None:
-    answer = send(client, {"laughs.svg": LAUGHS}, ("units", "m"))
-    assert refused(answer, 422, "invalid_request").startswith("/files/0: declares XML entities")
-
-
-def test_an_encoding_that_nobody_knows(client: httpx.Client) -> None:
-    drawing = b'<?xml version="1.0" encoding="unknown-enc"?><svg xmlns="http://www.w3.org/2000/svg"/>'
-    answer = send(client, {"plan.svg": drawing}, ("units", "m"))
-    assert "unknown encoding" in refused(answer, 422, "invalid_request")
-
-
-@pytest.mark.parametrize(("count", "status", "code"), [(8_000_000, 413, "too_large"), (1000, 422, "invalid_request")])
-def test_features_without_geometry(client: httpx.Client, count: int, status: int, code: str) -> None:
-    features = b'{"type": "FeatureCollection", "features": [' + b"{}," * count + b"{}]}"
-    refused(send(client, {"plan.geojson": features}, ("local_metres", "true")), status, code)
-
-
-def test_the_grey_value_of_unknown_cells(client: httpx.Client) -> None:
-    answer = send(client, room_grid(), ("unknown", "none"))
-    assert answer.status_code == 200, answer.text
-    assert {note["code"]: note["count"] for note in answer.json()["report"]["read"]}["unknown_cells"] == 0
-    answer = send(client, room_grid(), ("unknown", "grey"))
-    assert refused(answer, 422, "invalid_request").startswith("/unknown: expected none, or a grey value from 0 to 255")
 
 
 def test_a_format_that_is_not_read(client: httpx.Client) -> None:
@@ -174,33 +149,3 @@ def test_scans_of_a_log_can_be_sent_as_they_are(client: httpx.Client) -> None:
     asked = {"map": examples.MAP, "scan": answer["scans"][0]}
     found = client.post("/v1/associate", json=asked)
     assert found.json()["status"] in ("no_match", "ambiguous", "degenerate"), found.text
-
-
-@pytest.mark.parametrize(
-    ("files", "fields", "status", "said"),
-    [
-        ({"plan.dxf": b"0"}, (), 415, "found no log; expected a file that ends in one of .bag"),
-        ({"a.log": carmen(1), "b.log": carmen(1)}, (), 422, "expected one log"),
-        ({}, (), 422, "expected a file, found none"),
-        ({"a.bag": b"no bag"}, (), 422, "/files/0"),
-        ({"a.log": carmen(1)}, (("max_scans", "0"),), 422, "/max_scans: expected an integer from 1 to 1000"),
-        ({"a.log": carmen(1)}, (("units", "m"),), 422, "/units: unknown field"),
-        ({"a.log": carmen(1)}, (("topic", "a"), ("topic", "b")), 422, "/topic: expected this field once"),
-    ],
-    ids=["a map", "two", "none", "broken", "no scans", "a field of maps", "twice"],
-)
-def test_what_is_no_log_is_named(
-    client: httpx.Client, files: dict[str, bytes], fields: tuple[tuple[str, str], ...], status: int, said: str
-) -> None:
-    found = scans_of(client, files, *fields)
-    assert found.status_code == status, found.text
-    assert said in found.json()["detail"]
-
-
-def test_the_picture_of_a_grid_lies_where_the_grid_does(client: httpx.Client) -> None:
-    picture = send(client, room_grid()).json()["picture"]
-    image = Image.open(io.BytesIO(base64.b64decode(picture["png"])))
-    assert image.size == (200, 140)
-    assert [image.getpixel(at) for at in ((100, 30), (70, 60), (2, 2))] == [254, 0, 205]
-    assert (picture["pose"], picture["resolution"]) == ({"x": -1.0, "y": -2.0, "theta": 0.0}, 0.05)
-    assert send(client, {"a.csv": SQUARE}, ("units", "m")).json()["picture"] is None

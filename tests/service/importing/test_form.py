@@ -84,6 +84,7 @@ def test_fields_are_options() -> None:
         ("thickness", ["thick"], "a number"),
         ("drawn", ["somehow"], "faces or centres"),
         ("local_metres", ["perhaps"], "true or false"),
+        ("unknown", ["grey"], "expected none, or a grey value from 0 to 255"),
     ],
     ids=str,
 )
