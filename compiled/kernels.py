@@ -21,10 +21,7 @@ def kernel(function: Function) -> Function:
     """Compile a function at its first call and cache the machine code for later processes.
 
     The function runs without Python's global lock. Additions keep the order in which they are written. With
-    ``NUMBA_DISABLE_JIT=1`` in the environment it stays plain Python. It has no entry for C code.
-
-    To Numba a literal is a type of its own. A kernel that is called with ``0``, or with a variable that starts at ``0``
-    before a loop, is compiled for that type, too. With ``np.int64(0)`` it is compiled once.
+    ``NUMBA_DISABLE_JIT=1`` in the environment it stays plain Python.
 
     Parameters
     ----------
@@ -40,7 +37,7 @@ def kernel(function: Function) -> Function:
         return interpreted(function)
     directory = cache_directory()
     with _cached_in(directory):
-        decorate = numba.njit(cache=directory is not None, nogil=True, no_cfunc_wrapper=True)
+        decorate = numba.njit(cache=directory is not None, nogil=True)
         return cast(Function, decorate(function))
 
 
