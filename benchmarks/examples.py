@@ -146,7 +146,7 @@ class Case:
             told=not right and (self.told is None or pose is None or self.told(pose)),
             before_null=plain,
             share=probability_among(weighed),
-            shown=probability_by_shown(best, description.others),
+            shown=probability_by_shown(context, best, description.others),
             loose=probability_with_loose_walls(context, found.answer, description.others),
             vetoes=tuple(one.name for one in applied(replace(findings, mirrored_better=features.null_better))),
         )

@@ -5,8 +5,8 @@ Alternatives are compared three times.
 - As they were scored.
 - By what the scan shows. Suppose two rooms are equal but for a cupboard that the map shows in one of them. Today the
   cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But a
-  single removed cupboard explains all of these beams. Beams and lines of sight therefore count little where another
-  place explains everything that the scan does show.
+  single removed cupboard explains all of these beams. Where another place explains everything that the scan does
+  show, each thing that is missing there counts little therefore, however many beams miss it.
 - With walls taken to be off by more than the answer shows. Suppose a building repeats itself and its map is
   centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.
   The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A
@@ -29,10 +29,12 @@ from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
+from .absences import absences
 from .kernels import alternatives as kernels
 from .tuning import (
     ABSENCE,
     ALTERNATIVE_TEMPERATURE,
+    FAR_BEHIND_BY_SHOWN,
     LOOSE_ALTERNATIVES,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
@@ -52,18 +54,22 @@ def probability_among(alternatives: Records) -> float:
     return kernels.probability_among(alternatives)
 
 
-def probability_by_shown(best: ConsensusSet, others: Sequence[ConsensusSet]) -> float:
+def probability_by_shown(context: SearchContext, best: ConsensusSet, others: Sequence[ConsensusSet]) -> float:
     """Return the probability of the best explanation where what the scan does not show counts little, up to 1.
 
-    An alternative is behind by ``shown + min(rest, ABSENCE)`` nats. ``shown`` is the difference of the scores of all
-    matches and of the prior. The rest is what lines of sight, beams and the log-determinant make.
+    An alternative is behind by ``shown + min(rest, limit)`` nats. ``shown`` is the difference of the scores of all
+    matches and of the prior. The rest is what lines of sight, beams and the log-determinant make. The limit is
+    `ABSENCE` for each thing that the map shows there and the scan does not, one at least.
     """
     if not others:
         return 1.0
     shown = np.array([_shown(one) for one in (best, *others)])
     behind = shown[0] - shown[1:]
     rest = np.array([best.posterior - one.posterior for one in others]) - behind
-    behind += np.minimum(rest, ABSENCE)
+    limits = np.full(len(others), ABSENCE)
+    near = (behind + np.minimum(rest, limits) < FAR_BEHIND_BY_SHOWN) & (rest > limits)
+    limits[near] = np.maximum(ABSENCE, absences(context, best, [others[k] for k in np.flatnonzero(near).tolist()]))
+    behind += np.minimum(rest, limits)
     return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind) / ALTERNATIVE_TEMPERATURE).sum()))
 
 

@@ -128,7 +128,7 @@ def _at_first(context: SearchContext, description: Description) -> Probabilities
         by_usual=probability(usual.odds, described),
         by_model=probability(model.odds, described),
         among_as_scored=probability_among(description.alternatives),
-        among_by_shown=probability_by_shown(description.answer.best, description.others),
+        among_by_shown=probability_by_shown(context, description.answer.best, description.others),
         among_with_loose_walls=None,
         null=None,
         null_above=0.0,

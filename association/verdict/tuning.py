@@ -9,9 +9,12 @@ LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 
 # --- Alternatives: compared again by what the scan shows --------------------------------------------------------------
 
-# The most that beams and lines of sight count against an alternative that explains all that the scan shows, tables. A
-# single removed object explains them; its probability is taken to be 1 in 55.
+# The most that each thing counts which an alternative has and the scan does not show, tables: it was moved away, with a
+# probability of 1 in 55.
 ABSENCE = 4.0  # nats
+SAME_THING = 0.4  # m, tables; beams that speak against an alternative within that distance do so for one thing
+LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against it does not count
+FAR_BEHIND_BY_SHOWN = 12.0  # nats; an alternative that is behind by more has a weight below 1 in 2,900
 
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 

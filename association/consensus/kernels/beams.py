@@ -41,6 +41,13 @@ def across_wall(
 
 
 @kernel
+def evidence_of_beam(across: float, wall: Record) -> tuple[float, float]:
+    """Return how far a beam reads a wall, and how far it passed through it, 0 to 1, by its distance `across` it."""
+    read = math.exp(-0.5 * across * across / (NEAR * NEAR))
+    return read, min(1.0, (wall.end - wall.begin) / SURE_LENGTH) if across > CERTAIN else 0.0
+
+
+@kernel
 def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> None:
     """Let a ray go where a beam did; `c` and `s` are cosine and sine of the pose's heading."""
     ray.x = c * beam.x - s * beam.y + pose.x
@@ -73,9 +80,9 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
         across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
         if w < 0:
             continue
-        read += math.exp(-0.5 * across * across / (NEAR * NEAR))
-        if across > CERTAIN:
-            passed += min(1.0, (walls[w].end - walls[w].begin) / SURE_LENGTH)
+        here, through = evidence_of_beam(across, walls[w])
+        read += here
+        passed += through
     n = max(1, len(beams))
     evidence.read = read / n
     evidence.passed = passed / n

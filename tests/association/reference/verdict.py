@@ -15,6 +15,7 @@ from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.tuning import RIVAL_SHARE
 from association.verdict import tuning
+from association.verdict.absences import absences
 from association.verdict.alternatives import probability_with_loose_walls
 from association.verdict.chance import NullScore, find_null_score
 from registration.observability import MAX_DEVIATION
@@ -50,7 +51,7 @@ def evidence(answer: Answer, rivals: list[ConsensusSet], temperature: float) -> 
     return total
 
 
-def shared(answer: Answer, rivals: list[ConsensusSet]) -> float:
+def shared(context: SearchContext, answer: Answer, rivals: list[ConsensusSet]) -> float:
     """Return the probability of the answer among the others: as scored, or by what the scan shows if that is less."""
     as_scored = 1.0 / (1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE))
     total = 0.0
@@ -59,7 +60,8 @@ def shared(answer: Answer, rivals: list[ConsensusSet]) -> float:
         by_matches -= sum(max(0.0, float(b)) for b in rival.matches["score"])
         by_prior = (answer.best.posterior - answer.best.score) - (rival.posterior - rival.score)
         rest = (answer.best.score - rival.score) - by_matches
-        total += math.exp(-max(0.0, by_matches + by_prior + min(tuning.ABSENCE, rest)) / tuning.ALTERNATIVE_TEMPERATURE)
+        limit = max(tuning.ABSENCE, float(absences(context, answer.best, [rival])[0]))
+        total += math.exp(-max(0.0, by_matches + by_prior + min(limit, rest)) / tuning.ALTERNATIVE_TEMPERATURE)
     return min(as_scored, 1.0 / (1.0 + total))
 
 
@@ -191,7 +193,7 @@ def judge(
     chances = _chances(context, explanations, models, usual_deviation)
     likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
-        share = shared(answer, rivals)
+        share = shared(context, answer, rivals)
         less = min(1.0, probability_with_loose_walls(context, answer, rivals) / share)
         chances = replace(chances, right=less * chances.right, careful=less * chances.careful)
         if chances.careful >= bar_of(context):
@@ -237,7 +239,7 @@ def _chances(
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]
     numbers, cautious = features(context, answer, rivals), cautious_of(context, models)
     usual = models["probability" if context.scan.beams is None else "probability_with_beams"]
-    share = shared(answer, rivals)
+    share = shared(context, answer, rivals)
     return Judged(
         Status.NO_MATCH,
         False,

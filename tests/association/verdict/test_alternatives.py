@@ -123,19 +123,19 @@ def test_a_thing_that_is_where_the_map_shows_it_tells_two_rooms_apart() -> None:
 
 def test_what_the_scan_does_not_show_counts_up_to_a_limit() -> None:
     """Of two explanations with equal matches; any number of beams counts as one thing that may be gone."""
-    _, answer, _ = explained(0)
+    context, answer, _ = explained(0)
     equal = replace(answer.best, score=answer.best.score - 40.0, posterior=answer.best.posterior - 40.0)
     limited = 1.0 / (1.0 + math.exp(-ABSENCE / ALTERNATIVE_TEMPERATURE))
-    assert probability_by_shown(answer.best, [equal]) == pytest.approx(limited)
+    assert probability_by_shown(context, answer.best, [equal]) == pytest.approx(limited)
     fewer = equal.matches.copy()
     fewer["score"][0] = 0.0
     gap = float(answer.best.matches["score"][0]) + ABSENCE
     expected = 1.0 / (1.0 + math.exp(-gap / ALTERNATIVE_TEMPERATURE))
-    assert probability_by_shown(answer.best, [replace(equal, matches=fewer)]) == pytest.approx(expected)
-    assert probability_by_shown(answer.best, []) == 1.0
+    assert probability_by_shown(context, answer.best, [replace(equal, matches=fewer)]) == pytest.approx(expected)
+    assert probability_by_shown(context, answer.best, []) == 1.0
 
 
 def test_a_prior_counts_in_full_next_to_what_the_scan_shows() -> None:
-    _, answer, _ = explained(0)
+    context, answer, _ = explained(0)
     unlikely = replace(answer.best, posterior=answer.best.posterior - 30.0)
-    assert probability_by_shown(answer.best, [unlikely]) > 0.999
+    assert probability_by_shown(context, answer.best, [unlikely]) > 0.999
