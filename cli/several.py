@@ -11,6 +11,7 @@ from .contract import Json
 from .errors import WrongUseError
 from .inputs import FILES, read_map_or_id
 
+IN_BAGS = "metadata.yaml"  # a file in the folder of each bag of ROS 2
 MOST_NAME = 120  # letters of a name; the contract allows 128
 NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]+")
 
@@ -70,9 +71,9 @@ def _named(names: Sequence[str]) -> list[tuple[str, Json]]:
 
 
 def _files_of(name: str) -> list[str]:
-    """Return the map files of a folder, by name; of anything else itself."""
+    """Return the map files of a folder, by name; of anything else itself, also of the folder of a bag."""
     folder = Path(name)
-    if not folder.is_dir():
+    if not folder.is_dir() or (folder / IN_BAGS).is_file():
         return [name]
     found = sorted(str(file) for file in folder.iterdir() if file.suffix.lower() in FILES and file.is_file())
     if not found:

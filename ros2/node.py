@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+import weakref
 from collections.abc import Callable, Sequence
 
 import linefix
@@ -34,6 +35,11 @@ MARGIN = 1e-3  # s; so that a waiting time is over at the next check
 
 def _to_stderr(line: str) -> None:
     print(f"linefix: {line}", file=sys.stderr, flush=True)
+
+
+def _problem(node: Node | None, problem: str) -> None:
+    if node is not None:
+        node._health.problem(problem)
 
 
 class Node:
@@ -68,7 +74,9 @@ class Node:
         self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
         participant = connect(options.domain)
-        self._topics = Topics(participant, options, lambda problem: self._health.problem(problem))
+        # Not in a cycle of references: the garbage collector would leave the endpoints of DDS open.
+        node = weakref.ref(self)
+        self._topics = Topics(participant, options, lambda problem: _problem(node(), problem))
         prefix = f"{options.namespace.strip('/')}/" if options.namespace else ""
         names = prefix, options.hardware_id or options.namespace.strip("/")
         self._health = Health(self._topics.diagnostics, self._topics.status, names, log)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rosbags.rosbag2 import Writer
 
 from service.schemas import examples
+from tests.formats.recorded import GRID, TYPES, grid_bytes
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
@@ -75,6 +78,17 @@ def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None
     (files.parent / "other" / "room.json").write_text(json.dumps({"segments": HALL}))
     answer = json.loads(linefix("locate", "floors/room.json", "other/room.json", "scan.json", "--json").out)
     assert {one["map_id"] for one in answer["maps"]} == {"room", "room-2"}
+
+
+def test_the_folder_of_a_bag_is_one_map(linefix: Linefix, files: Path) -> None:
+    cells = np.full((50, 60), -1)
+    cells[9:41, 9:51] = 100
+    cells[10:40, 10:50] = 0
+    with Writer(files.parent / "bag", version=8) as writer:
+        maps = writer.add_connection("/map", GRID, typestore=TYPES["cdr"])
+        writer.write(maps, 0, grid_bytes(cells))
+    answer = json.loads(linefix("locate", "bag", "floors/hall.json", "scan.json", "--json").out)
+    assert {one["map_id"] for one in answer["maps"]} == {"bag", "hall"}
 
 
 def test_an_empty_folder_is_told(linefix: Linefix, files: Path) -> None:
