@@ -24,7 +24,7 @@ def kernel(function: Function) -> Function:
     ``NUMBA_DISABLE_JIT=1`` in the environment it stays plain Python. It has no entry for C code.
 
     To Numba a literal is a type of its own. A kernel that is called with ``0``, or with a variable that starts at ``0``
-    before a loop, is compiled for that type, too. With ``np.int64(0)`` it is compiled once.
+    before a loop, is compiled for that type, too. With ``int(np.int64(0))`` it is compiled once.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ def kernel(function: Function) -> Function:
         return interpreted(function)
     directory = cache_directory()
     with _cached_in(directory):
-        decorate = numba.njit(cache=directory is not None, nogil=True, no_cfunc_wrapper=True)
+        # The types that Numba ships lack this option.
+        decorate = numba.njit(cache=directory is not None, nogil=True, no_cfunc_wrapper=True)  # type: ignore[call-overload]
         return cast(Function, decorate(function))
 
 

@@ -80,7 +80,7 @@ def match_scan(
             first = bin_starts[lowest]
             span = bin_starts[highest + 1] - first + (len(walls) if highest < lowest else 0)
             least = 1e300
-            left_to_follow = np.int64(MOST_BRIDGED)
+            left_to_follow = int(np.int64(MOST_BRIDGED))
             for k in range(starts[here], starts[here + 1]):
                 w = items[k]
                 if w - first + (len(walls) if w < first else 0) >= span:

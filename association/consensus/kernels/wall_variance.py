@@ -91,7 +91,7 @@ def squared_correlation(ties: Floats, one: int, other: int) -> float:
 @kernel
 def sum_pairs(scan: Records, matches: Records, known_walls: KnownWalls, wall_variance: float, work: Workspace) -> None:
     """Fill the sums of `work` with all matches, walls off with that variance."""
-    sum_pairs_without(scan, matches, known_walls, wall_variance, np.int64(-1), work)
+    sum_pairs_without(scan, matches, known_walls, wall_variance, int(np.int64(-1)), work)
 
 
 @kernel

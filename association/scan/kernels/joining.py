@@ -291,7 +291,7 @@ def lines_of_a_view(measured: Measured, counted: bool, directed: bool) -> tuple[
     Returns (n,) the line of each segment, and the lines, (k,) of `LINE_PARTS`.
     """
     given = as_lines(measured)
-    cut, lines = join_lines(given, CUT_LATERAL, CUT_COSINE, np.bool_(True), directed)
+    cut, lines = join_lines(given, CUT_LATERAL, CUT_COSINE, bool(np.bool_(True)), directed)
     if len(lines) == len(given):
         return join_lines(given, LINE_LATERAL, LINE_COSINE, counted, directed)
     apart, lines = join_lines(lines, LINE_LATERAL, LINE_COSINE, counted, directed)

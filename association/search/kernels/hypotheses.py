@@ -46,7 +46,7 @@ def search_listed(question: Question, tables: MapTables, base: Record, state: Se
     met = np.empty(AT_ONCE, MET)
     count, entries = look_up(figure, tables.crossings, lists)
     stop = state.stop
-    at = np.int64(0)
+    at = int(np.int64(0))
     gated = False
     goes_on = True
     while goes_on and at < entries:
@@ -94,11 +94,11 @@ def sweep_laid(
     swept = sweeps.swept
     met = sweeps.met
     stop = state.stop
-    chain = np.int64(0)
+    chain = int(np.int64(0))
     while chain < count:
         chain, cells = sweep(laid, chain, count, tables.sweep.present, sectors.shape[0], swept)
-        cell = np.int64(0)
-        entry = np.int64(0)
+        cell = int(np.int64(0))
+        entry = int(np.int64(0))
         while cell < cells:
             if stop[0] != 0:
                 return False

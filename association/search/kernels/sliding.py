@@ -84,7 +84,7 @@ def search_slides(
     leave_out_bases(question.scan, sliding, work.shifts, work.later)
     anchor_list = np.empty(len(chains), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
-    n = np.int64(0)
+    n = int(np.int64(0))
     for k in range(n_anchors):
         chain = chains[anchor_list[k]]
         low, high, count = slides_on(chain, a, prior, spacing)
