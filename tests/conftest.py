@@ -15,7 +15,7 @@ from tests.running import RunningService, running
 
 TESTS = Path(__file__).parent
 EXIT_SECONDS = 30.0
-ROOMS = ("faults", "service", "experiments", "benchmarks")  # whose files take long
+ROOMS = ("faults", "service", "ros2", "map_quality", "cli", "experiments", "benchmarks")  # whose files take long
 
 # The same examples in each run: what fails does so again, and no run fails by what it alone has drawn. Whoever looks
 # for other examples says `--hypothesis-profile=other`.

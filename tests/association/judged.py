@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -210,10 +210,3 @@ def crossing(value: Callable[[float], object], high: float = 1.0, halvings: int 
         middle = 0.5 * (low + high)
         low, high = (middle, high) if value(middle) == below else (low, middle)
     return low, high
-
-
-def sought(wanted: Callable[[Drawn], bool], **how: Any) -> Drawn:
-    """Draw until an answer is as wanted."""
-    rng = np.random.default_rng(0)
-    every: Iterator[Drawn] = (replace(drawn(rng, (None,)), **how) for _ in range(20_000))
-    return next(one for one in every if wanted(one))

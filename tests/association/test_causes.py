@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationOptions, Beams, CancelledError, Deadline, MapIndex, Scan, associate
+from association import AssociationOptions, Beams, Deadline, MapIndex, Scan, associate
 from association.causes import find_causes
 from association.explain import search_and_explain
 from association.scan.scan import mirrored, scaled, turned_round
@@ -113,20 +113,6 @@ def test_nothing_is_looked_for_past_the_deadline() -> None:
     how = AssociationOptions(causes=True)
     found = associate(INDEX, mirrored(SCAN), None, how, Deadline(time.monotonic()))
     assert "mirrored" not in [one.code for one in found.warnings]
-
-
-def test_an_inner_deadline_ends_with_the_outer_one() -> None:
-    outer = Deadline(at=10.0)
-    assert (outer.within(5.0).at, outer.within(20.0).at, Deadline().within(3.0).at) == (5.0, 10.0, 3.0)
-    inner = Deadline().within(math.inf)
-    assert not inner.passed
-    later = Deadline()
-    inner = later.within(math.inf)
-    later.cancel()
-    assert inner.cancelled
-    assert inner.passed
-    with pytest.raises(CancelledError):
-        associate(INDEX, SCAN, None, AssociationOptions(), inner)
 
 
 def test_scaled_lengths() -> None:

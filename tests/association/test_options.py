@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Any
 
 import numpy as np
 import pytest
 
-from association import AssociationOptions, Deadline, HardPrior, InvalidSearchError, SoftPrior
+from association import AssociationOptions, HardPrior, InvalidSearchError, SoftPrior
 from registration.layout import Floats
 
 from .scenes import pose
@@ -92,16 +91,3 @@ def test_a_window_has_a_size(radius: float, angle: float, argument: str) -> None
 )
 def test_a_window_contains_what_is_near_in_place_and_angle(at: Any, inside: bool) -> None:
     assert HardPrior(pose(1.0, 2.0, 3.1), 0.5, 0.25).contains(at) is inside
-
-
-def test_deadlines() -> None:
-    now = time.monotonic()
-    assert not Deadline().passed
-    assert not Deadline(at=now + 100.0).passed
-    assert Deadline(at=now).passed
-    cancelled = Deadline(at=now + 100.0)
-    assert not cancelled.cancelled
-    cancelled.cancel()
-    assert cancelled.cancelled
-    assert cancelled.passed
-    assert not Deadline(at=now).cancelled

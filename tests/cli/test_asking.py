@@ -91,13 +91,6 @@ def test_vectorize_says_that_points_are_in_no_order(linefix: Linefix, folder: Pa
     assert "points_not_in_order" not in linefix("vectorize", "points.json").out
 
 
-def test_a_scan_whose_angles_contradict_each_other_is_refused(linefix: Linefix, folder: Path) -> None:
-    laser = {"angle_min": -3.1, "angle_max": 3.1, "angle_increment": 0.05, "ranges": [2.0] * 63}
-    (folder / "laser.json").write_text(json.dumps(laser))
-    for command in (("locate", "room.json", "laser.json"), ("vectorize", "laser.json")):
-        assert "angle_max 3.1 rad and angle_increment 0.05 rad contradict" in refused(linefix(*command), 3)
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
@@ -124,11 +117,6 @@ def test_a_key_comes_from_the_environment(linefix: Linefix, folder: Path, guarde
     asked = ("locate", "room.json", "scan.json", "--server", guarded.url)
     assert "LINEFIX_KEY" in refused(linefix(*asked), 4)
     assert linefix(*asked, LINEFIX_KEY="sesame").code == 0
-
-
-def test_version(linefix: Linefix, folder: Path) -> None:
-    ended = linefix("--version")
-    assert (ended.code, ended.out.split()[0]) == (0, "linefix")
 
 
 def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix, folder: Path) -> None:

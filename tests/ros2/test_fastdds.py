@@ -176,15 +176,6 @@ def test_a_grid_is_received(domain: int, program: Path) -> None:
     assert float(found[4]) == pytest.approx(1.0, abs=0.05)
 
 
-def test_stamps_that_jump_back_and_stamps_of_zero(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
-        robot.mount()
-        robot.until("initialpose", Way(robot, 1000.0))
-        robot.until("pose", Way(robot, 10.0), lambda words: float(words[1]) < 1000.0)
-        robot.until("diagnostics linefix: localization: the pose is agreed", Way(robot, 20.0))
-        robot.until("pose 0 0", lambda: robot.drive(linefix.RigidTransform(0.8, 1.0, 0.1), 0.0))
-
-
 def silent_for_five_scans(robot: Peer, way: Way) -> None:
     """Rest until five scans in succession are without an initialpose; the first may come again with odometry."""
     found: list[str] = []
@@ -238,16 +229,3 @@ def test_the_map_of_the_agreed_pose(domain: int, program: Path) -> None:
         robot.until("initialpose", way)
         with peer_without_bridge(program, domain, "/tower") as late:
             assert late.until("map_id") == ["map_id", "hq-2"]
-
-
-def test_mounts_of_robots_with_prefixes_are_on_one_topic(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    options = NodeOptions(domain=domain, namespace="/robot1", frame_prefix="robot1/", agree=1)
-    with (
-        running(options, room),
-        peer(program, domain, "/robot1") as robot,
-        peer_without_bridge(program, domain, "/robot2") as other,
-    ):
-        other.send("global_mount", "robot2/", 5.0, 5.0, 0.0)
-        robot.send("global_mount", "robot1/", BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta)
-        found = robot.until("initialpose", Way(robot))
-        assert float(found[4]) == pytest.approx(1.0, abs=0.03)

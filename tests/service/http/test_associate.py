@@ -140,18 +140,6 @@ def test_the_paper_s_estimator_has_no_covariance(client: httpx.Client) -> None:
     assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_the_same_seed_gives_the_same_answer(client: httpx.Client) -> None:
-    first, second = (
-        {
-            name: value
-            for name, value in associated(client, options={"seed": 5}).items()
-            if name not in ("request_id", "timing_ms")
-        }
-        for _ in range(2)
-    )
-    assert first == second
-
-
 def test_a_deadline_that_has_passed_is_504(client: httpx.Client) -> None:
     response = client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {"deadline_ms": 0}})
     assert (response.status_code, response.json()["code"]) == (504, "deadline_exceeded")
