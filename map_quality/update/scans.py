@@ -1,0 +1,241 @@
+"""Scans of several visits, and the poses that the search finds for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
+from registration import Correspondences, InputError, RigidTransform, Segments
+
+from .result import RefusedVisit
+from .tuning import (
+    HELD_BACK,
+    LEAST_SCANS,
+    LEAST_USABLE,
+    MOST_SIGMA,
+    MOST_TURN_SIGMA,
+    OFF_SCALE,
+    PLACE,
+    SURE_OF_SCALE,
+)
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
+DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_ranges", "scan_exceeds_map"))
+
+
+class UpdateError(InputError):
+    """A scan cannot be evidence of a change."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisitScan:
+    """A scan with ranges, and the visit that it was taken on.
+
+    Attributes
+    ----------
+    scan : Scan
+        With its beams.
+    visit : str
+        Scans of one visit share it. What changes within a visit, such as a door, is not learned.
+    pose : RigidTransform or None
+        Pose as the sender knows it, map_from_scan; a prior of the search. The search finds the pose in any case.
+    covariance : (3, 3) or None
+        Of additive (x, y, theta) of `pose`; required with it.
+
+    Raises
+    ------
+    UpdateError
+        When the scan has no beams, or a pose comes without its covariance.
+    """
+
+    scan: Scan
+    visit: str
+    pose: RigidTransform | None = None
+    covariance: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.scan.beams is None or self.scan.viewpoint is None:
+            raise UpdateError("found a scan without ranges, expected ranges; segments do not show free space",
+                              argument="scan")  # fmt: skip
+        if (self.pose is None) != (self.covariance is None):
+            missing = "covariance" if self.covariance is None else "pose"
+            raise UpdateError("found none, expected pose and covariance together, or neither", argument=missing)
+
+    @property
+    def prior(self) -> SoftPrior | None:
+        """The stated pose as a prior."""
+        if self.pose is None or self.covariance is None:
+            return None
+        return SoftPrior(self.pose, self.covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Localized:
+    """A scan and its pose.
+
+    Attributes
+    ----------
+    number : int
+        Of the scan, in the order in which they came.
+    visit : int
+        Number of its visit.
+    scan : Scan
+    result : AssociationResult
+    on : Segments
+        The map that it was searched in; the result's correspondences name its segments.
+    held_back : bool
+        True if it gives no evidence, and tests the new map.
+    """
+
+    number: int
+    visit: int
+    scan: Scan
+    result: AssociationResult
+    on: Segments
+    held_back: bool
+
+    @property
+    def usable(self) -> bool:
+        """Whether a robot may use the answer."""
+        return self.result.usable
+
+    @property
+    def precise(self) -> bool:
+        """Whether the pose is known well enough, and nothing speaks against the ranges."""
+        if not self.result.usable or self.result.covariance is None:
+            return False
+        x, y, theta = np.sqrt(np.diag(self.result.covariance))
+        doubtful = any(one.code in DOUBTFUL for one in self.result.warnings)
+        return bool(max(x, y) <= MOST_SIGMA and theta <= MOST_TURN_SIGMA) and not doubtful
+
+    @property
+    def pose(self) -> RigidTransform:
+        """The pose of a usable scan, map_from_scan."""
+        assert self.result.pose is not None
+        return self.result.pose
+
+    @property
+    def score(self) -> float:
+        """Of its consensus set, nats; 0 where it is not usable."""
+        return self.result.diagnostics.score if self.usable and self.result.diagnostics is not None else 0.0
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """The square that it was taken in."""
+        return math.floor(self.pose.x / PLACE), math.floor(self.pose.y / PLACE)
+
+    @property
+    def pairs(self) -> Correspondences:
+        """The correspondences, by scan segment."""
+        pairs = [(one.scan, one.map) for one in self.result.correspondences]
+        return Correspondences.of(self.on, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
+
+
+def visit_numbers(scans: Sequence[VisitScan]) -> tuple[list[str], list[int]]:
+    """Return the names of the visits in the order in which they came, and the number of each scan's visit."""
+    names = list(dict.fromkeys(one.visit for one in scans))
+    numbers = {name: k for k, name in enumerate(names)}
+    return names, [numbers[one.visit] for one in scans]
+
+
+def held_back(visits: Sequence[int]) -> list[bool]:
+    """Return which scans are held back: one in ten of each visit."""
+    counts: dict[int, int] = {}
+    held = []
+    for visit in visits:
+        counts[visit] = counts.get(visit, -1) + 1
+        held.append(counts[visit] % HELD_BACK == HELD_BACK // 2)
+    return held
+
+
+def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
+    """Search a scan in a map, with the directions that count in the index.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    oriented = len(index.segments) == index.directed
+    options = AssociationOptions(max_alternatives=0, oriented=oriented, parts=("correspondences",))
+    return associate(index, one.scan, one.prior, options, deadline)
+
+
+def choose_evidence(names: Sequence[str], found: Sequence[Localized]) -> tuple[list[Localized], list[RefusedVisit]]:
+    """Return the scans that give evidence, and the visits that give none.
+
+    A visit of another building has few usable scans. A laser with a wrong scale leaves residuals that grow with the
+    distance of the walls.
+    """
+    chosen: list[Localized] = []
+    refused: list[RefusedVisit] = []
+    for number, name in enumerate(names):
+        own = [one for one in found if one.visit == number]
+        precise = [one for one in own if one.precise]
+        told = _doubt(own, precise)
+        if told is None:
+            chosen += [one for one in precise if not one.held_back]
+        else:
+            refused.append(RefusedVisit(name, told))
+    return chosen, refused
+
+
+def _doubt(own: Sequence[Localized], precise: Sequence[Localized]) -> str | None:
+    """Return why a visit gives no evidence; None if it does."""
+    if len(precise) < max(LEAST_SCANS, LEAST_USABLE * len(own)):
+        return (
+            f"{len(precise)} of {len(own)} scans are usable and precise, expected at least "
+            f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building."
+        )
+    factor, sigma = scale_of(precise)
+    if abs(factor) > OFF_SCALE and abs(factor) > SURE_OF_SCALE * sigma:
+        return (
+            f"Lengths of the scans are off by {100.0 * factor:.1f} % from those of the map, expected at most "
+            f"{100.0 * OFF_SCALE:g} %. Check the scale of the map and of the ranges."
+        )
+    return None
+
+
+def scale_of(found: Sequence[Localized]) -> tuple[float, float]:
+    """Estimate by which fraction the lengths of scans are off from those of the map.
+
+    The offset of a scan line from its wall is ``b - s a``, with the distance ``a`` of the wall from the sensor, a
+    common offset ``b``, and the fraction ``s``.
+
+    Returns
+    -------
+    float
+        The fraction, above 0 where ranges are too long.
+    float
+        Its standard deviation, from the residuals.
+    """
+    arms, offsets, weights = [], [], []
+    for one in found:
+        pairs = one.pairs
+        c, s = math.cos(one.pose.theta), math.sin(one.pose.theta)
+        viewed = pairs.midpoints - np.asarray(one.scan.viewpoint)
+        points = np.stack([c * viewed[:, 0] - s * viewed[:, 1], s * viewed[:, 0] + c * viewed[:, 1]], axis=1)
+        arms.append(-np.einsum("ij,ij->i", pairs.map_normals, points))
+        offsets.append(np.array([pair.offset for pair in one.result.correspondences]))
+        weights.append(np.sqrt(pairs.lengths))
+    a, o, w = np.concatenate(arms), np.concatenate(offsets), np.concatenate(weights)
+    if len(a) < 10:
+        return 0.0, math.inf
+    design = np.stack([np.ones_like(a), -a], axis=1) * w[:, None]
+    normal = design.T @ design
+    if np.linalg.cond(normal) > 1e12:
+        return 0.0, math.inf
+    inverse = np.linalg.inv(normal)
+    solution = inverse @ design.T @ (w * o)
+    residual = w * o - design @ solution
+    # Residuals of one scan and of one wall are not independent: each scan counts once.
+    variance = float(residual @ residual) / max(1, len(a) - 2) * len(a) / max(1, len(found))
+    return float(solution[1]), math.sqrt(max(0.0, inverse[1, 1] * variance))

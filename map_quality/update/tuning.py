@@ -1,0 +1,61 @@
+"""Thresholds of map updates; `drawn` means chosen on buildings that `simulation` draws."""
+
+from __future__ import annotations
+
+import math
+
+# --- Scans that give evidence -----------------------------------------------------------------------------------------
+
+MOST_SIGMA, MOST_TURN_SIGMA = 0.05, math.radians(1.0)  # m, rad; deviations of a pose that is known well enough
+LEAST_USABLE = 0.3  # fraction of a visit's scans, drawn; in another building nearly none are usable
+LEAST_SCANS = 3  # usable ones of a visit
+OFF_SCALE, SURE_OF_SCALE = 0.005, 5.0  # fraction, and times its deviation; by which lengths of a visit are off
+HELD_BACK = 10  # one scan in so many gives no evidence, and tests the new map
+MOST_BEAMS = 720  # of a scan, time
+USUAL_SIGMA = 0.02  # m; of the walls of a map that does not declare it
+
+# --- Evidence of beams ------------------------------------------------------------------------------------------------
+
+CHUNK = 0.2  # m; walls are judged in pieces of about this length
+LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are no evidence
+LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
+DEVIATIONS = 3.0  # times the standard deviation, likewise
+THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
+PLACE = 0.5  # m; scans from the same square of this side count as one pose
+HANGING = 0.1  # m; deviation without a wall above which a pose depends on that wall, and is no evidence for it
+
+# --- Decisions about a chunk ------------------------------------------------------------------------------------------
+
+LEAST_BEAMS = 3  # of a visit
+FEW, MOST = 0.1, 0.7  # fractions of a visit's beams: those that contradict it, those that agree
+LEAST_VISITS, LEAST_POSES = 2, 3
+CONTRADICTING = 0.1  # fraction of all beams on a change, drawn
+
+# --- Changes ----------------------------------------------------------------------------------------------------------
+
+LEAST_GONE = 0.6  # fraction of a wall's length that is gone, if nothing reads the rest: the wall is removed
+THING = 30.0  # m; longest outline of a thing: a closed loop of walls
+LOOP_GAP = 0.01  # m; corners that are nearer are one
+LEAST_GONE_OF_THING = 0.5  # fraction of an outline, likewise
+LEAST_CUT = 0.5  # m; a wall is shortened by no less
+LEAST_PIECE = 0.2  # m; that remains of a wall, or is added
+LEAST_SEEN = 0.25  # m; shorter lines of a scan do not suggest a wall
+SAME_ANGLE = math.radians(4.0)  # between lines of scans that show one wall
+SAME_LINE = 0.08  # m, likewise
+SAME_GAP = 0.3  # m; along the wall
+BIN = 0.05  # m; resolution of the ends of a new wall
+ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added
+FULLY_ON_MAP = 0.85  # fraction of a scan line's length
+JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
+NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
+SAME_LENGTH = 0.15  # m; by which a side of a moved thing may differ
+
+# --- Confidence, and the check of the proposal ------------------------------------------------------------------------
+
+DOUBT_VISIT, DOUBT_POSE = 0.1, 0.7  # probability that a visit, or a pose, shows a change that is none; drawn
+MOST_CONFIDENCE = 0.9999
+LOWER_SCORE = 1.0  # nats; a change may lower the score of its scans by no more
+SAME_POSE = 0.3  # m; between the poses of one scan on the old and the new map
+FEWER_USABLE = 0.01  # fraction of the scans; a proposal that loses more is withdrawn
+DROPS = 3  # times that changes are dropped and the rest is verified again
+ROUNDS = 2  # scans that are usable on the new map only give more evidence

@@ -1,0 +1,305 @@
+"""The update of a map from scans of several visits."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import CancelledError, Deadline, MapIndex
+from registration import InvalidArgumentError, Segments
+
+from .additions import candidates, unexplained
+from .changes import Draft, change_of, draft_changes
+from .evidence import WallEvidence, gather
+from .result import Change, ChangeCode, MapUpdate, RefusedVisit, Usable
+from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, search, visit_numbers
+from .tuning import DROPS, FEWER_USABLE, LOWER_SCORE, ROUNDS, SAME_POSE, USUAL_SIGMA
+
+Floats = NDArray[np.float64]
+FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
+
+
+def update(
+    index: MapIndex,
+    scans: Sequence[VisitScan],
+    deadline: Deadline | None = None,
+    *,
+    accept: float | None = None,
+    refuse: Collection[int] = (),
+) -> MapUpdate:
+    """Propose changes of a map that scans of several visits show.
+
+    1. Localize: search each scan in the map. Usable and precise ones give evidence, except one in ten.
+    2. Suggest: join lines of scans that the map does not show to walls that may be new.
+    3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
+    4. Decide: at least two visits and three places agree, no visit contradicts.
+    5. Verify: search all scans in the new map. A change that lowers the score of its scans is dropped.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Directions count as they do in the index.
+    scans : sequence of VisitScan
+    deadline : Deadline, optional
+        If it passes before all is verified, nothing is proposed.
+    accept : float, optional
+        Confidence from 0 to 1 below which a change is proposed, but not in the new map. None: all are in it.
+    refuse : collection of int
+        Indices of proposed changes that are not in the new map.
+
+    Returns
+    -------
+    MapUpdate
+
+    Raises
+    ------
+    UpdateError
+        When there are no scans.
+    InvalidArgumentError
+        When `accept` or `refuse` is out of range.
+    CancelledError
+        When the deadline was cancelled.
+    """
+    steps = updating(index, scans, deadline, accept=accept, refuse=refuse)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            found: MapUpdate = done.value
+            return found
+
+
+def updating(
+    index: MapIndex,
+    scans: Sequence[VisitScan],
+    deadline: Deadline | None = None,
+    *,
+    accept: float | None = None,
+    refuse: Collection[int] = (),
+) -> Generator[None, None, MapUpdate]:
+    """Do what `update` does, one search at a step, and return the same; between steps others may have their turn.
+
+    Raises
+    ------
+    UpdateError, InvalidArgumentError, CancelledError
+        As `update`.
+    """
+    if not len(scans):
+        raise UpdateError("found no scans, expected scans of at least two visits", argument="scans")
+    if accept is not None and not 0.0 <= accept <= 1.0:
+        raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
+    begun = _Update(index, tuple(scans), deadline or Deadline())
+    names, _ = visit_numbers(scans)
+    first = yield from begun.localize()
+    proposed, latest = Proposed(), tuple(first)
+    for _ in range(ROUNDS):
+        chosen, refused = choose_evidence(names, latest)
+        drafts, evidence = begun.draft(chosen, names)
+        better = yield from begun.verify(drafts, evidence, first)
+        if better is None or better.usable < proposed.usable or better.shown == proposed.shown:
+            break
+        proposed, latest = better, better.found
+    return begun.proposal(proposed, first, refused, accept, refuse)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposed:
+    """Verified changes.
+
+    Attributes
+    ----------
+    drafts : tuple of Draft
+    changes : tuple of Change
+        The same with their evidence.
+    found : tuple of Localized
+        All scans, searched on the map with these changes; empty where there are none.
+    """
+
+    drafts: tuple[Draft, ...] = ()
+    changes: tuple[Change, ...] = ()
+    found: tuple[Localized, ...] = ()
+
+    @property
+    def usable(self) -> int:
+        """Number of scans that are usable on the new map."""
+        return sum(one.usable for one in self.found)
+
+    @property
+    def shown(self) -> list[tuple[ChangeCode, tuple[int, ...], int]]:
+        """The changes without their evidence."""
+        return sorted((one.code, one.segments, len(one.new)) for one in self.drafts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Update:
+    """An update in the making."""
+
+    index: MapIndex
+    scans: tuple[VisitScan, ...]
+    deadline: Deadline
+
+    @property
+    def known(self) -> Segments:
+        """The map as sent."""
+        return Segments.derived(self.index.segments.endpoints[: self.index.directed])
+
+    @property
+    def sigma(self) -> float:
+        """Of its walls, metres."""
+        return USUAL_SIGMA if self.index.sigma is None else self.index.sigma
+
+    @property
+    def oriented(self) -> bool:
+        """Whether directions count."""
+        return len(self.index.segments) == self.index.directed
+
+    def localize(self) -> Generator[None, None, list[Localized]]:
+        """Search all scans that there is time for."""
+        _, visits = visit_numbers(self.scans)
+        held, found = held_back(visits), []
+        now = time.monotonic()
+        at = math.inf if self.deadline.at is None else now + FIRST_SEARCHES * (self.deadline.at - now)
+        for number, one in enumerate(self.scans):
+            if self.deadline.cancelled:
+                raise CancelledError
+            if time.monotonic() > at:
+                break
+            result = search(self.index, one, self.deadline)
+            found.append(Localized(number, visits[number], one.scan, result, self.index.segments, held[number]))
+            yield
+        return found
+
+    def draft(
+        self, chosen: Sequence[Localized], names: Sequence[str]
+    ) -> tuple[list[tuple[Draft, Change]], WallEvidence]:
+        """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
+        known = self.known
+        new, sigmas = candidates(unexplained(chosen, known), known)
+        walls = Segments.derived(np.concatenate([known.endpoints, new]))
+        evidence = gather(walls, chosen, len(names), self.sigma, oriented=self.oriented)
+        drafts = draft_changes(evidence, known, sigmas, self.sigma)
+        told = [(one, change_of(one, evidence, names)) for one in drafts]
+        return [(one, change) for one, change in told if change is not None], evidence
+
+    def verify(
+        self, drafts: Sequence[tuple[Draft, Change]], evidence: WallEvidence, first: Sequence[Localized]
+    ) -> Generator[None, None, Proposed | None]:
+        """Search all scans on the new map; drop changes that lower the score of their scans, or move their poses.
+
+        Returns
+        -------
+        Proposed or None
+            What remains; None if nothing does, or there is no time to verify it.
+        """
+        for _ in range(DROPS):
+            if not drafts:
+                return None
+            found = yield from self._search_again([change for _, change in drafts], first)
+            if found is None:
+                return None
+            kept = [one for one in drafts if _is_better(one[0], evidence, first, found)]
+            if len(kept) == len(drafts):
+                if not _keeps_usable(first, found):
+                    return None
+                return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
+            drafts = kept
+        return None
+
+    def _search_again(
+        self, changes: Sequence[Change], first: Sequence[Localized]
+    ) -> Generator[None, None, list[Localized] | None]:
+        """Search all scans on the map with some changes; None if the deadline passes first."""
+        segments = apply(self.known, changes)
+        if not len(segments):
+            return None
+        new = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+        found = []
+        for one in first:
+            if self.deadline.cancelled:
+                raise CancelledError
+            if self.deadline.passed:
+                return None
+            found.append(replace(one, result=search(new, self.scans[one.number], self.deadline), on=new.segments))
+            yield
+        return found
+
+    def proposal(
+        self,
+        proposed: Proposed,
+        first: Sequence[Localized],
+        refused: Sequence[RefusedVisit],
+        accept: float | None,
+        refuse: Collection[int],
+    ) -> MapUpdate:
+        """Return the proposal with the new map."""
+        changes = sorted(proposed.changes, key=lambda one: -one.confidence)
+        wrong = [k for k in refuse if not 0 <= k < len(changes)]
+        if wrong:
+            told = f"found {wrong[0]}, expected an index of the {len(changes)} proposed changes"
+            raise InvalidArgumentError(told, argument="refuse")
+        accepted = tuple(
+            (accept is None or one.confidence >= accept) and k not in refuse for k, one in enumerate(changes)
+        )
+        after = proposed.found or first
+        return MapUpdate(
+            apply(self.known, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]),
+            self.index.sigma,
+            tuple(changes),
+            accepted,
+            _usable(first, after, held=False),
+            _usable(first, after, held=True),
+            tuple(refused),
+            len(first) == len(self.scans) and not self.deadline.passed,
+        )
+
+
+def apply(known: Segments, changes: Sequence[Change]) -> Segments:
+    """Return the segments of a map with some changes.
+
+    Segments that no change names keep their order. The first new segment of a change takes the place of its first old
+    one; others are appended.
+    """
+    kept: list[Floats | None] = list(known.endpoints)
+    appended: list[Floats] = []
+    for one in changes:
+        new = list(one.new)
+        for old in one.segments:
+            kept[old] = None
+        if one.segments and new and one.code in ("shortened", "extended"):
+            kept[one.segments[0]] = new.pop(0)
+        appended += new
+    ends = [*(one for one in kept if one is not None), *appended]
+    return Segments.derived(np.array(ends).reshape(-1, 4))
+
+
+def _is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether a change leaves the poses of the scans that saw it, and does not lower their score."""
+    concerned = evidence.scans_of(draft.chunks)
+    gain = 0.0
+    for before, after in zip(first, found, strict=True):
+        if before.number not in concerned or not before.usable:
+            continue
+        gain += after.score - before.score
+        if after.usable and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
+            return False
+    return gain >= -LOWER_SCORE
+
+
+def _keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether about as many scans are usable on the new map, of all and of those held back."""
+    counts = [_usable(first, found, held=held) for held in (False, True)]
+    counts.append(
+        Usable(*(sum(values) for values in zip(*((c.scans, c.before, c.after) for c in counts), strict=True)))
+    )
+    return all(one.after >= one.before - max(1.0, FEWER_USABLE * one.scans) for one in counts)
+
+
+def _usable(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:
+    """Count the scans that are held back, or the others."""
+    chosen = [(one.usable, after.usable) for one, after in zip(first, found, strict=True) if one.held_back == held]
+    return Usable(len(chosen), sum(before for before, _ in chosen), sum(after for _, after in chosen))
