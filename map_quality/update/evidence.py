@@ -17,6 +17,7 @@ from .tuning import (
     DEVIATIONS,
     FEW,
     HANGING,
+    HIDDEN,
     LEAST_BEAMS,
     LEAST_POSES,
     LEAST_SLANT,
@@ -73,8 +74,9 @@ class WallEvidence:
     Attributes
     ----------
     chunks : Chunks
-    through, on : (v, c)
-        Beams of each visit that pass through each chunk, and that end on it.
+    through, on, before : (v, c)
+        Beams of each visit that pass through each chunk, that end on it, and that end a little before it, so that it
+        may be there and hidden.
     sights : (k, 3)
         Distinct rows of chunk, place, and scan that saw something; `place` numbers the squares of 0.5 m.
     seen_on : (k,)
@@ -84,14 +86,23 @@ class WallEvidence:
     chunks: Chunks
     through: Indices
     on: Indices
+    before: Indices
     sights: Indices
     seen_on: Bools
 
     @property
     def gone(self) -> Bools:
         """Chunks that are not there: several visits and poses pass through, and no visit reads them, (c,)."""
-        agree, against = self._votes(self.through, self.on), self._votes(self.on, self.through)
+        agree = self._votes(self.through, self.on + self.before)
+        against = self._votes(self.on + self.before, self.through)
         return self._decided(agree, against, on=False)
+
+    @property
+    def open(self) -> Bools:
+        """Chunks that some beams pass through, and that nothing reads: gone if the chunk next to them is, (c,)."""
+        through, on = self.through.sum(axis=0), self.on.sum(axis=0)
+        hidden = self._votes(self.on + self.before, self.through).any(axis=0)
+        return np.asarray((through >= LEAST_BEAMS) & (on <= FEW * (through + on)) & ~hidden)
 
     @property
     def there(self) -> Bools:
@@ -153,28 +164,31 @@ def gather(walls: Segments, found: Sequence[Localized], visits: int, sigma: floa
         True if a wall is seen from its left only.
     """
     chunks = Chunks.of(walls)
-    through, on = (np.zeros((visits, len(chunks)), dtype=np.intp) for _ in range(2))
+    through, on, before = (np.zeros((visits, len(chunks)), dtype=np.intp) for _ in range(3))
     places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
     sights, seen_on = [], []
     for one in found:
         of_scan = _follow(chunks, one, sigma, oriented=oriented)
         through[one.visit] += of_scan[0]
         on[one.visit] += of_scan[1]
+        before[one.visit] += of_scan[2]
         seen = np.flatnonzero(of_scan[0] + of_scan[1])
         sights.append(np.stack([seen, np.full_like(seen, places[one.place]), np.full_like(seen, one.number)], axis=1))
         seen_on.append(of_scan[1][seen] > of_scan[0][seen])
     rows = np.concatenate(sights) if sights else np.zeros((0, 3), dtype=np.intp)
-    return WallEvidence(chunks, through, on, rows, np.concatenate(seen_on) if seen_on else np.zeros(0, dtype=bool))
+    return WallEvidence(
+        chunks, through, on, before, rows, np.concatenate(seen_on) if seen_on else np.zeros(0, dtype=bool)
+    )
 
 
-def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> tuple[Indices, Indices]:
-    """Return the beams of a scan through each chunk, and on each, (c,)."""
+def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> tuple[Indices, Indices, Indices]:
+    """Return the beams of a scan through each chunk, on each, and a little before each, (c,)."""
     origins, rays, ranges = beams_in_map(one)
     near = _within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0)))
     near = near[~hanging_walls(chunks.walls.take(near), one, sigma)]
     if not len(near) or not len(ranges):
         nothing = np.zeros(len(chunks), dtype=np.intp)
-        return nothing, nothing
+        return nothing, nothing, nothing
     walls = chunks.walls.take(near)
     slant = rays @ walls.normals.T
     to_line = walls.offsets[None, :] - origins @ walls.normals.T
@@ -195,8 +209,9 @@ def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> 
     chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
     facing = (slanted < 0.0) | (not oriented)
     passed, ended = gap > THROUGH * tolerance, (np.abs(gap) <= tolerance) & facing
-    total = len(chunks)
-    return np.bincount(chunk[passed], minlength=total), np.bincount(chunk[ended], minlength=total)
+    hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
+    passed_of, on_of, before_of = (np.bincount(chunk[one], minlength=len(chunks)) for one in (passed, ended, hidden))
+    return passed_of, on_of, before_of
 
 
 def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:

@@ -44,7 +44,7 @@ def runs(chosen: Bools) -> list[tuple[int, int]]:
 
 def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
     """Return which of the first so many walls are gone, whole or in part."""
-    gone, read = evidence.gone, evidence.read
+    gone, read, open_ = evidence.gone, evidence.read, evidence.open
     cuts = []
     whole = _gone_things(evidence, gone, read, walls)
     for wall in range(walls):
@@ -55,7 +55,7 @@ def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
         own = evidence.chunks.of_wall(wall)
         if not gone[own].any():
             continue
-        cut = _cut(evidence, wall, gone[own], read[own])
+        cut = _cut(evidence, wall, gone[own], read[own], open_[own])
         if cut is not None:
             cuts.append(cut)
     return cuts
@@ -89,7 +89,7 @@ def _gone_things(evidence: WallEvidence, gone: Bools, read: Bools, walls: int) -
     return out
 
 
-def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools) -> Cut | None:
+def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
     """Return what is gone of a wall; None where that is too little to be sure of."""
     first, length = int(evidence.chunks.first[wall]), float(evidence.chunks.walls.lengths[wall])
     step = length / len(gone)
@@ -97,8 +97,13 @@ def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools) -> Cut | N
         return Cut(wall, first + np.flatnonzero(gone), np.zeros((0, 4)))
     out = np.zeros(len(gone), dtype=bool)
     for begin, end in runs(gone):
-        if (end - begin) * step >= LEAST_CUT:
-            out[begin:end] = True
+        if (end - begin) * step < LEAST_CUT:
+            continue
+        while begin > 0 and open_[begin - 1]:
+            begin -= 1
+        while end < len(gone) and open_[end]:
+            end += 1
+        out[begin:end] = True
     for begin, end in runs(~out):  # what is too short to be a wall, and is not read
         if (end - begin) * step < LEAST_PIECE + 0.5 * step and not read[begin:end].any() and out.any():
             out[begin:end] = True
