@@ -93,43 +93,53 @@ class WallEvidence:
     @property
     def gone(self) -> Bools:
         """Chunks that are not there: several visits and poses pass through, and no visit reads them, (c,)."""
-        agree = self._votes(self.through, self.on + self.before)
-        against = self._votes(self.on + self.before, self.through)
-        return self._decided(agree, against, on=False)
+        return self._decided(self.through, self.on, self.before, on=False)
+
+    @property
+    def there(self) -> Bools:
+        """Chunks that are there: several visits and poses read them, and no visit passes through, (c,)."""
+        return self._decided(self.on, self.through, np.zeros_like(self.on), on=True)
 
     @property
     def open(self) -> Bools:
         """Chunks that some beams pass through, and that nothing reads: gone if the chunk next to them is, (c,)."""
         through, on = self.through.sum(axis=0), self.on.sum(axis=0)
-        hidden = self._votes(self.on + self.before, self.through).any(axis=0)
+        hidden = shows(self.on + self.before, self.through).any(axis=0)
         return np.asarray((through >= LEAST_BEAMS) & (on <= FEW * (through + on)) & ~hidden)
-
-    @property
-    def there(self) -> Bools:
-        """Chunks that are there: several visits and poses read them, and no visit passes through, (c,)."""
-        agree, against = self._votes(self.on, self.through), self._votes(self.through, self.on)
-        return self._decided(agree, against, on=True)
 
     @property
     def read(self) -> Bools:
         """Chunks that some visit reads, (c,)."""
         return np.asarray((self.on >= LEAST_BEAMS).any(axis=0))
 
-    def _votes(self, agree: Indices, against: Indices) -> Bools:
-        """Return which visits show something about a chunk, (v, c)."""
-        return (agree >= LEAST_BEAMS) & (agree >= MOST * (agree + against))
-
-    def _decided(self, agree: Bools, against: Bools, *, on: bool) -> Bools:
-        own, other = (self.on, self.through) if on else (self.through, self.on)
-        both = own.sum(axis=0) + other.sum(axis=0)
-        clear = other.sum(axis=0) <= FEW * both
+    def _decided(self, agree: Indices, against: Indices, hidden: Indices, *, on: bool) -> Bools:
+        """Decide about each chunk by its beams and those of the chunks next to it; it has some of its own."""
+        own = agree.sum(axis=0) > 0
+        near, other, all_other = (self._near(one) for one in (agree, against, against + hidden))
+        clear = other.sum(axis=0) <= FEW * (near + other).sum(axis=0)
+        visits, no_visits = shows(near, all_other).sum(axis=0), shows(all_other, near).any(axis=0)
         poses = self.poses(on=on)
-        return np.asarray((agree.sum(axis=0) >= LEAST_VISITS) & ~against.any(axis=0) & clear & (poses >= LEAST_POSES))
+        return np.asarray(own & clear & ~no_visits & (visits >= LEAST_VISITS) & (poses >= LEAST_POSES))
+
+    def _near(self, counts: Indices) -> Indices:
+        """Return the sums over each chunk and the chunks of its wall next to it, (v, c)."""
+        inner = np.ones(len(self.chunks), dtype=bool)
+        inner[self.chunks.first[:-1]] = False  # the first chunk of a wall has none before it
+        total = counts.copy()
+        total[:, 1:] += counts[:, :-1] * inner[1:]
+        total[:, :-1] += counts[:, 1:] * inner[1:]
+        return total
 
     def poses(self, *, on: bool) -> Indices:
-        """Return the number of places from which each chunk is read, or passed through, (c,)."""
+        """Return the number of places from which each chunk, or one next to it, is read, or passed through, (c,)."""
         rows = np.unique(self.sights[self.seen_on == on][:, :2], axis=0)
-        return np.bincount(rows[:, 0], minlength=len(self.chunks))
+        wall = np.repeat(np.arange(len(self.chunks.walls)), self.chunks.counts)
+        spread = [rows]
+        for step in (-1, 1):
+            moved = rows + np.array([step, 0])
+            moved = moved[(moved[:, 0] >= 0) & (moved[:, 0] < len(self.chunks))]
+            spread.append(moved[wall[moved[:, 0]] == wall[moved[:, 0] - step]])
+        return np.bincount(np.unique(np.concatenate(spread), axis=0)[:, 0], minlength=len(self.chunks))
 
     def places_of(self, chunks: Indices, *, on: bool) -> int:
         """Return the number of places from which any of some chunks is read, or passed through."""
@@ -144,7 +154,12 @@ class WallEvidence:
         """Return which visits show that some chunks are there, or not there, (v,)."""
         own, other = (self.on, self.through) if on else (self.through, self.on)
         mine, others = own[:, chunks].sum(axis=1), other[:, chunks].sum(axis=1)
-        return np.asarray((mine >= LEAST_BEAMS) & (mine >= MOST * (mine + others)))
+        return shows(mine, others)
+
+
+def shows(agree: Indices, against: Indices) -> Bools:
+    """Return where the beams of a visit show something: enough of them, and most of all."""
+    return np.asarray((agree >= LEAST_BEAMS) & (agree >= MOST * (agree + against)))
 
 
 def gather(walls: Segments, found: Sequence[Localized], visits: int, sigma: float, *, oriented: bool) -> WallEvidence:

@@ -124,8 +124,8 @@ class Localized:
 
     @property
     def score(self) -> float:
-        """Of its consensus set, nats; 0 where it is not usable."""
-        return self.result.diagnostics.score if self.usable and self.result.diagnostics is not None else 0.0
+        """Of its consensus set, nats; 0 where nothing was matched."""
+        return 0.0 if self.result.diagnostics is None else self.result.diagnostics.score
 
     @property
     def place(self) -> tuple[int, int]:

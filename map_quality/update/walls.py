@@ -9,8 +9,19 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .evidence import WallEvidence
-from .tuning import LEAST_CUT, LEAST_GONE, LEAST_GONE_OF_THING, LEAST_PIECE, LOOP_GAP, THING
+from .evidence import WallEvidence, shows
+from .tuning import (
+    FEW_ON_THING,
+    LEAST_BEAMS,
+    LEAST_CUT,
+    LEAST_GONE,
+    LEAST_GONE_OF_THING,
+    LEAST_PIECE,
+    LEAST_POSES,
+    LEAST_VISITS,
+    LOOP_GAP,
+    THING,
+)
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -46,11 +57,12 @@ def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
     """Return which of the first so many walls are gone, whole or in part."""
     gone, read, open_ = evidence.gone, evidence.read, evidence.open
     cuts = []
-    whole = _gone_things(evidence, gone, read, walls)
+    whole = _gone_things(evidence, walls)
     for wall in range(walls):
         if wall in whole:
             own = evidence.chunks.of_wall(wall)
-            cuts.append(Cut(wall, own.start + np.flatnonzero(gone[own]), np.zeros((0, 4))))
+            passed = evidence.through[:, own].any(axis=0)
+            cuts.append(Cut(wall, own.start + np.flatnonzero(passed), np.zeros((0, 4))))
             continue
         own = evidence.chunks.of_wall(wall)
         if not gone[own].any():
@@ -61,16 +73,16 @@ def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
     return cuts
 
 
-def _gone_things(evidence: WallEvidence, gone: Bools, read: Bools, walls: int) -> set[int]:
-    """Return the walls of things that are gone: of closed loops of walls of which none is read, and most is gone.
+def _gone_things(evidence: WallEvidence, walls: int) -> set[int]:
+    """Return the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
 
-    Beams passed through the thing, so its other sides are gone, too, whether they were seen or not.
+    What beams passed through is not solid, so its other sides are gone, too, whether they were seen or not.
     """
     ends = evidence.chunks.walls.endpoints[:walls]
     corners = np.round(ends.reshape(-1, 2) / LOOP_GAP).astype(np.int64)
     _, corner = np.unique(corners, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 2)
-    lengths, counts = evidence.chunks.walls.lengths, evidence.chunks.counts
+    lengths = evidence.chunks.walls.lengths
     at = np.bincount(corner.ravel())
     joined = coo_array((np.ones(walls), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
     _, label = connected_components(joined, directed=False)
@@ -79,14 +91,23 @@ def _gone_things(evidence: WallEvidence, gone: Bools, read: Bools, walls: int) -
         mine = np.flatnonzero(label[corner[:, 0]] == loop)
         if len(mine) < 3 or lengths[mine].sum() > THING or (at[np.unique(corner[mine])] != 2).any():
             continue
-        own = [evidence.chunks.of_wall(int(wall)) for wall in mine]
-        if any(read[one].any() for one in own):
-            continue
-        step = lengths[mine] / counts[mine]
-        length = sum(float(gone[one].sum() * each) for one, each in zip(own, step, strict=True))
-        if length >= LEAST_GONE_OF_THING * float(lengths[mine].sum()):
+        chunks = np.concatenate([np.arange(len(evidence.chunks))[evidence.chunks.of_wall(int(k))] for k in mine])
+        if _is_gone_whole(evidence, chunks):
             out.update(mine.tolist())
     return out
+
+
+def _is_gone_whole(evidence: WallEvidence, chunks: Indices) -> bool:
+    """Return whether beams of several visits and poses pass through a good part of a thing, and nothing reads it."""
+    through, on = evidence.through[:, chunks], evidence.on[:, chunks]
+    if on.sum() > FEW_ON_THING * (through.sum() + on.sum()) or shows(on.sum(axis=1), through.sum(axis=1)).any():
+        return False
+    if (on >= LEAST_BEAMS).any():
+        return False
+    visits = shows(through.sum(axis=1), on.sum(axis=1)).sum()
+    passed = float((through.sum(axis=0) > 0).mean())
+    poses = evidence.places_of(chunks, on=False)
+    return bool(visits >= LEAST_VISITS and poses >= LEAST_POSES and passed >= LEAST_GONE_OF_THING)
 
 
 def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
