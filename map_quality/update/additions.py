@@ -22,6 +22,7 @@ from .tuning import (
     SAME_ANGLE,
     SAME_GAP,
     SAME_LINE,
+    SAME_SIDE,
 )
 from .walls import runs
 
@@ -148,7 +149,6 @@ def _along(seen: SeenLines) -> Bools:
 def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
     """Return the pieces of one line that several visits show, and that are no wall of the map, with their sigma."""
     place, direction, sigma = _fit(group)
-    normal = np.array([-direction[1], direction[0]])
     begins = (group.lines.endpoints[:, :2] - place) @ direction
     ends = (group.lines.endpoints[:, 2:] - place) @ direction
     low = float(begins.min())
@@ -157,7 +157,7 @@ def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
     covered = np.zeros((int(group.visits.max()) + 1, count), dtype=bool)
     for visit, begin, end in zip(group.visits, begins, ends, strict=True):
         covered[visit] |= (middles >= begin) & (middles <= end)
-    new = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, place, direction, normal, middles)
+    new = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, place + middles[:, None] * direction, direction)
     return [
         (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
         for a, b in runs(new)
@@ -182,12 +182,17 @@ def _fit(group: SeenLines) -> tuple[Floats, Floats, float]:
     return place, direction, float(np.sqrt(scatter / places + 1.0 / weight.sum()) + 0.002)
 
 
-def _on_map(known: Segments, place: Floats, direction: Floats, normal: Floats, middles: NDArray[np.floating]) -> Bools:
-    """Return which bins of a line lie along a wall of the map that faces the same way."""
-    near = np.flatnonzero(known.directions @ direction >= np.cos(2.0 * SAME_ANGLE))
-    begins, ends = known.endpoints[near, :2] - place, known.endpoints[near, 2:] - place
-    beside = np.minimum(np.abs(begins @ normal), np.abs(ends @ normal)) <= ON_MAP
-    on = np.zeros(len(middles), dtype=bool)
-    for begin, end in zip(begins[beside] @ direction, ends[beside] @ direction, strict=True):
-        on |= (middles >= begin) & (middles <= end)
-    return on
+def _on_map(known: Segments, points: Floats, direction: Floats) -> Bools:
+    """Return which points of a line lie on a wall of the map that faces about the same way, (k,).
+
+    A line across the sides of a round column is off their directions, too.
+    """
+    facing = np.flatnonzero(known.directions @ direction >= SAME_SIDE)
+    low, high = points.min(axis=0) - ON_MAP, points.max(axis=0) + ON_MAP
+    begins, ends = known.endpoints[facing, :2], known.endpoints[facing, 2:]
+    met = (np.maximum(begins, ends) >= low).all(axis=1) & (np.minimum(begins, ends) <= high).all(axis=1)
+    walls = known.take(facing[met])
+    off = points[:, None, :] - walls.endpoints[None, :, :2]
+    along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
+    gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
+    return np.asarray((gaps <= ON_MAP).any(axis=1))

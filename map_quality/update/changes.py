@@ -18,6 +18,8 @@ from .tuning import (
     DOUBT_VISIT,
     JOINED,
     LEAST_PIECE,
+    LEAST_POSES,
+    LEAST_VISITS,
     MOST_CONFIDENCE,
     NEAR_MOVE,
     NEW_JOINED,
@@ -221,7 +223,7 @@ def _fits(new: Floats, old: Floats) -> bool:
 
 
 def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Change | None:
-    """Return a change with its evidence; None if too much contradicts it."""
+    """Return a change with its evidence; None if too little shows it, or too much contradicts it."""
     through = int(evidence.through[:, draft.gone].sum())
     on = int(evidence.on[:, draft.there].sum())
     against = int(evidence.on[:, draft.gone].sum() + evidence.through[:, draft.there].sum())
@@ -234,7 +236,7 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
             agreeing |= evidence.visits_of(chunks, on=is_on)
             poses.append(evidence.places_of(chunks, on=is_on))
     visits = np.flatnonzero(agreeing)
-    if not len(visits):
+    if len(visits) < LEAST_VISITS or min(poses) < LEAST_POSES:
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
     told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
-from registration import Correspondences, InputError, RigidTransform, Segments
+from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
 
 from .result import RefusedVisit
 from .tuning import (
+    AGREEING,
     HELD_BACK,
     LEAST_SCANS,
     LEAST_USABLE,
+    MOST_OWN_SIGMA,
     MOST_SIGMA,
     MOST_TURN_SIGMA,
     OFF_SCALE,
@@ -29,6 +31,10 @@ Indices = NDArray[np.intp]
 
 # Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
 DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_ranges", "scan_exceeds_map"))
+
+
+# Reasons that changes of a building alone may give.
+OF_OLD_MAPS = frozenset(("map_mismatch", "insufficient_evidence", "not_on_map"))
 
 
 class UpdateError(InputError):
@@ -46,7 +52,8 @@ class VisitScan:
     visit : str
         Scans of one visit share it. What changes within a visit, such as a door, is not learned.
     pose : RigidTransform or None
-        Pose as the sender knows it, map_from_scan; a prior of the search. The search finds the pose in any case.
+        Pose as the sender knows it, map_from_scan; a prior of the search, which finds the pose in any case. A pose that
+        is not usable, because the map is too old there, is evidence if this pose confirms it.
     covariance : (3, 3) or None
         Of additive (x, y, theta) of `pose`; required with it.
 
@@ -93,6 +100,8 @@ class Localized:
         The map that it was searched in; the result's correspondences name its segments.
     held_back : bool
         True if it gives no evidence, and tests the new map.
+    vouched : bool
+        True if the sender's own pose confirms one that is not usable because of the map's age.
     """
 
     number: int
@@ -101,6 +110,7 @@ class Localized:
     result: AssociationResult
     on: Segments
     held_back: bool
+    vouched: bool = False
 
     @property
     def usable(self) -> bool:
@@ -108,9 +118,14 @@ class Localized:
         return self.result.usable
 
     @property
+    def located(self) -> bool:
+        """Whether its pose is known: it is usable, or the sender vouches for it."""
+        return self.usable or self.vouched
+
+    @property
     def precise(self) -> bool:
         """Whether the pose is known well enough, and nothing speaks against the ranges."""
-        if not self.result.usable or self.result.covariance is None:
+        if not self.located or self.result.covariance is None:
             return False
         x, y, theta = np.sqrt(np.diag(self.result.covariance))
         doubtful = any(one.code in DOUBTFUL for one in self.result.warnings)
@@ -169,6 +184,19 @@ def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationRe
     return associate(index, one.scan, one.prior, options, deadline)
 
 
+def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
+    """Return whether the sender's pose confirms a pose that is not usable for reasons that an old map gives."""
+    if one.pose is None or one.covariance is None or result.pose is None or result.covariance is None:
+        return False
+    if not {reason.code for reason in result.reasons} <= OF_OLD_MAPS or result.usable:
+        return False
+    x, y, _ = np.sqrt(np.diag(one.covariance))
+    away = np.array([result.pose.x - one.pose.x, result.pose.y - one.pose.y,
+                     wrap_angle(result.pose.theta - one.pose.theta)])  # fmt: skip
+    square = float(away @ np.linalg.solve(np.asarray(one.covariance) + result.covariance, away))
+    return bool(max(x, y) <= MOST_OWN_SIGMA and square <= AGREEING)
+
+
 def choose_evidence(names: Sequence[str], found: Sequence[Localized]) -> tuple[list[Localized], list[RefusedVisit]]:
     """Return the scans that give evidence, and the visits that give none.
 
@@ -190,9 +218,10 @@ def choose_evidence(names: Sequence[str], found: Sequence[Localized]) -> tuple[l
 
 def _doubt(own: Sequence[Localized], precise: Sequence[Localized]) -> str | None:
     """Return why a visit gives no evidence; None if it does."""
-    if len(precise) < max(LEAST_SCANS, LEAST_USABLE * len(own)):
+    sure = sum(one.usable for one in precise)
+    if sure < max(LEAST_SCANS, LEAST_USABLE * len(own)):
         return (
-            f"{len(precise)} of {len(own)} scans are usable and precise, expected at least "
+            f"{sure} of {len(own)} scans are usable and precise, expected at least "
             f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building."
         )
     factor, sigma = scale_of(precise)

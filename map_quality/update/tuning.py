@@ -7,6 +7,8 @@ import math
 # --- Scans that give evidence -----------------------------------------------------------------------------------------
 
 MOST_SIGMA, MOST_TURN_SIGMA = 0.05, math.radians(1.0)  # m, rad; deviations of a pose that is known well enough
+MOST_OWN_SIGMA = 0.5  # m; deviation of a sender's own pose that may confirm that of the search
+AGREEING = 11.3  # chi-square of 3 degrees of freedom, 99 %; of both poses
 LEAST_USABLE = 0.3  # fraction of a visit's scans, drawn; in another building nearly none are usable
 LEAST_SCANS = 3  # usable ones of a visit
 OFF_SCALE, SURE_OF_SCALE = 0.005, 5.0  # fraction, and times its deviation; by which lengths of a visit are off
@@ -47,6 +49,7 @@ SAME_LINE = 0.08  # m, likewise
 SAME_GAP = 0.3  # m; along the wall
 BIN = 0.05  # m; resolution of the ends of a new wall
 ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added
+SAME_SIDE = 0.5  # cosine between walls that face about the same way
 FULLY_ON_MAP = 0.85  # fraction of a scan line's length
 JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
@@ -60,4 +63,4 @@ LOWER_SCORE = 1.0  # nats; a change may lower the score of its scans by no more
 SAME_POSE = 0.3  # m; between the poses of one scan on the old and the new map
 FEWER_USABLE = 0.01  # fraction of the scans; a proposal that loses more is withdrawn
 DROPS = 3  # times that changes are dropped and the rest is verified again
-ROUNDS = 2  # scans that are usable on the new map only give more evidence
+ROUNDS = 4  # scans that are usable on the new map only give more evidence

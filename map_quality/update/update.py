@@ -16,8 +16,8 @@ from registration import InvalidArgumentError, Segments
 from .additions import candidates, unexplained
 from .changes import Draft, change_of, draft_changes
 from .evidence import WallEvidence, gather
-from .result import Change, ChangeCode, MapUpdate, RefusedVisit, Usable
-from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, search, visit_numbers
+from .result import Change, MapUpdate, RefusedVisit, Usable
+from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
 from .tuning import DROPS, FEWER_USABLE, LOWER_SCORE, ROUNDS, SAME_POSE, USUAL_SIGMA
 
 Floats = NDArray[np.float64]
@@ -96,15 +96,17 @@ def updating(
     begun = _Update(index, tuple(scans), deadline or Deadline())
     names, _ = visit_numbers(scans)
     first = yield from begun.localize()
-    proposed, latest = Proposed(), tuple(first)
+    latest: list[Localized] = list(first)
+    shown: list[tuple[str, tuple[int, ...], int]] = []
     for _ in range(ROUNDS):
         chosen, refused = choose_evidence(names, latest)
         drafts, evidence = begun.draft(chosen, names)
-        better = yield from begun.verify(drafts, evidence, first)
-        if better is None or better.usable < proposed.usable or better.shown == proposed.shown:
+        before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
+        if shown == before or begun.deadline.passed:
             break
-        proposed, latest = better, better.found
-    return begun.proposal(proposed, first, refused, accept, refuse)
+        latest = yield from begun.search_others(drafts, first, latest)
+    proposed = yield from begun.verify(drafts, evidence, first)
+    return begun.proposal(proposed or Proposed(), first, refused, accept, refuse)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,16 +125,6 @@ class Proposed:
     drafts: tuple[Draft, ...] = ()
     changes: tuple[Change, ...] = ()
     found: tuple[Localized, ...] = ()
-
-    @property
-    def usable(self) -> int:
-        """Number of scans that are usable on the new map."""
-        return sum(one.usable for one in self.found)
-
-    @property
-    def shown(self) -> list[tuple[ChangeCode, tuple[int, ...], int]]:
-        """The changes without their evidence."""
-        return sorted((one.code, one.segments, len(one.new)) for one in self.drafts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +162,10 @@ class _Update:
             if time.monotonic() > at:
                 break
             result = search(self.index, one, self.deadline)
-            found.append(Localized(number, visits[number], one.scan, result, self.index.segments, held[number]))
+            vouched = is_vouched(one, result)
+            found.append(
+                Localized(number, visits[number], one.scan, result, self.index.segments, held[number], vouched)
+            )
             yield
         return found
 
@@ -197,11 +192,14 @@ class _Update:
             What remains; None if nothing does, or there is no time to verify it.
         """
         for _ in range(DROPS):
-            if not drafts:
+            new = self._index(drafts) if drafts else None
+            if new is None:
                 return None
-            found = yield from self._search_again([change for _, change in drafts], first)
-            if found is None:
-                return None
+            found = []
+            for one in first:
+                found.append((yield from self._search(new, one)))
+                if self.deadline.passed:
+                    return None
             kept = [one for one in drafts if _is_better(one[0], evidence, first, found)]
             if len(kept) == len(drafts):
                 if not _keeps_usable(first, found):
@@ -210,23 +208,35 @@ class _Update:
             drafts = kept
         return None
 
-    def _search_again(
-        self, changes: Sequence[Change], first: Sequence[Localized]
-    ) -> Generator[None, None, list[Localized] | None]:
-        """Search all scans on the map with some changes; None if the deadline passes first."""
-        segments = apply(self.known, changes)
-        if not len(segments):
-            return None
-        new = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+    def search_others(
+        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]
+    ) -> Generator[None, None, list[Localized]]:
+        """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
+
+        Scans that were precise at first keep that pose, which depends on no change.
+        """
+        new = self._index(drafts)
+        if new is None:
+            return list(latest)
         found = []
-        for one in first:
-            if self.deadline.cancelled:
-                raise CancelledError
-            if self.deadline.passed:
-                return None
-            found.append(replace(one, result=search(new, self.scans[one.number], self.deadline), on=new.segments))
-            yield
+        for one, now in zip(first, latest, strict=True):
+            again = not one.precise and not self.deadline.passed
+            found.append((yield from self._search(new, one)) if again else now)
         return found
+
+    def _index(self, drafts: Sequence[tuple[Draft, Change]]) -> MapIndex | None:
+        """Return the index of the map with some changes; None if nothing of it is left."""
+        segments = apply(self.known, [change for _, change in drafts])
+        return MapIndex.build(segments, self.index.sigma, oriented=self.oriented) if len(segments) else None
+
+    def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
+        """Search one scan in another map."""
+        if self.deadline.cancelled:
+            raise CancelledError
+        sent = self.scans[one.number]
+        result = search(index, sent, self.deadline)
+        yield
+        return replace(one, result=result, on=index.segments, vouched=is_vouched(sent, result))
 
     def proposal(
         self,
@@ -282,21 +292,25 @@ def _is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized],
     concerned = evidence.scans_of(draft.chunks)
     gain = 0.0
     for before, after in zip(first, found, strict=True):
-        if before.number not in concerned or not before.usable:
+        if before.number not in concerned or not before.located:
             continue
         gain += after.score - before.score
-        if after.usable and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
+        if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
             return False
     return gain >= -LOWER_SCORE
 
 
 def _keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether about as many scans are usable on the new map, of all and of those held back."""
-    counts = [_usable(first, found, held=held) for held in (False, True)]
-    counts.append(
-        Usable(*(sum(values) for values in zip(*((c.scans, c.before, c.after) for c in counts), strict=True)))
+    """Return whether hardly any usable scan fits the new map less, and may not be used there.
+
+    A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
+    its room looks like others.
+    """
+    lost = sum(
+        before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+        for before, after in zip(first, found, strict=True)
     )
-    return all(one.after >= one.before - max(1.0, FEWER_USABLE * one.scans) for one in counts)
+    return lost <= max(1.0, FEWER_USABLE * len(first))
 
 
 def _usable(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:
