@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,8 +162,10 @@ def shows(agree: Indices, against: Indices) -> Bools:
     return np.asarray((agree >= LEAST_BEAMS) & (agree >= MOST * (agree + against)))
 
 
-def gather(walls: Segments, found: Sequence[Localized], visits: int, sigma: float, *, oriented: bool) -> WallEvidence:
-    """Follow the beams of localized scans through walls.
+def gather(
+    walls: Segments, found: Sequence[Localized], visits: int, sigma: float, *, oriented: bool
+) -> Generator[None, None, WallEvidence]:
+    """Follow the beams of localized scans through walls, one scan at a step, and return the evidence.
 
     Parameters
     ----------
@@ -190,6 +192,7 @@ def gather(walls: Segments, found: Sequence[Localized], visits: int, sigma: floa
         seen = np.flatnonzero(of_scan[0] + of_scan[1])
         sights.append(np.stack([seen, np.full_like(seen, places[one.place]), np.full_like(seen, one.number)], axis=1))
         seen_on.append(of_scan[1][seen] > of_scan[0][seen])
+        yield
     rows = np.concatenate(sights) if sights else np.zeros((0, 3), dtype=np.intp)
     return WallEvidence(
         chunks, through, on, before, rows, np.concatenate(seen_on) if seen_on else np.zeros(0, dtype=bool)

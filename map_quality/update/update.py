@@ -96,16 +96,19 @@ def updating(
     begun = _Update(index, tuple(scans), deadline or Deadline())
     names, _ = visit_numbers(scans)
     first = yield from begun.localize()
-    latest: list[Localized] = list(first)
+    latest, proposed = list(first), None
     shown: list[tuple[str, tuple[int, ...], int]] = []
-    for _ in range(ROUNDS):
-        chosen, refused = choose_evidence(names, latest)
-        drafts, evidence = begun.draft(chosen, names)
+    _, refused = choose_evidence(names, first)
+    for number in range(ROUNDS):
+        chosen, _ = choose_evidence(names, latest)
+        drafts, evidence = yield from begun.draft(chosen, names)
         before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
-        if shown == before or begun.deadline.passed:
+        if begun.deadline.passed:
+            break
+        if shown == before or number == ROUNDS - 1:
+            proposed = yield from begun.verify(drafts, evidence, first)
             break
         latest = yield from begun.search_others(drafts, first, latest)
-    proposed = yield from begun.verify(drafts, evidence, first)
     return begun.proposal(proposed or Proposed(), first, refused, accept, refuse)
 
 
@@ -171,12 +174,12 @@ class _Update:
 
     def draft(
         self, chosen: Sequence[Localized], names: Sequence[str]
-    ) -> tuple[list[tuple[Draft, Change]], WallEvidence]:
+    ) -> Generator[None, None, tuple[list[tuple[Draft, Change]], WallEvidence]]:
         """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
         known = self.known
         new, sigmas = candidates(unexplained(chosen, known), known)
         walls = Segments.derived(np.concatenate([known.endpoints, new]))
-        evidence = gather(walls, chosen, len(names), self.sigma, oriented=self.oriented)
+        evidence = yield from gather(walls, chosen, len(names), self.sigma, oriented=self.oriented)
         drafts = draft_changes(evidence, known, sigmas, self.sigma)
         told = [(one, change_of(one, evidence, names)) for one in drafts]
         return [(one, change) for one, change in told if change is not None], evidence
