@@ -66,6 +66,28 @@ class Change:
     confidence: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sharpened:
+    """Walls of a map at better positions, estimated from all scans.
+
+    Attributes
+    ----------
+    segments : (k,)
+        Indices of the old map's segments that moved.
+    ends : (k, 4)
+        Metres in the map frame.
+    sigma : (k,)
+        Standard deviation of each normal to itself, metres.
+    """
+
+    segments: NDArray[np.intp]
+    ends: Floats = field(repr=False)
+    sigma: Floats = field(repr=False)
+
+
+NOT_SHARPENED = Sharpened(np.zeros(0, dtype=np.intp), np.zeros((0, 4)), np.zeros(0))
+
+
 @dataclass(frozen=True, slots=True)
 class Usable:
     """Number of scans, and of those that are usable on the old and on the new map."""
@@ -101,6 +123,8 @@ class MapUpdate:
         Scans that gave evidence, and those without evidence that were searched, too.
     held_back : Usable
         Scans that gave no evidence and test the proposal.
+    sharpened : Sharpened
+        Walls that are in the new map at better positions; they are in no change.
     refused_visits : tuple of RefusedVisit
     complete : bool
         False if the deadline ended it; then no change is proposed that was not verified.
@@ -112,5 +136,6 @@ class MapUpdate:
     accepted: tuple[bool, ...]
     usable: Usable
     held_back: Usable
+    sharpened: Sharpened = NOT_SHARPENED
     refused_visits: tuple[RefusedVisit, ...] = ()
     complete: bool = True

@@ -55,6 +55,16 @@ JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the ma
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
 SAME_LENGTH = 0.15  # m; by which a side of a moved thing may differ
 
+# --- Sharper walls ----------------------------------------------------------------------------------------------------
+
+LEAST_BLUR = 0.008  # m; of a map's declared sigma below which its walls stay as they are
+SHARPER = 0.7  # times the declared sigma; the deviation of a wall above which it stays as it is
+LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one scan that do not average out
+MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
+FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
+OUTLYING = 4.0  # times the deviation; a line of a scan farther off its wall does not count
+CORNER, CORNER_SINE = 0.02, 0.35  # m, and sine of the angle; ends of two walls that are one corner
+
 # --- Confidence, and the check of the proposal ------------------------------------------------------------------------
 
 DOUBT_VISIT, DOUBT_POSE = 0.1, 0.7  # probability that a visit, or a pose, shows a change that is none; drawn

@@ -16,9 +16,10 @@ from registration import InvalidArgumentError, Segments
 from .additions import candidates, unexplained
 from .changes import Draft, change_of, draft_changes
 from .evidence import WallEvidence, gather
-from .result import Change, MapUpdate, RefusedVisit, Usable
+from .result import NOT_SHARPENED, Change, MapUpdate, RefusedVisit, Sharpened, Usable
 from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
-from .tuning import DROPS, FEWER_USABLE, LOWER_SCORE, ROUNDS, SAME_POSE, USUAL_SIGMA
+from .sharpening import sharpen
+from .tuning import DROPS, FEWER_USABLE, LEAST_BLUR, LOWER_SCORE, ROUNDS, SAME_POSE, USUAL_SIGMA
 
 Floats = NDArray[np.float64]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
@@ -39,6 +40,7 @@ def update(
     3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
     4. Decide: at least two visits and three places agree, no visit contradicts.
     5. Verify: search all scans in the new map. A change that lowers the score of its scans is dropped.
+    6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.
 
     Parameters
     ----------
@@ -109,7 +111,8 @@ def updating(
             proposed = yield from begun.verify(drafts, evidence, first)
             break
         latest = yield from begun.search_others(drafts, first, latest)
-    return begun.proposal(proposed or Proposed(), first, refused, accept, refuse)
+    sharper = (yield from begun.sharpen(proposed or Proposed(), first, names)) or proposed
+    return begun.proposal(sharper or Proposed(), first, refused, accept, refuse)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,12 +125,14 @@ class Proposed:
     changes : tuple of Change
         The same with their evidence.
     found : tuple of Localized
-        All scans, searched on the map with these changes; empty where there are none.
+        All scans, searched on the new map; empty where nothing has changed.
+    sharpened : Sharpened
     """
 
     drafts: tuple[Draft, ...] = ()
     changes: tuple[Change, ...] = ()
     found: tuple[Localized, ...] = ()
+    sharpened: Sharpened = NOT_SHARPENED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,6 +216,43 @@ class _Update:
             drafts = kept
         return None
 
+    def sharpen(
+        self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
+    ) -> Generator[None, None, Proposed | None]:
+        """Estimate the walls from all scans, and search all scans on the sharper map.
+
+        Returns
+        -------
+        Proposed or None
+            None if the map is sharp enough, if the sharper one fits the scans less, or if there is no time to try.
+        """
+        found = proposed.found or tuple(first)
+        chosen, _ = choose_evidence(names, found)
+        if self.index.sigma is None or self.index.sigma < LEAST_BLUR or not chosen or self.deadline.passed:
+            return None
+        whole = apply(self.known, proposed.changes)
+        if any(one.on is not chosen[0].on for one in chosen):
+            return None  # scans that were searched on different maps
+        index = self._indexed(whole)
+        better = sharpen(index, chosen, self.index.sigma)
+        old = kept_indices(len(self.known), proposed.changes)[better.segments]
+        mine = old >= 0
+        sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
+        if not mine.any():
+            return None
+        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
+        again = []
+        for one in first:
+            again.append((yield from self._search(new, one)))
+            if self.deadline.passed:
+                return None
+        if total_score(again, found) < total_score(found, found) or not _keeps_usable(found, again):
+            return None
+        return replace(proposed, found=tuple(again), sharpened=sharpened)
+
+    def _indexed(self, segments: Segments) -> MapIndex:
+        return MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+
     def search_others(
         self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]
     ) -> Generator[None, None, list[Localized]]:
@@ -230,7 +272,7 @@ class _Update:
     def _index(self, drafts: Sequence[tuple[Draft, Change]]) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
         segments = apply(self.known, [change for _, change in drafts])
-        return MapIndex.build(segments, self.index.sigma, oriented=self.oriented) if len(segments) else None
+        return self._indexed(segments) if len(segments) else None
 
     def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
         """Search one scan in another map."""
@@ -258,14 +300,15 @@ class _Update:
         accepted = tuple(
             (accept is None or one.confidence >= accept) and k not in refuse for k, one in enumerate(changes)
         )
-        after = proposed.found or first
+        after, taken = proposed.found or first, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]
         return MapUpdate(
-            apply(self.known, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]),
-            self.index.sigma,
+            apply(with_ends(self.known, proposed.sharpened), taken),
+            sharper_sigma(self.known, self.index.sigma, proposed.sharpened),
             tuple(changes),
             accepted,
             _usable(first, after, held=False),
             _usable(first, after, held=True),
+            proposed.sharpened,
             tuple(refused),
             len(first) == len(self.scans) and not self.deadline.passed,
         )
@@ -288,6 +331,41 @@ def apply(known: Segments, changes: Sequence[Change]) -> Segments:
         appended += new
     ends = [*(one for one in kept if one is not None), *appended]
     return Segments.derived(np.array(ends).reshape(-1, 4))
+
+
+def kept_indices(count: int, changes: Sequence[Change]) -> NDArray[np.intp]:
+    """Return which old segment each segment of the map with some changes is, -1 for those that changes made."""
+    kept = list(range(count))
+    made = 0
+    for one in changes:
+        in_place = bool(one.segments) and len(one.new) > 0 and one.code in ("shortened", "extended")
+        for old in one.segments:
+            kept[old] = -2
+        if in_place:
+            kept[one.segments[0]] = -1
+        made += len(one.new) - in_place
+    return np.array([*(k for k in kept if k != -2), *[-1] * made], dtype=np.intp)
+
+
+def with_ends(known: Segments, sharpened: Sharpened) -> Segments:
+    """Return a map with its sharpened walls."""
+    ends = known.endpoints.copy()
+    ends[sharpened.segments] = sharpened.ends
+    return Segments.derived(ends)
+
+
+def sharper_sigma(known: Segments, sigma: float | None, sharpened: Sharpened) -> float | None:
+    """Return the standard deviation of all lines of the new map: the root mean square by length, metres."""
+    if sigma is None or not len(sharpened.segments):
+        return sigma
+    each = np.full(len(known), sigma)
+    each[sharpened.segments] = sharpened.sigma
+    return float(np.sqrt(known.lengths @ each**2 / known.lengths.sum()))
+
+
+def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
+    """Return the score of the scans that were located before, nats."""
+    return sum(one.score for one, before in zip(found, of, strict=True) if before.located)
 
 
 def _is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
