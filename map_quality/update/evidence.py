@@ -208,13 +208,13 @@ def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> 
         nothing = np.zeros(len(chunks), dtype=np.intp)
         return nothing, nothing, nothing
     walls = chunks.walls.take(near)
-    slant = rays @ walls.normals.T
+    slant, across = rays @ walls.normals.T, rays @ walls.directions.T
     to_line = walls.offsets[None, :] - origins @ walls.normals.T
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = to_line / slant
         along = (
             origins @ walls.directions.T
-            + distance * (rays @ walls.directions.T)
+            + distance * across
             - np.einsum("ij,ij->i", walls.endpoints[:, :2], walls.directions)[None, :]
         )
         behind = (ranges[:, None] - distance) * np.abs(slant)
@@ -226,7 +226,10 @@ def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> 
     counts = chunks.counts[near[columns]]
     chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
     facing = (slanted < 0.0) | (not oriented)
-    passed, ended = gap > THROUGH * tolerance, (np.abs(gap) <= tolerance) & facing
+    # So far behind a wall a beam is still behind it, not beside it: else a wall that is a little off would seem gone.
+    deep = along[beams, columns] + THROUGH * tolerance / np.abs(slanted) * across[beams, columns]
+    within = (deep >= 0.0) & (deep <= walls.lengths[columns])
+    passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
     hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
     passed_of, on_of, before_of = (np.bincount(chunk[one], minlength=len(chunks)) for one in (passed, ended, hidden))
     return passed_of, on_of, before_of

@@ -98,9 +98,9 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float) -> Sharpe
     better = _seen_often(pairs, found, len(walls)) & (spread <= SHARPER * sigma)
     better &= np.abs(shift[:, 0]) <= OUTLYING * sigma
     moved = np.flatnonzero(better[wall_of])
-    ends = _joined(known, _moved(known, wall_of, middles, np.where(better[:, None], shift, 0.0)))
-    changed = np.union1d(moved, np.flatnonzero(np.abs(ends - known.endpoints).max(axis=1) > 1e-9))
-    return Sharpened(changed, ends[changed], np.where(better, spread, sigma)[wall_of[changed]])
+    ends = _moved(known, wall_of, middles, np.where(better[:, None], shift, 0.0))
+    ends = _joined(known, ends, better[wall_of])
+    return Sharpened(moved, ends[moved], spread[wall_of[moved]])
 
 
 def _extents(known: Segments, wall_of: Indices, count: int) -> tuple[Floats, Floats]:
@@ -194,8 +194,8 @@ def _moved(known: Segments, wall_of: Indices, middles: Floats, shift: Floats) ->
     return out
 
 
-def _joined(known: Segments, ends: Floats) -> Floats:
-    """Return the ends with corners closed again: where two walls met, they meet where their new lines cross."""
+def _joined(known: Segments, ends: Floats, moved: Bools) -> Floats:
+    """Return the ends with corners closed again: walls that moved end where they cross the wall that they met."""
     new, out = Segments.derived(ends), ends.copy()
     cells: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for k, corner in enumerate(np.round(known.endpoints.reshape(-1, 2) / CORNER).astype(int).tolist()):
@@ -203,10 +203,12 @@ def _joined(known: Segments, ends: Floats) -> Floats:
     for members in cells.values():
         if len(members) != 2 or members[0][0] == members[1][0]:
             continue
-        (a, at_a), (b, at_b) = members
+        a, b = members[0][0], members[1][0]
         normals = np.stack([new.normals[a], new.normals[b]])
         if abs(float(np.linalg.det(normals))) < CORNER_SINE:
             continue
         point = np.linalg.solve(normals, [new.offsets[a], new.offsets[b]])
-        out[a, at_a : at_a + 2], out[b, at_b : at_b + 2] = point, point
+        for wall, at in members:
+            if moved[wall]:
+                out[wall, at : at + 2] = point
     return out

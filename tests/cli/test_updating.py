@@ -34,7 +34,7 @@ def write_visit(path: Path, walls: Segments, seed: int) -> None:
 
 @pytest.fixture(autouse=True)
 def _files(folder: Path) -> None:
-    (folder / "hall.json").write_text(json.dumps({"segments": HALL.endpoints.tolist(), "sigma": 0.01, "meta": "A 3"}))
+    (folder / "hall.json").write_text(json.dumps({"segments": HALL.endpoints.tolist(), "sigma": 0.005, "meta": "A 3"}))
     for day, walls in (("monday", TODAY), ("tuesday", TODAY)):
         write_visit(folder / f"{day}.log", walls, len(day))
 
@@ -50,7 +50,7 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
     assert "of 16 usable before" in rows["scans"]
     new = json.loads((folder / "new.json").read_text())
     assert new["segments"] == TODAY.endpoints.tolist()
-    assert (new["sigma"], new["meta"]) == (0.01, "A 3")
+    assert (new["sigma"], new["meta"]) == (0.005, "A 3")
     with Image.open(folder / "changes.png") as picture:
         colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
     assert (0xD5, 0x5E, 0x00) in colours  # what is removed

@@ -16,7 +16,7 @@ CART = box(6.0, 5.0, 7.2, 5.8)
 
 
 def updated(old: Segments, *visits: list[VisitScan]) -> MapUpdate:
-    return map_quality.update(MapIndex.build(old, 0.01), [one for some in visits for one in some])
+    return map_quality.update(MapIndex.build(old, 0.005), [one for some in visits for one in some])
 
 
 def visits(*today: Segments) -> list[list[VisitScan]]:

@@ -29,7 +29,7 @@ def days(walls: Segments, *, scanner: Scanner = SCANNER, change: Callable[[np.nd
 
 
 def index() -> MapIndex:
-    return MapIndex.build(HALL, 0.01)
+    return MapIndex.build(HALL, 0.005)
 
 
 @pytest.mark.parametrize("factor", [0.98, 1.02])

@@ -21,7 +21,7 @@ HALL = segments(RACK, PILLAR)
 
 @pytest.fixture(autouse=True)
 def _stored(client: httpx.Client) -> Iterator[None]:
-    document = {"segments": HALL.endpoints.tolist(), "sigma": 0.01, "frame_id": "hall", "meta": {"floor": 3}}
+    document = {"segments": HALL.endpoints.tolist(), "sigma": 0.005, "frame_id": "hall", "meta": {"floor": 3}}
     client.put("/v1/maps/updated", json=document).raise_for_status()
     yield
     client.delete("/v1/maps/updated")
@@ -53,7 +53,7 @@ def test_a_removed_rack_is_proposed_not_stored_and_accepted_by_put(client: httpx
     assert (told["visits"], told["from"], told["to"]) == (2, "day 0", "day 1")
     assert found["changes"][0]["accepted"]
     assert found["map"]["segments"] == today.endpoints.tolist()
-    assert (found["map"]["frame_id"], found["map"]["meta"], found["map"]["sigma"]) == ("hall", {"floor": 3}, 0.01)
+    assert (found["map"]["frame_id"], found["map"]["meta"], found["map"]["sigma"]) == ("hall", {"floor": 3}, 0.005)
     assert (found["scans"], found["held_back"]["scans"], found["complete"], found["client_ref"]) == (16, 2, True, 7)
     assert found["usable_after"] >= found["usable_before"] > 8
 
