@@ -94,13 +94,15 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float) -> Sharpe
     off = np.abs(pairs.residual - np.einsum("ij,ij->i", pairs.of_wall, shift[pairs.wall]))
     inliers = off <= OUTLYING * np.sqrt(pairs.variance + sigma**2)
     shift, covariance = _solve(pairs.take(inliers), prior)
-    spread = np.sqrt(covariance[:, 0] + covariance[:, 1] * lengths**2 / 12.0)
-    better = _seen_often(pairs, found, len(walls)) & (spread <= SHARPER * sigma)
+    spread = _deviations(known, wall_of, middles, covariance)
+    widest = np.zeros(len(walls))
+    np.maximum.at(widest, wall_of, spread)
+    better = _seen_often(pairs, found, len(walls)) & (widest <= SHARPER * sigma)
     better &= np.abs(shift[:, 0]) <= OUTLYING * sigma
     moved = np.flatnonzero(better[wall_of])
     ends = _moved(known, wall_of, middles, np.where(better[:, None], shift, 0.0))
     ends = _joined(known, ends, better[wall_of])
-    return Sharpened(moved, ends[moved], spread[wall_of[moved]])
+    return Sharpened(moved, ends[moved], spread[moved])
 
 
 def _extents(known: Segments, wall_of: Indices, count: int) -> tuple[Floats, Floats]:
@@ -152,7 +154,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
 
 
 def _solve(pairs: _Pairs, prior: Floats) -> tuple[Floats, Floats]:
-    """Return the shift of each wall, offset and tilt (n, 2), and its variances (n, 2); poses are marginal."""
+    """Return the shift of each wall, offset and tilt (n, 2), and its covariance (n, 2, 2); poses are marginal."""
     count = 2 * len(prior)
     information, right = np.diag(1.0 / np.square(prior).ravel()), np.zeros(count)
     weight = 1.0 / pairs.variance
@@ -171,7 +173,17 @@ def _solve(pairs: _Pairs, prior: Floats) -> tuple[Floats, Floats]:
         information[np.ix_(own, own)] += (jacobian * w[:, None]).T @ jacobian - both.T @ gain[:, :-1]
         right[own] += at_wall - both.T @ gain[:, -1]
     covariance = np.linalg.inv(information)
-    return (covariance @ right).reshape(-1, 2), np.diag(covariance).reshape(-1, 2).copy()
+    blocks = covariance.reshape(len(prior), 2, len(prior), 2)
+    of_walls: Floats = np.asarray(blocks[np.arange(len(prior)), :, np.arange(len(prior)), :], dtype=np.float64)
+    return np.asarray((covariance @ right).reshape(-1, 2)), of_walls
+
+
+def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: Floats) -> Floats:
+    """Return the standard deviation of each segment normal to itself, the root mean square along it, (n,) metres."""
+    at = np.einsum("ij,ij->i", known.midpoints - middles[wall_of], known.directions)
+    own = covariance[wall_of]
+    square = own[:, 0, 0] + 2.0 * at * own[:, 0, 1] + (at**2 + known.lengths**2 / 12.0) * own[:, 1, 1]
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _seen_often(pairs: _Pairs, found: Sequence[Localized], count: int) -> Bools:
