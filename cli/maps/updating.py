@@ -97,6 +97,20 @@ def thinned(found: Iterable[LoggedScan], most: int) -> list[LoggedScan]:
     return kept
 
 
+def update_by_drive(document: Json, log: Path) -> Json:
+    """Return the update of a map by one log; its halves count as two visits.
+
+    Raises
+    ------
+    RefusedError
+        When the log, or a scan, is not taken.
+    """
+    scans = _scans(log, None, None, 2 * SCANS)
+    half = len(scans) // 2
+    halves = {"first half": scans[:half], "second half": scans[half:]}
+    return here.update(document, halves, None, ())
+
+
 def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
     """Yield a proposal as text for people."""
     for one in answer["refused_visits"]:
@@ -137,7 +151,7 @@ def draw_changes(old: Json, answer: Json, picture: Path) -> None:
         lines = []
         for code, colour in CHANGES.items():
             mine = [one for one in answer["changes"] if one["code"] == code]
-            gone = [ends[k] for one in mine for k in one["segments"]]
+            gone = [ends[k] for one in mine for k in one["segments"] if code != "extended"]
             new = [one["segment"] for change in mine for one in change["new"]]
             lines.append(DrawnLines(np.array(new).reshape(-1, 4), rgb(colour), code))
             name = code if code == "removed" else f"{code}, before"

@@ -85,3 +85,18 @@ def test_a_stored_map_is_updated_and_stays_as_it_is(linefix: Linefix) -> None:
 def test_wrong_use_is_one_line(linefix: Linefix, arguments: tuple[str, ...], code: int, said: str) -> None:
     told = linefix("map", "update", *arguments)
     assert (told.code, said in told.err.splitlines()[-1]) == (code, True), told.err
+
+
+def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) -> None:
+    ends = HALL.endpoints.tolist()
+    (folder / "hall.csv").write_text("".join(f"{a},{b},{c},{d}\n" for a, b, c, d in ends))
+    lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
+    (folder / "drive.log").write_text("".join(lines))
+    plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
+    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json")
+    assert told.code == 0, told.err
+    answer = json.loads(told.out)
+    assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
+    assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
+    wrong = linefix(*plain, "--update")
+    assert (wrong.code, "--update: found no log" in wrong.err) == (2, True)
