@@ -100,9 +100,9 @@ def updating(
     first = yield from begun.localize()
     latest, proposed = list(first), None
     shown: list[tuple[str, tuple[int, ...], int]] = []
-    _, refused = choose_evidence(names, first)
+    _, refused = choose_evidence(names, first, begun.sigma)
     for number in range(ROUNDS):
-        chosen, _ = choose_evidence(names, latest)
+        chosen, _ = choose_evidence(names, latest, begun.sigma)
         drafts, evidence = yield from begun.draft(chosen, names)
         before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
         if begun.deadline.passed:
@@ -227,7 +227,7 @@ class _Update:
             None if the map is sharp enough, if the sharper one fits the scans less, or if there is no time to try.
         """
         found = proposed.found or tuple(first)
-        chosen, _ = choose_evidence(names, found)
+        chosen, _ = choose_evidence(names, found, self.sigma)
         if self.index.sigma is None or self.index.sigma < LEAST_BLUR or not chosen or self.deadline.passed:
             return None
         whole = apply(self.known, proposed.changes)
