@@ -80,7 +80,7 @@ class WallEvidence:
     sights : (k, 3)
         Distinct rows of chunk, place, and scan that saw something; `place` numbers the squares of 0.5 m.
     seen_on : (k,)
-        Whether most beams of that scan on that chunk end on it; else they pass through.
+        True if most beams of that scan at that chunk end on it; else they pass through.
     """
 
     chunks: Chunks
@@ -226,7 +226,7 @@ def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> 
     counts = chunks.counts[near[columns]]
     chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
     facing = (slanted < 0.0) | (not oriented)
-    # So far behind a wall a beam is still behind it, not beside it: else a wall that is a little off would seem gone.
+    # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
     deep = along[beams, columns] + THROUGH * tolerance / np.abs(slanted) * across[beams, columns]
     within = (deep >= 0.0) & (deep <= walls.lengths[columns])
     passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing

@@ -50,7 +50,7 @@ class VisitScan:
     scan : Scan
         With its beams.
     visit : str
-        Scans of one visit share it. What changes within a visit, such as a door, is not learned.
+        Scans of one visit share it. A visit should be short, such as a drive or a day.
     pose : RigidTransform or None
         Pose as the sender knows it, map_from_scan; a prior of the search, which finds the pose in any case. A pose that
         is not usable, because the map is too old there, is evidence if this pose confirms it.
@@ -114,17 +114,17 @@ class Localized:
 
     @property
     def usable(self) -> bool:
-        """Whether a robot may use the answer."""
+        """Return whether a robot may use the answer."""
         return self.result.usable
 
     @property
     def located(self) -> bool:
-        """Whether its pose is known: it is usable, or the sender vouches for it."""
+        """Return whether its pose is known: it is usable, or the sender vouches for it."""
         return self.usable or self.vouched
 
     @property
     def precise(self) -> bool:
-        """Whether the pose is known well enough, and nothing speaks against the ranges."""
+        """Return whether the pose is known well enough, without a warning about the ranges."""
         if not self.located or self.result.covariance is None:
             return False
         x, y, theta = np.sqrt(np.diag(self.result.covariance))
@@ -252,7 +252,7 @@ def scale_of(found: Sequence[Localized], sigma: float) -> tuple[float, float]:
     float
         The fraction, above 0 where ranges are too long.
     float
-        Its standard deviation; inf where nothing tells it.
+        Its standard deviation.
     """
     information, right, square, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
     for one in found:

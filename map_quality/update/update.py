@@ -155,7 +155,7 @@ class _Update:
 
     @property
     def oriented(self) -> bool:
-        """Whether directions count."""
+        """Return whether directions count."""
         return len(self.index.segments) == self.index.directed
 
     def localize(self) -> Generator[None, None, list[Localized]]:
@@ -197,7 +197,7 @@ class _Update:
         Returns
         -------
         Proposed or None
-            What remains; None if nothing does, or there is no time to verify it.
+            The changes that remain; None if none remain, or if there is no time to verify them.
         """
         for _ in range(DROPS):
             new = self._index(drafts) if drafts else None

@@ -76,7 +76,7 @@ def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
 def _gone_things(evidence: WallEvidence, walls: int) -> set[int]:
     """Return the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
 
-    What beams passed through is not solid, so its other sides are gone, too, whether they were seen or not.
+    A thing that beams pass through is not solid, so its other sides are gone, too, whether they were seen or not.
     """
     ends = evidence.chunks.walls.endpoints[:walls]
     corners = np.round(ends.reshape(-1, 2) / LOOP_GAP).astype(np.int64)

@@ -25,7 +25,7 @@ def visits(*today: Segments) -> list[list[VisitScan]]:
 
 
 def off_walls(new: np.ndarray, truth: Segments) -> np.ndarray:
-    """How far the ends of each segment are from the nearest wall of the truth that faces the same way, m."""
+    """Return how far the ends of each segment are from the nearest wall of the truth that faces the same way, m."""
     found = Segments.from_array(new)
     far = []
     for ends, direction in zip(found.endpoints, found.directions, strict=True):

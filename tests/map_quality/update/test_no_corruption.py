@@ -14,7 +14,7 @@ import map_quality
 from association import CancelledError, Deadline, MapIndex
 from map_quality import UpdateError, VisitScan
 from map_quality.update.evidence import hanging_walls
-from map_quality.update.scans import Localized, search
+from map_quality.update.scans import Localized, scale_of, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner
 
@@ -117,3 +117,16 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
     localized = Localized(0, 0, seen, result, corridor, False)
     assert hanging_walls(corridor, localized, 0.01).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("factor", [0.98, 0.995, 1.0, 1.015])
+def test_the_scale_of_scans_is_estimated_beside_their_poses_and_an_error_of_all_ranges(factor: float) -> None:
+    known, found = index(), []
+    for number, one in enumerate(days(HALL, change=lambda ranges: ranges * factor + 0.01)):
+        result = search(known, one, Deadline())
+        if result.usable and not any(warning.code == "map_scale" for warning in result.warnings):
+            found.append(Localized(number, 0, one.scan, result, HALL, False))
+    assert len(found) > 3
+    estimated, sigma = scale_of(found, 0.005)
+    assert sigma < 0.003
+    assert estimated == pytest.approx(factor - 1.0, abs=3.0 * sigma + 5e-4)

@@ -27,7 +27,7 @@ def updated(old: Segments, sigma: float = SIGMA) -> MapUpdate:
 
 
 def off(ends: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """How far the middles of segments are from the true lines, metres."""
+    """Return how far the middles of segments are from the true lines, metres."""
     middles = 0.5 * (ends[:, :2] + ends[:, 2:])
     return np.einsum("ij,ij->i", middles, TRUE.normals[indices]) - TRUE.offsets[indices]
 
@@ -41,7 +41,7 @@ def test_walls_come_nearer_to_the_truth_and_their_sigma_tells_how_near() -> None
         sharp = found.sharpened
         assert len(sharp.segments) >= 12
         error, before = off(sharp.ends, sharp.segments), off(old.endpoints[sharp.segments], sharp.segments)
-        # The whole map may lie a little beside the truth: only its own walls say where it is.
+        # The whole map may be a little off: only its own walls determine its position.
         assert np.sqrt(np.mean(error**2)) < 0.6 * np.sqrt(np.mean(before**2))
         squares += error.tolist()
         ratios += ((error / sharp.sigma) ** 2).tolist()
