@@ -59,16 +59,16 @@ def judge(scene: Scene, poses: Sequence[tuple[str, RigidTransform]], update: Map
     return Judged(len(gone) + len(new), shown, found, len(false), len(update.changes))
 
 
-def is_false(change: Change, scene: Scene) -> bool:
-    """Return whether a change takes away a wall that is there, or makes one that is not."""
-    today, mapped = scene.today.segments, scene.mapped.segments
+def is_false(change: Change, scene: Scene, old: Segments | None = None) -> bool:
+    """Return whether a change takes away a wall that is there, or makes one that is not; `old` is the map before it."""
+    today, mapped = scene.today.segments, scene.mapped.segments if old is None else old
     kept = Segments.derived(change.new) if len(change.new) else Segments.from_array([])
     for side in mapped.endpoints[list(change.segments)]:
         lost = _on(side, today, SAME) & ~_on(side, kept, NEAR)
         if lost.sum() * STEP > 0.35:
             return True
     for side in change.new:
-        wrong = ~_on(side, today, NEAR) & ~_on(side, mapped, SAME)
+        wrong = ~_on(side, today, NEAR) & ~_on(side, scene.mapped.segments, SAME)
         if wrong.sum() * STEP > 0.35:
             return True
     return False

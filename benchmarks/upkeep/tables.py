@@ -115,8 +115,8 @@ def rounds(families: Sequence[str], seeds: Sequence[int]) -> list[Row]:
         for _ in range(ROUNDS):
             taken = list(visits(scene, ROUND_VISITS, rng, doors=True))
             update = map_quality.update(MapIndex.build(segments, sigma), with_poses(taken, rng))
+            wrong += sum(is_false(one, scene, segments) for one in update.changes)
             segments, sigma = update.segments, update.sigma or sigma
-            wrong += sum(is_false(one, scene) for one in update.changes)
         off = errors(segments.endpoints, scene.mapped.segments)
         drift.append(_rms(off[~np.isnan(off)]))
         done += 1

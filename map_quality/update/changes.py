@@ -14,8 +14,11 @@ from .evidence import WallEvidence
 from .result import Change, ChangeCode, Evidence
 from .tuning import (
     CONTRADICTING,
+    DOOR_VISITS,
+    DOORWAY,
     DOUBT_POSE,
     DOUBT_VISIT,
+    JAMB,
     JOINED,
     LEAST_PIECE,
     LEAST_POSES,
@@ -49,6 +52,8 @@ class Draft:
     sigma : (k,)
     gone, there : (c,)
         Chunks that it says are not there, and are there.
+    closes : bool
+        True if it closes a gap between walls that may be a doorway.
     """
 
     code: ChangeCode
@@ -57,6 +62,7 @@ class Draft:
     sigma: Floats
     gone: Indices
     there: Indices
+    closes: bool = False
 
     @property
     def chunks(self) -> Indices:
@@ -72,6 +78,7 @@ class Draft:
             np.concatenate([self.sigma, other.sigma]),
             np.concatenate([self.gone, other.gone]),
             np.concatenate([self.there, other.there]),
+            self.closes or other.closes,
         )
 
 
@@ -125,14 +132,17 @@ def _new_walls(
                 continue
             old = _continued(known, piece)
             if old is None or old in cut:
-                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks))
+                closes = _closes_doorway(known, piece)
+                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, closes))
                 continue
             before = extended.get(old)
             line = known.endpoints[old] if before is None else before.new[0]
             whole = _prolonged(known, old, line, piece)
-            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks)
+            closes = _closes_doorway(known, piece)
+            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks, closes)
             if before is not None:
-                one = replace(one, there=np.concatenate([before.there, chunks]))
+                both = np.concatenate([before.there, chunks])
+                one = replace(one, there=both, closes=closes or before.closes)
             extended[old] = one
     return list(extended.values()), added
 
@@ -163,6 +173,19 @@ def _continued(known: Segments, piece: Floats) -> int | None:
     gaps = np.maximum(begin, end)  # the wall lies ahead of the piece, or behind it
     fitting = np.flatnonzero(parallel & beside & (gaps <= SAME_GAP) & (gaps >= -SAME_GAP))
     return int(fitting[np.argmin(np.abs(gaps[fitting]))]) if len(fitting) else None
+
+
+def _closes_doorway(known: Segments, piece: Floats) -> bool:
+    """Return whether a new wall closes a gap between walls of the map that is as wide as a doorway."""
+    low, high = DOORWAY
+    if not low <= np.hypot(*(piece[2:] - piece[:2])) <= high:
+        return False
+    for point in (piece[:2], piece[2:]):
+        off = point - known.endpoints[:, :2]
+        along = np.clip(np.einsum("ij,ij->i", off, known.directions), 0.0, known.lengths)
+        if np.linalg.norm(off - along[:, None] * known.directions, axis=1).min() > JAMB:
+            return False
+    return True
 
 
 def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Floats:
@@ -236,7 +259,7 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
             agreeing |= evidence.visits_of(chunks, on=is_on)
             poses.append(evidence.places_of(chunks, on=is_on))
     visits = np.flatnonzero(agreeing)
-    if len(visits) < LEAST_VISITS or min(poses) < LEAST_POSES:
+    if len(visits) < (DOOR_VISITS if draft.closes else LEAST_VISITS) or min(poses) < LEAST_POSES:
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
     told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])

@@ -103,6 +103,12 @@ def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> 
     hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.5, 7.98, 7.0, 8.02))
     assert updated(hall, *visits(shut, hall, shut, hall)).changes == ()
     assert updated(shut, *visits(shut, hall, hall, shut)).changes == ()
+    assert updated(hall, *visits(shut, shut)).changes == ()
+
+
+def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:
+    hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.98, 6.9, 8.02))
+    assert [one.code for one in updated(hall, *visits(*[shut] * 5)).changes] == ["extended"]
 
 
 def test_people_and_carts_do_not_become_walls() -> None:
