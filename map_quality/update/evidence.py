@@ -1,70 +1,24 @@
-"""Evidence of beams about walls, in chunks along each wall: beams that end on it, and beams that pass through it."""
+"""Evidence of all scans about walls, and what it shows: chunks that are there, and chunks that are not."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import JointSums, RigidTransform, Segments
+from association import AssociationResult
+from registration import Segments
 
+from .beams import Chunks, Followed, follow
+from .hanging import hanging_lines
 from .scans import Localized
-from .tuning import (
-    CHUNK,
-    DEVIATIONS,
-    FEW,
-    HANGING,
-    HIDDEN,
-    LEAST_BEAMS,
-    LEAST_POSES,
-    LEAST_SLANT,
-    LEAST_TOLERANCE,
-    LEAST_VISITS,
-    MOST,
-    MOST_BEAMS,
-    THROUGH,
-)
+from .tuning import FEW, LEAST_BEAMS, LEAST_POSES, LEAST_VISITS, MOST
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Bools = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Chunks:
-    """Walls cut into pieces of about 0.2 m.
-
-    Attributes
-    ----------
-    walls : Segments
-        In the map frame.
-    first : (n + 1,)
-        The first chunk of each wall; chunks of a wall follow one another from its begin.
-    """
-
-    walls: Segments
-    first: Indices
-
-    @classmethod
-    def of(cls, walls: Segments) -> Chunks:
-        """Cut walls into chunks of equal length."""
-        counts = np.maximum(1, np.round(walls.lengths / CHUNK)).astype(np.intp)
-        return cls(walls, np.concatenate([[0], np.cumsum(counts)]).astype(np.intp))
-
-    def __len__(self) -> int:
-        return int(self.first[-1])
-
-    @property
-    def counts(self) -> Indices:
-        """Number of chunks of each wall, (n,)."""
-        return np.diff(self.first)
-
-    def of_wall(self, wall: int) -> slice:
-        """Return the chunks of a wall."""
-        return slice(int(self.first[wall]), int(self.first[wall + 1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,145 +116,63 @@ def shows(agree: Indices, against: Indices) -> Bools:
     return np.asarray((agree >= LEAST_BEAMS) & (agree >= MOST * (agree + against)))
 
 
-def gather(
-    walls: Segments, found: Sequence[Localized], visits: int, sigma: float, *, oriented: bool
-) -> Generator[None, None, WallEvidence]:
-    """Follow the beams of localized scans through walls, one scan at a step, and return the evidence.
+@dataclass(frozen=True, slots=True, eq=False)
+class Gatherer:
+    """Follows the beams of scans through the walls of a map, once for each pose.
 
-    Parameters
+    Attributes
     ----------
-    walls : Segments
-        Of the map, and others that may be there; metres in the map frame.
-    found : sequence of Localized
-        Scans that give evidence.
-    visits : int
-        Number of all visits.
+    known : Segments
+        The map, metres in the map frame.
     sigma : float
         Standard deviation of the walls, metres.
     oriented : bool
         True if a wall is seen from its left only.
+    kept : dict of int to (AssociationResult, Floats, Followed)
+        By the number of a scan: its answer, the lines that it is no evidence for, and its beams at the map.
     """
-    chunks = Chunks.of(walls)
-    through, on, before = (np.zeros((visits, len(chunks)), dtype=np.intp) for _ in range(3))
-    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
-    sights, seen_on = [], []
-    for one in found:
-        of_scan = _follow(chunks, one, sigma, oriented=oriented)
-        through[one.visit] += of_scan[0]
-        on[one.visit] += of_scan[1]
-        before[one.visit] += of_scan[2]
-        seen = np.flatnonzero(of_scan[0] + of_scan[1])
-        sights.append(np.stack([seen, np.full_like(seen, places[one.place]), np.full_like(seen, one.number)], axis=1))
-        seen_on.append(of_scan[1][seen] > of_scan[0][seen])
-        yield
-    rows = np.concatenate(sights) if sights else np.zeros((0, 3), dtype=np.intp)
-    return WallEvidence(
-        chunks, through, on, before, rows, np.concatenate(seen_on) if seen_on else np.zeros(0, dtype=bool)
-    )
 
+    known: Segments
+    sigma: float
+    oriented: bool
+    kept: dict[int, tuple[AssociationResult, Floats, Followed]] = field(default_factory=dict)
 
-def _follow(chunks: Chunks, one: Localized, sigma: float, *, oriented: bool) -> tuple[Indices, Indices, Indices]:
-    """Return the beams of a scan through each chunk, on each, and a little before each, (c,)."""
-    origins, rays, ranges = beams_in_map(one)
-    near = _within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0)))
-    near = near[~hanging_walls(chunks.walls.take(near), one, sigma)]
-    if not len(near) or not len(ranges):
-        nothing = np.zeros(len(chunks), dtype=np.intp)
-        return nothing, nothing, nothing
-    walls = chunks.walls.take(near)
-    slant, across = rays @ walls.normals.T, rays @ walls.directions.T
-    to_line = walls.offsets[None, :] - origins @ walls.normals.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = to_line / slant
-        along = (
-            origins @ walls.directions.T
-            + distance * across
-            - np.einsum("ij,ij->i", walls.endpoints[:, :2], walls.directions)[None, :]
-        )
-        behind = (ranges[:, None] - distance) * np.abs(slant)
-        met = (np.abs(slant) >= LEAST_SLANT) & (distance > 0.0) & (along >= 0.0) & (along < walls.lengths[None, :])
-    beams, columns = np.nonzero(met)
-    gap, slanted, far = behind[beams, columns], slant[beams, columns], distance[beams, columns]
-    tolerance = _tolerance(one, sigma, far)
-    share = along[beams, columns] / walls.lengths[columns]
-    counts = chunks.counts[near[columns]]
-    chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
-    facing = (slanted < 0.0) | (not oriented)
-    # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
-    deep = along[beams, columns] + THROUGH * tolerance / np.abs(slanted) * across[beams, columns]
-    within = (deep >= 0.0) & (deep <= walls.lengths[columns])
-    passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
-    hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
-    passed_of, on_of, before_of = (np.bincount(chunk[one], minlength=len(chunks)) for one in (passed, ended, hidden))
-    return passed_of, on_of, before_of
+    def gather(self, new: Segments, found: Sequence[Localized], visits: int) -> Generator[None, None, WallEvidence]:
+        """Follow the beams of localized scans, one scan at a step, and return the evidence.
 
+        Parameters
+        ----------
+        new : Segments
+            Walls that may be there; the evidence has them behind those of the map.
+        found : sequence of Localized
+            Scans that give evidence.
+        visits : int
+            Number of all visits.
+        """
+        chunks = Chunks.of(Segments.derived(np.concatenate([self.known.endpoints, new.endpoints])))
+        at_map, at_new = Chunks.of(self.known), Chunks.of(new)
+        through, on, before = (np.zeros((visits, len(chunks)), dtype=np.intp) for _ in range(3))
+        places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
+        sights, seen_on = [np.zeros((0, 3), dtype=np.intp)], [np.zeros(0, dtype=bool)]
+        for one in found:
+            lines, seen = self._at_map(at_map, one)
+            beyond = follow(at_new, one, lines, self.sigma, oriented=self.oriented)
+            seen = seen.and_behind(beyond, len(at_map))
+            through[one.visit, seen.chunks] += seen.through
+            on[one.visit, seen.chunks] += seen.on
+            before[one.visit, seen.chunks] += seen.before
+            told = seen.through + seen.on > 0
+            row = seen.chunks[told]
+            sights.append(np.stack([row, np.full_like(row, places[one.place]), np.full_like(row, one.number)], axis=1))
+            seen_on.append(seen.on[told] > seen.through[told])
+            yield
+        return WallEvidence(chunks, through, on, before, np.concatenate(sights), np.concatenate(seen_on))
 
-def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
-    """Return the beams that came back: their origins (m, 2), unit directions (m, 2), and ranges (m,); map frame.
-
-    A beam without return is no evidence: dark and transparent walls return none.
-    """
-    beams = one.scan.beams
-    assert beams is not None
-    assert one.scan.viewpoint is not None
-    known = np.flatnonzero(np.isfinite(beams.ranges) & (beams.ranges < beams.range_max))
-    known = known[:: max(1, math.ceil(len(known) / MOST_BEAMS))]
-    at = np.tile(one.scan.viewpoint, (len(known), 1)) if beams.origins is None else beams.origins[known]
-    angles = beams.angles[known] + one.pose.theta
-    return one.pose.apply(at), np.stack([np.cos(angles), np.sin(angles)], axis=1), beams.ranges[known]
-
-
-def _within(walls: Segments, place: Floats, reach: float) -> Indices:
-    """Return the walls that come nearer than `reach` to a place."""
-    off = place - walls.endpoints[:, :2]
-    along = np.clip(np.einsum("ij,ij->i", off, walls.directions), 0.0, walls.lengths)
-    gaps = off - along[:, None] * walls.directions
-    return np.flatnonzero(np.einsum("ij,ij->i", gaps, gaps) <= (reach + 1.0) ** 2)
-
-
-def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
-    """Return how far a beam may end from a wall and still read it, metres."""
-    assert one.result.covariance is not None
-    position = float(np.linalg.eigvalsh(one.result.covariance[:2, :2]).max())
-    turn = float(one.result.covariance[2, 2])
-    noise = float(np.median(one.scan.measured.sigma)) if len(one.scan.measured) else 0.0
-    deviation = np.sqrt(noise**2 + sigma**2 + position + turn * distance**2)
-    return np.maximum(LEAST_TOLERANCE, DEVIATIONS * deviation)
-
-
-def hanging_walls(walls: Segments, one: Localized, sigma: float) -> Bools:
-    """Return the walls without which the pose of a scan would not be known along their normal, (n,).
-
-    The sums of the other correspondences are what remains when those of a wall are taken out.
-    """
-    pairs = one.pairs
-    weights = 1.0 / (pairs.variances + sigma**2)
-    local = pairs.about((one.pose.x, one.pose.y), (0.0, 0.0))
-    total, hanging = JointSums.of_set(local, weights), np.zeros(len(walls), dtype=bool)
-    left = np.ones(len(pairs), dtype=bool)
-    while left.any():
-        first = int(np.argmax(left))
-        normal, offset = pairs.map_normals[first], pairs.map_offsets[first]
-        mine = _on_line(pairs.map_directions, pairs.map_midpoints, normal, offset)
-        mine[first] = True
-        left &= ~mine
-        rest = total - JointSums.of_set(local.take(mine), weights[mine])
-        if rest.count < 2 or _deviation(rest, one.pose, normal) > HANGING:
-            hanging |= _on_line(walls.directions, walls.midpoints, normal, offset)
-    return hanging
-
-
-def _on_line(directions: Floats, midpoints: Floats, normal: Floats, offset: float) -> Bools:
-    """Return which segments lie on a line, as pieces of one wall do."""
-    return np.asarray((np.abs(directions @ normal) < 0.05) & (np.abs(midpoints @ normal - offset) < LEAST_TOLERANCE))
-
-
-def _deviation(sums: JointSums, pose: RigidTransform, normal: Floats) -> float:
-    """Return the standard deviation of a pose along a direction by some sums, metres; inf where it is free."""
-    information = sums.information(pose.theta)
-    values, vectors = np.linalg.eigh(information)
-    along = vectors.T @ np.array([normal[0], normal[1], 0.0])
-    free = values <= 1e-9 * max(1.0, float(values.max()))
-    if np.any(np.abs(along[free]) > 1e-3):
-        return math.inf
-    return float(np.sqrt(np.sum(along[~free] ** 2 / values[~free])))
+    def _at_map(self, chunks: Chunks, one: Localized) -> tuple[Floats, Followed]:
+        """Return the lines that a scan is no evidence for, and its beams at the map."""
+        kept = self.kept.get(one.number)
+        if kept is None or kept[0] is not one.result:
+            lines = hanging_lines(one, self.sigma)
+            kept = one.result, lines, follow(chunks, one, lines, self.sigma, oriented=self.oriented)
+            self.kept[one.number] = kept
+        return kept[1], kept[2]

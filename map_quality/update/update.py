@@ -14,12 +14,14 @@ from association import CancelledError, Deadline, MapIndex
 from registration import InvalidArgumentError, Segments
 
 from .additions import candidates, unexplained
+from .applying import apply, kept_indices, sharper_sigma, with_ends
 from .changes import Draft, change_of, draft_changes
-from .evidence import WallEvidence, gather
-from .result import NOT_SHARPENED, Change, MapUpdate, RefusedVisit, Sharpened, Usable
+from .evidence import Gatherer, WallEvidence
+from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
 from .sharpening import sharpen
-from .tuning import DROPS, FEWER_USABLE, LEAST_BLUR, LOWER_SCORE, ROUNDS, SAME_POSE, USUAL_SIGMA
+from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
+from .verifying import Proposed, is_better, keeps_usable, total_score, usable_of
 
 Floats = NDArray[np.float64]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
@@ -95,7 +97,7 @@ def updating(
         raise UpdateError("found no scans, expected scans of at least two visits", argument="scans")
     if accept is not None and not 0.0 <= accept <= 1.0:
         raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
-    begun = _Update(index, tuple(scans), deadline or Deadline())
+    begun = _Update.of(index, scans, deadline or Deadline())
     names, _ = visit_numbers(scans)
     first = yield from begun.localize()
     latest, proposed = list(first), None
@@ -116,47 +118,30 @@ def updating(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Proposed:
-    """Verified changes.
-
-    Attributes
-    ----------
-    drafts : tuple of Draft
-    changes : tuple of Change
-        The same with their evidence.
-    found : tuple of Localized
-        All scans, searched on the new map; empty where nothing has changed.
-    sharpened : Sharpened
-    """
-
-    drafts: tuple[Draft, ...] = ()
-    changes: tuple[Change, ...] = ()
-    found: tuple[Localized, ...] = ()
-    sharpened: Sharpened = NOT_SHARPENED
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Update:
     """An update in the making."""
 
     index: MapIndex
     scans: tuple[VisitScan, ...]
     deadline: Deadline
+    gatherer: Gatherer
+
+    @classmethod
+    def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
+        """Begin an update."""
+        known = Segments.derived(index.segments.endpoints[: index.directed])
+        sigma, oriented = USUAL_SIGMA if index.sigma is None else index.sigma, len(index.segments) == index.directed
+        return cls(index, tuple(scans), deadline, Gatherer(known, sigma, oriented))
 
     @property
     def known(self) -> Segments:
         """The map as sent."""
-        return Segments.derived(self.index.segments.endpoints[: self.index.directed])
+        return self.gatherer.known
 
     @property
     def sigma(self) -> float:
         """Of its walls, metres."""
-        return USUAL_SIGMA if self.index.sigma is None else self.index.sigma
-
-    @property
-    def oriented(self) -> bool:
-        """Return whether directions count."""
-        return len(self.index.segments) == self.index.directed
+        return self.gatherer.sigma
 
     def localize(self) -> Generator[None, None, list[Localized]]:
         """Search all scans that there is time for."""
@@ -183,8 +168,7 @@ class _Update:
         """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
         known = self.known
         new, sigmas = candidates(unexplained(chosen, known), known)
-        walls = Segments.derived(np.concatenate([known.endpoints, new]))
-        evidence = yield from gather(walls, chosen, len(names), self.sigma, oriented=self.oriented)
+        evidence = yield from self.gatherer.gather(Segments.derived(new), chosen, len(names))
         drafts = draft_changes(evidence, known, sigmas, self.sigma)
         told = [(one, change_of(one, evidence, names)) for one in drafts]
         return [(one, change) for one, change in told if change is not None], evidence
@@ -208,9 +192,9 @@ class _Update:
                 found.append((yield from self._search(new, one)))
                 if self.deadline.passed:
                     return None
-            kept = [one for one in drafts if _is_better(one[0], evidence, first, found)]
+            kept = [one for one in drafts if is_better(one[0], evidence, first, found)]
             if len(kept) == len(drafts):
-                if not _keeps_usable(first, found):
+                if not keeps_usable(first, found):
                     return None
                 return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
             drafts = kept
@@ -246,12 +230,12 @@ class _Update:
             again.append((yield from self._search(new, one)))
             if self.deadline.passed:
                 return None
-        if total_score(again, found) < total_score(found, found) or not _keeps_usable(found, again):
+        if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
             return None
         return replace(proposed, found=tuple(again), sharpened=sharpened)
 
     def _indexed(self, segments: Segments) -> MapIndex:
-        return MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+        return MapIndex.build(segments, self.index.sigma, oriented=self.gatherer.oriented)
 
     def search_others(
         self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]
@@ -306,95 +290,9 @@ class _Update:
             sharper_sigma(self.known, self.index.sigma, proposed.sharpened),
             tuple(changes),
             accepted,
-            _usable(first, after, held=False),
-            _usable(first, after, held=True),
+            usable_of(first, after, held=False),
+            usable_of(first, after, held=True),
             proposed.sharpened,
             tuple(refused),
             len(first) == len(self.scans) and not self.deadline.passed,
         )
-
-
-def apply(known: Segments, changes: Sequence[Change]) -> Segments:
-    """Return the segments of a map with some changes.
-
-    Segments that no change names keep their order. The first new segment of a change takes the place of its first old
-    one; others are appended.
-    """
-    kept: list[Floats | None] = list(known.endpoints)
-    appended: list[Floats] = []
-    for one in changes:
-        new = list(one.new)
-        for old in one.segments:
-            kept[old] = None
-        if one.segments and new and one.code in ("shortened", "extended"):
-            kept[one.segments[0]] = new.pop(0)
-        appended += new
-    ends = [*(one for one in kept if one is not None), *appended]
-    return Segments.derived(np.array(ends).reshape(-1, 4))
-
-
-def kept_indices(count: int, changes: Sequence[Change]) -> NDArray[np.intp]:
-    """Return which old segment each segment of the map with some changes is, -1 for those that changes made."""
-    kept = list(range(count))
-    made = 0
-    for one in changes:
-        in_place = bool(one.segments) and len(one.new) > 0 and one.code in ("shortened", "extended")
-        for old in one.segments:
-            kept[old] = -2
-        if in_place:
-            kept[one.segments[0]] = -1
-        made += len(one.new) - in_place
-    return np.array([*(k for k in kept if k != -2), *[-1] * made], dtype=np.intp)
-
-
-def with_ends(known: Segments, sharpened: Sharpened) -> Segments:
-    """Return a map with its sharpened walls."""
-    ends = known.endpoints.copy()
-    ends[sharpened.segments] = sharpened.ends
-    return Segments.derived(ends)
-
-
-def sharper_sigma(known: Segments, sigma: float | None, sharpened: Sharpened) -> float | None:
-    """Return the standard deviation of all lines of the new map: the root mean square by length, metres."""
-    if sigma is None or not len(sharpened.segments):
-        return sigma
-    each = np.full(len(known), sigma)
-    each[sharpened.segments] = sharpened.sigma
-    return float(np.sqrt(known.lengths @ each**2 / known.lengths.sum()))
-
-
-def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
-    """Return the score of the scans that were located before, nats."""
-    return sum(one.score for one, before in zip(found, of, strict=True) if before.located)
-
-
-def _is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether a change leaves the poses of the scans that saw it, and does not lower their score."""
-    concerned = evidence.scans_of(draft.chunks)
-    gain = 0.0
-    for before, after in zip(first, found, strict=True):
-        if before.number not in concerned or not before.located:
-            continue
-        gain += after.score - before.score
-        if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
-            return False
-    return gain >= -LOWER_SCORE
-
-
-def _keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether hardly any usable scan fits the new map less, and may not be used there.
-
-    A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
-    its room looks like others.
-    """
-    lost = sum(
-        before.usable and not after.usable and after.score < before.score - LOWER_SCORE
-        for before, after in zip(first, found, strict=True)
-    )
-    return lost <= max(1.0, FEWER_USABLE * len(first))
-
-
-def _usable(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:
-    """Count the scans that are held back, or the others."""
-    chosen = [(one.usable, after.usable) for one, after in zip(first, found, strict=True) if one.held_back == held]
-    return Usable(len(chosen), sum(before for before, _ in chosen), sum(after for _, after in chosen))

@@ -13,7 +13,7 @@ import pytest
 import map_quality
 from association import CancelledError, Deadline, MapIndex
 from map_quality import UpdateError, VisitScan
-from map_quality.update.evidence import hanging_walls
+from map_quality.update.hanging import hanging_lines, on_lines
 from map_quality.update.scans import Localized, scale_of, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner
@@ -24,7 +24,9 @@ HALL = segments(RACK, PILLAR)
 TODAY = segments(PILLAR)
 
 
-def days(walls: Segments, *, scanner: Scanner = SCANNER, change: Callable[[np.ndarray], np.ndarray] = lambda r: r):
+def days(
+    walls: Segments, *, scanner: Scanner = SCANNER, change: Callable[[np.ndarray], np.ndarray] = lambda r: r
+) -> list[VisitScan]:
     return [one for k in range(3) for one in visit(walls, f"day {k}", k, scanner, change)]
 
 
@@ -116,7 +118,7 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     assert result.pose is not None
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
     localized = Localized(0, 0, seen, result, corridor, False)
-    assert hanging_walls(corridor, localized, 0.01).tolist() == [False, True, False]
+    assert on_lines(corridor, hanging_lines(localized, 0.01)).tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize("factor", [0.98, 0.995, 1.0, 1.015])
