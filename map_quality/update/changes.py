@@ -15,7 +15,6 @@ from .result import Change, ChangeCode, Evidence
 from .tuning import (
     CONTRADICTING,
     DOOR_VISITS,
-    DOORWAY,
     DOUBT_POSE,
     DOUBT_VISIT,
     JAMB,
@@ -23,6 +22,7 @@ from .tuning import (
     LEAST_PIECE,
     LEAST_POSES,
     LEAST_VISITS,
+    LONGEST_LEAF,
     MOST_CONFIDENCE,
     NEAR_MOVE,
     NEW_JOINED,
@@ -52,8 +52,8 @@ class Draft:
     sigma : (k,)
     gone, there : (c,)
         Chunks that it says are not there, and are there.
-    closes : bool
-        True if it closes a gap between walls that may be a doorway.
+    door : bool
+        True if a part of it may be the leaf of a door.
     """
 
     code: ChangeCode
@@ -62,7 +62,7 @@ class Draft:
     sigma: Floats
     gone: Indices
     there: Indices
-    closes: bool = False
+    door: bool = False
 
     @property
     def chunks(self) -> Indices:
@@ -78,7 +78,7 @@ class Draft:
             np.concatenate([self.sigma, other.sigma]),
             np.concatenate([self.gone, other.gone]),
             np.concatenate([self.there, other.there]),
-            self.closes or other.closes,
+            self.door or other.door,
         )
 
 
@@ -132,17 +132,17 @@ def _new_walls(
                 continue
             old = _continued(known, piece)
             if old is None or old in cut:
-                closes = _closes_doorway(known, piece)
-                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, closes))
+                door = _may_be_door(known, piece)
+                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, door))
                 continue
             before = extended.get(old)
             line = known.endpoints[old] if before is None else before.new[0]
             whole = _prolonged(known, old, line, piece)
-            closes = _closes_doorway(known, piece)
-            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks, closes)
+            door = _may_be_door(known, piece)
+            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks, door)
             if before is not None:
                 both = np.concatenate([before.there, chunks])
-                one = replace(one, there=both, closes=closes or before.closes)
+                one = replace(one, there=both, door=door or before.door)
             extended[old] = one
     return list(extended.values()), added
 
@@ -175,17 +175,12 @@ def _continued(known: Segments, piece: Floats) -> int | None:
     return int(fitting[np.argmin(np.abs(gaps[fitting]))]) if len(fitting) else None
 
 
-def _closes_doorway(known: Segments, piece: Floats) -> bool:
-    """Return whether a new wall closes a gap between walls of the map that is as wide as a doorway."""
-    low, high = DOORWAY
-    if not low <= np.hypot(*(piece[2:] - piece[:2])) <= high:
+def _may_be_door(known: Segments, piece: Floats) -> bool:
+    """Return whether a new wall is no longer than the leaf of a door, and begins or ends where a wall of the map does."""
+    if np.hypot(*(piece[2:] - piece[:2])) > LONGEST_LEAF:
         return False
-    for point in (piece[:2], piece[2:]):
-        off = point - known.endpoints[:, :2]
-        along = np.clip(np.einsum("ij,ij->i", off, known.directions), 0.0, known.lengths)
-        if np.linalg.norm(off - along[:, None] * known.directions, axis=1).min() > JAMB:
-            return False
-    return True
+    gaps = known.endpoints.reshape(-1, 1, 2) - piece.reshape(1, 2, 2)
+    return bool(np.linalg.norm(gaps, axis=2).min() <= JAMB)
 
 
 def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Floats:
@@ -259,7 +254,7 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
             agreeing |= evidence.visits_of(chunks, on=is_on)
             poses.append(evidence.places_of(chunks, on=is_on))
     visits = np.flatnonzero(agreeing)
-    if len(visits) < (DOOR_VISITS if draft.closes else LEAST_VISITS) or min(poses) < LEAST_POSES:
+    if len(visits) < (DOOR_VISITS if draft.door else LEAST_VISITS) or min(poses) < LEAST_POSES:
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
     told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])
