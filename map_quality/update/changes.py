@@ -176,7 +176,7 @@ def _continued(known: Segments, piece: Floats) -> int | None:
 
 
 def _may_be_door(known: Segments, piece: Floats) -> bool:
-    """Return whether a new wall is no longer than the leaf of a door, and begins or ends where a wall of the map does."""
+    """Return whether a new wall is no longer than the leaf of a door, and begins or ends at the end of another wall."""
     if np.hypot(*(piece[2:] - piece[:2])) > LONGEST_LEAF:
         return False
     gaps = known.endpoints.reshape(-1, 1, 2) - piece.reshape(1, 2, 2)
