@@ -168,12 +168,12 @@ def speed(families: Sequence[str], scans: int, least: int) -> list[Row]:
     together = [one for some in zip(*taken, strict=True) for one in some][:scans]
     index = MapIndex.build(Segments.from_array(np.concatenate(walls)), MAP_SIGMA)
     map_quality.update(index, together[:20])
-    begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     map_quality.update(index, together)
-    took, most = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    took, most = time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     what = f"{len(together)} scans in a map of {len(index.segments)} segments"
     return [
-        at_most(f"seconds for {what}", took, 20.0, form=".1f"),
+        at_most(f"seconds of a core for {what}", took, 20.0, form=".1f"),
         at_most("  memory of the process at most, MB", most / 1024.0, 500.0, form=".0f"),
         at_most("  of this before the update, MB", before / 1024.0, form=".0f"),
     ]

@@ -134,3 +134,11 @@ def test_walls_that_are_not_seen_stay_as_they_are() -> None:
     hall, today = segments(RACK, PILLAR, hidden), segments(PILLAR, hidden)
     found = updated(hall, *visits(today, today))
     assert found.segments.endpoints.tolist() == today.endpoints.tolist()
+
+
+def test_a_map_without_directions_is_updated_too() -> None:
+    hall, today = segments(RACK, PILLAR), segments(PILLAR)
+    scans = [one for some in visits(today, today, today) for one in some]
+    found = map_quality.update(MapIndex.build(hall, 0.005, oriented=False), scans)
+    assert [(one.code, one.segments) for one in found.changes] == [("removed", (12, 13, 14, 15))]
+    assert found.segments.endpoints.tolist() == today.endpoints.tolist()

@@ -29,7 +29,7 @@ def updated(old: Segments, sigma: float = SIGMA) -> MapUpdate:
 def off(ends: np.ndarray, indices: np.ndarray) -> np.ndarray:
     """Return how far the middles of segments are from the true lines, metres."""
     middles = 0.5 * (ends[:, :2] + ends[:, 2:])
-    return np.einsum("ij,ij->i", middles, TRUE.normals[indices]) - TRUE.offsets[indices]
+    return np.asarray(np.einsum("ij,ij->i", middles, TRUE.normals[indices]) - TRUE.offsets[indices])
 
 
 def test_walls_come_nearer_to_the_truth_and_their_sigma_tells_how_near() -> None:
