@@ -33,7 +33,9 @@ def grid_map(walls: Segments, rng: np.random.Generator) -> LineMap:
         steps = np.arange(0.0, float(ranges.max()), 0.5 * CELL)
         rays, along = np.nonzero(steps[None, :] < ranges[:, None] - 0.25 * CELL)
         x, y = at.x + steps[along] * np.cos(angles[rays]), at.y + steps[along] * np.sin(angles[rays])
-        cells[((y - low[1]) / CELL).astype(int), ((x - low[0]) / CELL).astype(int)] = FREE
+        column, row = ((x - low[0]) / CELL).astype(int), ((y - low[1]) / CELL).astype(int)
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)  # a street is open at its ends
+        cells[row[inside], column[inside]] = FREE
         hit = np.flatnonzero(seen.true_ranges < MAPPER.range_max)
         far = seen.true_ranges[hit] + 1e-3
         ends.append(np.stack([at.x + far * np.cos(angles[hit]), at.y + far * np.sin(angles[hit])], axis=1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -183,10 +183,16 @@ def upkeep(quick: int) -> list[Row]:
     """Return the rows of all tables; buildings of which none is fitted on."""
     families = [name for name, one in FAMILIES.items() if one.held_out]
     seeds = range(max(1, 4 // quick))
-    rows = changes(families, seeds)
-    rows += sharper(families, seeds[: max(1, len(seeds) // 2)])
-    rows += rounds(families, seeds[:1])
-    rows += foreign(families, max(6, 1000 // quick))
-    rows += speed(families, max(100, 1000 // quick), max(500, 2000 // quick))
-    print_rows("Map updates", rows)
+    parts: dict[str, Callable[[], list[Row]]] = {
+        "changes": lambda: changes(families, seeds),
+        "walls of grids": lambda: sharper(families, seeds[: max(1, len(seeds) // 2)]),
+        "rounds": lambda: rounds(families, seeds[:1]),
+        "foreign logs": lambda: foreign(families, max(6, 1000 // quick)),
+        "speed": lambda: speed(families, max(100, 1000 // quick), max(500, 2000 // quick)),
+    }
+    rows: list[Row] = []
+    for name, part in parts.items():
+        found = part()
+        print_rows(f"Map updates: {name}", found)
+        rows += found
     return rows
