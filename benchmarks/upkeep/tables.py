@@ -83,7 +83,8 @@ def sharper(families: Sequence[str], seeds: Sequence[int]) -> list[Row]:
         sharp = update.sharpened
         error = errors(sharp.ends, scene.mapped.segments)
         known = ~np.isnan(error)
-        before.append(errors(old.segments.endpoints[sharp.segments], scene.mapped.segments)[known])
+        blurred = errors(old.segments.endpoints[sharp.segments], scene.mapped.segments)
+        before.append(blurred[~np.isnan(blurred)])
         after.append(error[known])
         ratios.append((error[known] / sharp.sigma[known]) ** 2)
         progress(f"upkeep, grids, {scene.family}", len(after), len(families) * len(seeds))

@@ -97,7 +97,7 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
     ----------
     seen : SeenLines
     known : Segments
-        Of the map; what lies along them is left out.
+        Of the map; what lies along them, or along a longer new wall, is left out.
 
     Returns
     -------
@@ -116,9 +116,11 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
         group = rest.take(mine)
         if not _is_seen_often(group.visits, group.places):
             continue
-        for piece, sigma in _pieces(group, known):
-            walls.append(piece)
-            sigmas.append(sigma)
+        found = _pieces(group, known)
+        walls += [piece for piece, _ in found]
+        sigmas += [sigma for _, sigma in found]
+        if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
+            known = Segments.derived(np.concatenate([known.endpoints, [piece for piece, _ in found]]))
     return np.array(walls).reshape(-1, 4), np.array(sigmas)
 
 

@@ -76,4 +76,4 @@ LOWER_SCORE = 1.0  # nats; a change may lower the score of its scans by no more
 SAME_POSE = 0.3  # m; between the poses of one scan on the old and the new map
 FEWER_USABLE = 0.01  # fraction of the scans; a proposal that loses more is withdrawn
 DROPS = 3  # times that changes are dropped and the rest is verified again
-ROUNDS = 3  # scans that are usable on the new map only give more evidence
+ROUNDS = 4  # scans that are usable on the new map only give more evidence
