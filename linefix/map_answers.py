@@ -98,6 +98,10 @@ def update_json(update: MapUpdate, document: Mapping[str, Any]) -> Json:
             "usable_before": update.held_back.before,
             "usable_after": update.held_back.after,
         },
+        "sharpened": {
+            "segments": update.sharpened.segments.tolist(),
+            "sigma": update.sharpened.sigma.tolist(),
+        },
         "refused_visits": [asdict(one) for one in update.refused_visits],
         "complete": update.complete,
     }

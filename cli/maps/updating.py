@@ -128,6 +128,12 @@ def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
         )
     if not answer["changes"]:
         yield "change", "none"
+    sharp = answer["sharpened"]["sigma"]
+    if sharp:
+        yield (
+            "sharper",
+            f"{len(sharp)} walls at better positions, sigma {1e3 * float(np.median(sharp)):.1f} mm (median)",
+        )
     held = answer["held_back"]
     yield "scans", f"{answer['usable_before']} of {answer['scans']} usable before, {answer['usable_after']} after"
     yield (

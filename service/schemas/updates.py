@@ -120,6 +120,13 @@ class HeldBackAnswer(Answer):
     usable_after: Index = Field(description="number of usable scans on the map with all changes")
 
 
+class SharpenedAnswer(Answer):
+    """Walls that are in the new map at better positions; only of a map that declares a sigma of 8 mm or more."""
+
+    segments: list[Index] = Field(description="indices of the old map's segments")
+    sigma: list[float] = Field(description="standard deviation of each normal to itself, metres")
+
+
 class RefusedVisitAnswer(Answer):
     """A visit that gives no evidence."""
 
@@ -137,6 +144,7 @@ class UpdateAnswer(Answer):
     usable_before: Index = Field(description="number of usable scans on the old map")
     usable_after: Index = Field(description="number of usable scans on the map with all changes")
     held_back: HeldBackAnswer = Field(description="one in ten of these scans")
+    sharpened: SharpenedAnswer
     refused_visits: list[RefusedVisitAnswer]
     complete: bool = Field(description="false if the deadline ended the update; changes are then left out")
     client_ref: Any = Field(description="returned as it was sent")

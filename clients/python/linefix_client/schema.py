@@ -412,6 +412,15 @@ class SegmentOfView(TypedDict):
     scan: int
 
 
+class SharpenedAnswer(TypedDict):
+    """
+    Walls that are in the new map at better positions; only of a map that declares a sigma of 8 mm or more.
+    """
+
+    segments: list[int]
+    sigma: list[float]
+
+
 class SizeAnswer(TypedDict):
     """
     Size of a map.
@@ -877,6 +886,7 @@ class UpdateAnswer(TypedDict):
     usable_before: int
     usable_after: int
     held_back: HeldBackAnswer
+    sharpened: SharpenedAnswer
     refused_visits: list[RefusedVisitAnswer]
     complete: bool
     client_ref: Any

@@ -55,6 +55,7 @@ def test_a_removed_rack_is_proposed_not_stored_and_accepted_by_put(client: httpx
     assert found["map"]["segments"] == today.endpoints.tolist()
     assert (found["map"]["frame_id"], found["map"]["meta"], found["map"]["sigma"]) == ("hall", {"floor": 3}, 0.005)
     assert (found["scans"], found["held_back"]["scans"], found["complete"], found["client_ref"]) == (16, 2, True, 7)
+    assert found["sharpened"] == {"segments": [], "sigma": []}
     assert found["usable_after"] >= found["usable_before"] > 8
 
     kept = client.get("/v1/maps/updated")
