@@ -32,6 +32,7 @@ from .sensitivity import sensitivity
 from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
+from .upkeep import upkeep
 from .views import views
 from .worlds import worlds
 
@@ -138,6 +139,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "sensitivity": sensitivity,
     "plan": plan,
     "ros2": ros2,
+    "upkeep": upkeep,
     "starts": starts,
 }
 

@@ -12,7 +12,7 @@ import linefix
 from association import KnownOfMaps, Prior, associate_on_maps, explain_verdict
 from linefix.answers import Included, association_json, registration_json
 from linefix.explaining import explanation_json
-from linefix.map_answers import checked_json, import_json, map_json
+from linefix.map_answers import checked_json, import_json, map_json, update_json
 from map_quality import check_map
 from service.contract import (
     AssociateRequest,
@@ -208,6 +208,34 @@ def check(on: Json, documents: Sequence[Json], logged: Sequence[LoggedScan] = ()
         checked = linefix.check(index, scans, deadline=deadline, oriented=oriented)
         watch.lap("search")
         return _sealed({**checked_json(checked), "map": found.reference, "client_ref": None}, watch)
+
+
+def update(on: Json, visits: Mapping[str, Sequence[LoggedScan]], accept: float | None, refuse: Sequence[int]) -> Json:
+    """Return the answer of ``/v1/maps/{map_id}:update``, also for a map that is not stored.
+
+    Parameters
+    ----------
+    on : dict
+        The map of a request.
+    visits : mapping of str to sequence of LoggedScan
+        The scans of each visit.
+    accept : float or None
+        Confidence below which a change is not in the new map.
+    refuse : sequence of int
+        Changes that are not in the new map either.
+    """
+    compile_first()
+    with refusing(Asked(map_id=id_of(on))):
+        watch = Stopwatch()
+        if id_of(on) is None:
+            validate(InlineMap, on, settings_here().limits())
+        found = map_here(on)
+        index = linefix.index_map(found.document)
+        watch.lap("decode")
+        proposal = linefix.update_map(index, visits, accept=accept, refuse=refuse)
+        watch.lap("search")
+        answer = update_json(proposal, found.document)
+        return _sealed({**answer, "based_on": found.reference, "client_ref": None}, watch)
 
 
 def import_map(file: Path, options: ImportOptions) -> Json:

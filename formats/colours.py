@@ -6,6 +6,13 @@ USABLE, AMBIGUOUS, DEGENERATE, NO_MATCH = "#009e73", "#e69f00", "#0072b2", "#d55
 VERDICTS = {"usable": USABLE, "ambiguous": AMBIGUOUS, "degenerate": DEGENERATE, "no_match": NO_MATCH}
 INK, WALL, POINT = "#101418", "#4a5460", "#8e98a3"
 MATCHED, UNMATCHED, CRITICAL = "#2aa0e0", "#e0529c", "#f5dc3d"
+CHANGES = {
+    "removed": NO_MATCH,
+    "added": USABLE,
+    "moved": AMBIGUOUS,
+    "extended": DEGENERATE,
+    "shortened": "#cc79a7",
+}  # suit every kind of colour vision, too
 ESTIMATE, OTHER = "#6a35c9", "#8f7d00"
 
 

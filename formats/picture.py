@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from registration import RigidTransform
@@ -22,6 +23,7 @@ from .line_map import LineMap
 SIZE = 1600  # pixels of the longer edge
 MARGIN = 20  # pixels
 TICK = 10.0  # pixels; towards the free side
+DASH = 8.0  # pixels
 MARK = 5.0  # pixels; of a pose
 STRIP = 60  # pixels; below the map, for the scale and the legend
 LETTERS = 22  # pixels; height of the text
@@ -39,16 +41,27 @@ class PlaceMark:
     colour: tuple[int, int, int]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnLines:
+    """Lines over the walls, (n, 4) metres in the map frame; their colour, and their name in the legend."""
+
+    ends: NDArray[np.float64]
+    colour: tuple[int, int, int]
+    name: str
+    dashed: bool = False
+
+
 def draw_map(
     map: LineMap,
     path: str | os.PathLike[str],
     poses: Iterable[RigidTransform] = (),
     doubtful: Iterable[RigidTransform] = (),
     marks: Iterable[PlaceMark] = (),
+    lines: Iterable[DrawnLines] = (),
 ) -> None:
     """Draw a map as PNG: walls in grey, a blue tick on the free side of each, poses in green, doubtful ones in grey.
 
-    Marks are painted below all that. The strip below the map has the scale and a legend of what is drawn.
+    Marks are painted below all that, lines above the walls. The strip below has the scale and a legend.
 
     Parameters
     ----------
@@ -60,6 +73,7 @@ def draw_map(
         map_from_scan; drawn as dots that point where they look.
     marks : iterable of PlaceMark
         A later one covers those before.
+    lines : iterable of DrawnLines
 
     Raises
     ------
@@ -74,7 +88,7 @@ def draw_map(
     width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
     picture = Image.new("RGB", (max(width, SIZE), height + STRIP), PAPER)
     draw = ImageDraw.Draw(picture)
-    marks, poses, doubtful = list(marks), list(poses), list(doubtful)
+    marks, poses, doubtful, lines = list(marks), list(poses), list(doubtful), list(lines)
 
     def place(x: float, y: float) -> tuple[float, float]:
         return MARGIN + (x - float(low[0])) * scale, height - MARGIN - (y - float(low[1])) * scale
@@ -90,6 +104,9 @@ def draw_map(
         if map.oriented:
             x, y = place(mx, my)
             draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=rgb(MATCHED), width=2)
+    for one in lines:
+        for x1, y1, x2, y2 in one.ends:
+            _draw_line(draw, place(x1, y1), place(x2, y2), one)
     for pose, colour in [*((pose, rgb(POINT)) for pose in doubtful), *((pose, rgb(USABLE)) for pose in poses)]:
         x, y = place(pose.x, pose.y)
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
@@ -99,8 +116,20 @@ def draw_map(
     entries += [("usable pose", rgb(USABLE))] * bool(poses) + [("pose that is not usable", rgb(POINT))] * bool(doubtful)
     painted = {mark.colour for mark in marks}
     entries += [(name.replace("_", " "), rgb(one)) for name, one in VERDICTS.items() if rgb(one) in painted]
+    entries += [(one.name, one.colour) for one in lines if len(one.ends)]
     _annotate(draw, height, scale, entries)
     picture.save(path, format="PNG")
+
+
+def _draw_line(
+    draw: ImageDraw.ImageDraw, begin: tuple[float, float], end: tuple[float, float], how: DrawnLines
+) -> None:
+    length = math.dist(begin, end)
+    count = max(1, round(length / DASH)) if how.dashed else 1
+    for k in range(0, count, 2):
+        a, b = k / count, min(1.0, (k + 1) / count)
+        ends = [(begin[0] + t * (end[0] - begin[0]), begin[1] + t * (end[1] - begin[1])) for t in (a, b)]
+        draw.line(ends, fill=how.colour, width=5)
 
 
 def _annotate(

@@ -48,6 +48,7 @@ from .checking import CheckedMap, check
 from .explaining import explain
 from .locating import index_map, index_maps, locate, scan_of
 from .mounted import MountedScan, view_of
+from .updating import update_map
 
 if TYPE_CHECKING:
     from formats import ImportOptions, LineMap, LogOptions, draw_map, read_log, read_map, write_map
@@ -95,6 +96,7 @@ __all__ = [
     "register",
     "scan_of",
     "simulation",
+    "update_map",
     "vectorize",
     "view_of",
     "write_map",

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from association import Status
-from map_quality import Analysis, Finding, MapCheck, PlaceVerdict, Sample
+from map_quality import Analysis, Change, Finding, MapCheck, MapUpdate, PlaceVerdict, Sample
 
 from .answers import Json, direction_json, pose_json
 from .checking import CheckedMap
@@ -80,6 +80,51 @@ def analysis_json(analysis: Analysis, found: Mapping[int, PlaceVerdict | None]) 
         },
         "spacing": analysis.standing.spacing,
         "complete": len(found) == tried,
+    }
+
+
+def update_json(update: MapUpdate, document: Mapping[str, Any]) -> Json:
+    """Return the answer of an update; `document` is the old map, whose frame and notes the new one has."""
+    changed = {"segments": update.segments.endpoints.tolist(), "sigma": update.sigma}
+    pairs = zip(update.changes, update.accepted, strict=True)
+    return {
+        "map": {**document, **changed},
+        "changes": [_change_json(one, accepted=accepted) for one, accepted in pairs],
+        "scans": update.usable.scans + update.held_back.scans,
+        "usable_before": update.usable.before + update.held_back.before,
+        "usable_after": update.usable.after + update.held_back.after,
+        "held_back": {
+            "scans": update.held_back.scans,
+            "usable_before": update.held_back.before,
+            "usable_after": update.held_back.after,
+        },
+        "sharpened": {
+            "segments": update.sharpened.segments.tolist(),
+            "sigma": update.sharpened.sigma.tolist(),
+        },
+        "refused_visits": [asdict(one) for one in update.refused_visits],
+        "complete": update.complete,
+    }
+
+
+def _change_json(one: Change, *, accepted: bool) -> Json:
+    told = one.evidence
+    return {
+        "code": one.code,
+        "segments": list(one.segments),
+        "new": [
+            {"segment": ends, "sigma": sigma} for ends, sigma in zip(one.new.tolist(), one.sigma.tolist(), strict=True)
+        ],
+        "evidence": {
+            "beams_through": told.beams_through,
+            "beams_on": told.beams_on,
+            "poses": told.poses,
+            "visits": told.visits,
+            "from": told.first,
+            "to": told.last,
+        },
+        "confidence": one.confidence,
+        "accepted": accepted,
     }
 
 

@@ -1,7 +1,8 @@
-"""Quality of a map: its doubtful parts, and the poses at which a robot would fail to localize.
+"""Quality of a map: its doubtful parts, the poses at which a robot would fail to localize, and what has changed.
 
 `check` examines a map alone and with sample scans taken in it. `analyze` puts a virtual scanner on a grid of poses and
-searches each of its scans in the map. Both call the search as a program would; a finding never changes an answer.
+searches each of its scans in the map. `update` proposes changes that scans of several visits show. All call the search
+as a program would; a finding never changes an answer.
 """
 
 from .analyze.analyze import Analysis, PlaceVerdict
@@ -11,22 +12,33 @@ from .check.judging import judge_samples
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
 from .check.thickness import conclude, find_thickness, fit_better_mirrored, thickness_finding
+from .update.result import Change, ChangeCode, Evidence, MapUpdate, RefusedVisit, Usable
+from .update.scans import UpdateError, VisitScan
+from .update.update import update, updating
 from .views import AnalysisError, Robot
 
 __all__ = [
     "Advice",
     "Analysis",
     "AnalysisError",
+    "Change",
+    "ChangeCode",
+    "Evidence",
     "Finding",
     "FindingCode",
     "MapCheck",
+    "MapUpdate",
     "Place",
     "PlaceVerdict",
+    "RefusedVisit",
     "Robot",
     "Sample",
     "SampleReport",
     "Size",
     "Standing",
+    "UpdateError",
+    "Usable",
+    "VisitScan",
     "check_map",
     "conclude",
     "find_thickness",
@@ -35,4 +47,6 @@ __all__ = [
     "standing_places",
     "thickness_finding",
     "try_sample",
+    "update",
+    "updating",
 ]

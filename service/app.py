@@ -27,7 +27,19 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import analyze, associate, batch, check, importing, maps, operations, pages, register, vectorize
+from .http.routes import (
+    analyze,
+    associate,
+    batch,
+    check,
+    importing,
+    maps,
+    operations,
+    pages,
+    register,
+    update,
+    vectorize,
+)
 from .http.services import KEY, Services
 from .importing.folders import remove_abandoned
 from .importing.reader import Bounds
@@ -83,7 +95,7 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started | None =
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
     # In the order in which they are tried: robots come most often, and the paths of what is done with a map are also
     # those of a map. An included router would be one more layer for each of them.
-    for module in (associate, register, batch, vectorize, check, analyze, importing, maps, operations, pages):
+    for module in (associate, register, batch, vectorize, check, analyze, update, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     for route in app.router.routes:
         if isinstance(route, APIRoute):

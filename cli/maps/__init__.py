@@ -1,4 +1,4 @@
-"""``linefix map``: maps of other tools in, maps checked, drawn, stored."""
+"""``linefix map``: maps of other tools in, maps checked, updated, drawn, stored."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from .checking import check
 from .drawing import draw
 from .importing import import_map
 from .storing import get, list_maps, put, remove
+from .updating import update
 
-app = typer.Typer(name="map", rich_markup_mode=None, help="Import, check, draw and store maps.")
+app = typer.Typer(name="map", rich_markup_mode=None, help="Import, check, update, draw and store maps.")
 app.command("import")(import_map)
 app.command()(check)
+app.command()(update)
 app.command()(draw)
 app.command()(put)
 app.command("list")(list_maps)

@@ -19,6 +19,7 @@ from ..options import AsJson, Picture, Server, grouped
 from ..printing import noted, print_json, print_rows
 from .checking import check_rows, samples_of
 from .drawing import write_document
+from .updating import update_by_drive, update_rows
 
 if TYPE_CHECKING:
     from formats import ImportOptions
@@ -129,6 +130,9 @@ def import_map(
             help="A log with scans of the building: estimate the thickness of walls drawn by centre lines from it.",
         ),
     ] = None,
+    update: Annotated[
+        bool, typer.Option("--update", help="Improve the map with the scans of --log; see map update.")
+    ] = False,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -137,9 +141,16 @@ def import_map(
         raise WrongUseError(
             "--log: not possible with --server; omit --server, and store the map with linefix map put afterwards"
         )
+    if update and log is None:
+        raise WrongUseError("--update: found no log, expected one; add --log FILE with scans of the building")
     answer = imported(file, said, server)
     if log is not None:
         answer = beside_log(answer, file, said, log)
+    rows = [*report_rows(answer), *check_rows(answer["check"])]
+    if update and log is not None:
+        updated = update_by_drive(answer["map"], log)
+        rows += update_rows(updated)
+        answer = {**answer, "map": updated.pop("map"), "update": updated}
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
@@ -150,7 +161,7 @@ def import_map(
     if as_json:
         print_json(answer)
     else:
-        print_rows([*report_rows(answer), *check_rows(answer["check"])])
+        print_rows(rows)
 
 
 def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:

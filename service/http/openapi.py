@@ -11,7 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from ..admission.grants import GUARDED
-from ..schemas import analysis, parts, replies, requests
+from ..schemas import analysis, parts, replies, requests, updates
 from ..schemas.encoding import encode
 from ..threads import Threads
 
@@ -34,6 +34,7 @@ _REQUESTS = (
     requests.CheckRequest,
     analysis.AnalyzeRequest,
     analysis.MapAnalyzeRequest,
+    updates.UpdateRequest,
     parts.MapDocument,
 )
 

@@ -200,6 +200,18 @@ class MapLookup:
         segments = Segments.from_array(asked.segments, argument="map.segments")
         return MapIndex.build(segments, asked.sigma, deadline=deadline)
 
+    def document(self, found: FoundMap) -> MapDocument:
+        """Return the document of a stored map; runs off the event loop.
+
+        Raises
+        ------
+        StoreError
+            When it has changed since it was found, or cannot be had again.
+        ParserEndedError
+            When the process that parses a large one ends meanwhile.
+        """
+        return self._document(found)
+
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
         return self._index(self._document(found), oriented)
 

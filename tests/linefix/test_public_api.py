@@ -27,6 +27,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "locating",
         "map_answers",
         "mounted",
+        "updating",
         "Any",
         "TYPE_CHECKING",
     }

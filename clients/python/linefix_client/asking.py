@@ -179,6 +179,11 @@ def check_of(map_id: str, body: Any) -> Question:
     return Question("GET" if body is None else "POST", map_path(map_id) + ":check", body)
 
 
+def update_of(map_id: str, body: Any) -> Question:
+    """Return the request for an update of a stored map."""
+    return Question("POST", map_path(map_id) + ":update", body)
+
+
 def import_of(files: Sequence[tuple[str, bytes]], fields: Mapping[str, str | Sequence[str]] | None) -> Question:
     """Return the request for an import."""
     return Question("POST", "/v1/maps:import", form=Form(files, fields or {}))

@@ -25,6 +25,7 @@ from .asking import (
     if_match,
     import_of,
     map_path,
+    update_of,
     wait_before_next,
 )
 from .problems import UnreachableError
@@ -139,6 +140,10 @@ class Client:
     def analyze(self, body: schema.MapAnalyzeRequest) -> schema.AnalyzeAnswer:
         """Simulate scans all over a map and report where localization succeeds; takes long on a large map."""
         return cast(schema.AnalyzeAnswer, self._ask(Question("POST", "/v1/analyze", body)))
+
+    def update_map(self, map_id: str, body: schema.UpdateRequest) -> schema.UpdateAnswer:
+        """Propose changes of a stored map that scans of several visits show; `put_map` accepts them."""
+        return cast(schema.UpdateAnswer, self._ask(update_of(map_id, body)))
 
     def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""
@@ -262,6 +267,10 @@ class AsyncClient:
     async def analyze(self, body: schema.MapAnalyzeRequest) -> schema.AnalyzeAnswer:
         """Simulate scans all over a map and report where localization succeeds; takes long on a large map."""
         return cast(schema.AnalyzeAnswer, await self._ask(Question("POST", "/v1/analyze", body)))
+
+    async def update_map(self, map_id: str, body: schema.UpdateRequest) -> schema.UpdateAnswer:
+        """Propose changes of a stored map that scans of several visits show; `put_map` accepts them."""
+        return cast(schema.UpdateAnswer, await self._ask(update_of(map_id, body)))
 
     async def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""

@@ -59,6 +59,19 @@ class CorrespondenceAnswer(TypedDict):
     alternatives: list[int]
 
 
+EvidenceAnswer = TypedDict(
+    "EvidenceAnswer",
+    {
+        "beams_through": int,
+        "beams_on": int,
+        "poses": int,
+        "visits": int,
+        "from": str,
+        "to": str,
+    },
+)
+
+
 class FindingAnswer(TypedDict):
     """
     A finding of a check.
@@ -84,6 +97,16 @@ class FindingAnswer(TypedDict):
     message: str
     segments: list[int]
     count: int
+
+
+class HeldBackAnswer(TypedDict):
+    """
+    Scans that gave no evidence, and test the proposal.
+    """
+
+    scans: int
+    usable_before: int
+    usable_after: int
 
 
 class ImportTimingAnswer(TypedDict):
@@ -178,6 +201,27 @@ class MapSummaryAnswer(TypedDict):
     oriented: bool | None
 
 
+class NewMapAnswer(TypedDict):
+    """
+    The new map, as PUT takes it.
+    """
+
+    segments: list[list[float]]
+    sigma: float | None
+    oriented: bool | None
+    frame_id: str
+    meta: Any
+
+
+class NewSegmentAnswer(TypedDict):
+    """
+    A segment of the new map.
+    """
+
+    segment: list[float]
+    sigma: float
+
+
 class NoteAnswer(TypedDict):
     """
     One thing that an import did.
@@ -257,6 +301,15 @@ class ReasonAnswer(TypedDict):
         "map_mismatch",
         "insufficient_evidence",
     ]
+    message: str
+
+
+class RefusedVisitAnswer(TypedDict):
+    """
+    A visit that gives no evidence.
+    """
+
+    visit: str
     message: str
 
 
@@ -357,6 +410,15 @@ class SegmentOfView(TypedDict):
 
     view: int
     scan: int
+
+
+class SharpenedAnswer(TypedDict):
+    """
+    Walls that are in the new map at better positions; only of a map that declares a sigma of 8 mm or more.
+    """
+
+    segments: list[int]
+    sigma: list[float]
 
 
 class SizeAnswer(TypedDict):
@@ -629,6 +691,21 @@ class Twist(TypedDict):
     omega: float
 
 
+class UpdateScan(TypedDict):
+    """
+    A scan as ranges, and optionally the pose of it that the robot assumed.
+    """
+
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
+    laser: Laser
+    sigma: NotRequired[float | None]
+    twist: NotRequired[Twist | None]
+    pose: NotRequired[Pose | None]
+    covariance: NotRequired[list[list[float]] | None]
+
+
 class VectorizeOptions(TypedDict):
     """
     How to cut points into segments.
@@ -650,6 +727,15 @@ class VectorizeRequest(TypedDict):
     twist: NotRequired[Twist | None]
     viewpoint: NotRequired[list[float] | None]
     options: NotRequired[VectorizeOptions]
+
+
+class Visit(TypedDict):
+    """
+    Scans of one visit to the building, such as a drive or a day.
+    """
+
+    visit: str
+    scans: list[UpdateScan]
 
 
 class AlternativeAnswer(TypedDict):
@@ -692,6 +778,19 @@ class AnalyzedPlaceAnswer(TypedDict):
     ]
     resolved_after: float | None
     with_landmark: WithLandmarkAnswer | None
+
+
+class ChangeAnswer(TypedDict):
+    """
+    A proposed change.
+    """
+
+    code: Literal["removed", "added", "moved", "extended", "shortened"]
+    segments: list[int]
+    new: list[NewSegmentAnswer]
+    evidence: EvidenceAnswer
+    confidence: float
+    accepted: bool
 
 
 class CriticalWallAnswer(TypedDict):
@@ -773,6 +872,26 @@ class ScansAnswer(TypedDict):
     report: ReportAnswer
     request_id: str
     timing_ms: ScansTimingAnswer
+
+
+class UpdateAnswer(TypedDict):
+    """
+    Proposed changes of a map; nothing is stored.
+    """
+
+    map: NewMapAnswer
+    based_on: MapReference
+    changes: list[ChangeAnswer]
+    scans: int
+    usable_before: int
+    usable_after: int
+    held_back: HeldBackAnswer
+    sharpened: SharpenedAnswer
+    refused_visits: list[RefusedVisitAnswer]
+    complete: bool
+    client_ref: Any
+    request_id: str
+    timing_ms: TimingAnswer
 
 
 class VectorizeAnswer(TypedDict):
@@ -906,6 +1025,18 @@ class SegmentView(TypedDict):
     covariance: NotRequired[list[list[float]] | None]
     relative_to: NotRequired[int | None]
     viewpoint: NotRequired[list[float] | None]
+
+
+class UpdateRequest(TypedDict):
+    """
+    Scans of several visits, from which changes of the map are learned.
+    """
+
+    visits: list[Visit]
+    accept: NotRequired[float | None]
+    refuse: NotRequired[list[int]]
+    deadline_ms: NotRequired[float | None]
+    client_ref: NotRequired[Any]
 
 
 class ViewsScan(TypedDict):

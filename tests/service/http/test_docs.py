@@ -23,6 +23,7 @@ PAGES = (
     "check",
     "import",
     "analyze",
+    "update",
     "errors",
     "operations",
 )
@@ -48,6 +49,7 @@ def test_there_are_examples() -> None:
         "/v1/associate",
         "/v1/maps/hq-3:check",
         "/v1/maps/hq-3:analyze",
+        "/v1/maps/hq-3:update",
     ]
 
 
@@ -63,6 +65,9 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
         assert len(answer.json()["segments"]) == 1
     elif path.endswith(":analyze"):
         assert answer.json()["summary"]["usable"] > 20
+    elif path.endswith(":update"):
+        assert (answer.json()["changes"], answer.json()["scans"]) == ([], 2)
+        assert answer.json()["map"]["segments"] == json.loads(STORED[0][1])["segments"]
     elif path.endswith(":check"):
         assert (answer.json()["findings"], answer.json()["samples"]["usable"]) == ([], 1)
     else:

@@ -77,6 +77,7 @@ OPERATIONS = [
     ("POST", "/v1/maps/{map_id}:check"),
     ("POST", "/v1/analyze"),
     ("POST", "/v1/maps/{map_id}:analyze"),
+    ("POST", "/v1/maps/{map_id}:update"),
     ("GET", "/v1/limits"),
     ("GET", "/version"),
     ("GET", "/livez"),

@@ -1,0 +1,199 @@
+"""The tables of map updates."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+import map_quality
+from association import Deadline, MapIndex
+from map_quality import MapUpdate, VisitScan
+from map_quality.update.scans import search
+from registration import RigidTransform, Segments
+from simulation import FAMILIES, SimulationError
+
+from ..outcomes import progress
+from ..table import Row, at_least, at_most, print_rows, within
+from .grids import errors, grid_map
+from .judging import Judged, is_false, judge
+from .scenes import Scene, draw, drawn, flipped, off_scale, visits, with_poses
+
+VISITS, PLACES = 5, 60
+MAP_SIGMA = 0.005  # m
+
+
+def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = False, own: bool = True) -> list[Row]:
+    """Return the rows about changes of buildings in which a fifth of what can move has moved."""
+    judged, usable, seconds = [], np.zeros(3), []
+    for scene in drawn(families, seeds, PLACES):
+        one, counts, took = _update(scene, listing=listing, own=own)
+        judged.append(one)
+        usable += counts
+        seconds.append(took)
+        progress(f"upkeep, {scene.family}", len(judged), len(families) * len(seeds))
+    total = Judged(*(sum(getattr(one, name) for one in judged) for name in Judged.__slots__))
+    return [
+        at_least(f"changes found, of {total.shown} that scans show", total.found / max(1, total.shown), 0.9),
+        at_least(f"  changes found, of all {total.all}", total.found / max(1, total.all)),
+        at_most(f"false changes, of {total.proposed} proposed", total.false / max(1, total.proposed), 0.02),
+        at_least("usable scans on the new map, of what the true map gives", usable[1] / usable[2], 0.98),
+        at_least("  on the old map", usable[0] / usable[2]),
+        at_most(f"  seconds for {VISITS * PLACES} scans, median", float(np.median(seconds)), form=".1f"),
+    ]
+
+
+def _update(scene: Scene, *, listing: bool, own: bool) -> tuple[Judged, np.ndarray, float]:
+    rng = np.random.default_rng(7)
+    taken = list(visits(scene, VISITS, rng))
+    scans = with_poses(taken, rng) if own else [one for one, _ in taken]
+    begun = time.perf_counter()
+    update = map_quality.update(MapIndex.build(scene.mapped.segments, MAP_SIGMA), scans)
+    took = time.perf_counter() - begun
+    judged = judge(scene, [(one.visit, at) for one, at in taken], update)
+    maps = (scene.mapped.segments, update.segments, scene.today.segments)
+    counts = [_usable(MapIndex.build(one, MAP_SIGMA), taken) for one in maps]
+    if listing:
+        _list(scene, update, judged)
+    return judged, np.array(counts), took
+
+
+def _usable(index: MapIndex, taken: Sequence[tuple[VisitScan, RigidTransform]]) -> int:
+    """Return how many scans are usable on a map, without a pose of their own."""
+    return sum(search(index, one, Deadline()).usable for one, _ in taken[:: VISITS - 1])
+
+
+def _list(scene: Scene, update: MapUpdate, judged: Judged) -> None:
+    print(f"{scene.family}: {judged}, {update.usable}, {update.held_back}, {len(update.refused_visits)} refused")
+    for one in update.changes:
+        if is_false(one, scene):
+            print("  false:", one.code, one.segments, one.new.round(2).tolist(), one.evidence, one.confidence)
+
+
+def sharper(families: Sequence[str], seeds: Sequence[int]) -> list[Row]:
+    """Return the rows about maps of grids of 5 cm cells after 300 scans."""
+    before, after, ratios = [], [], []
+    for scene in drawn(families, seeds, PLACES, 0.0):
+        rng = np.random.default_rng(11)
+        old = grid_map(scene.mapped.segments, rng)
+        taken = list(visits(scene, VISITS, rng))
+        update = map_quality.update(MapIndex.build(old.segments, old.sigma), with_poses(taken, rng))
+        sharp = update.sharpened
+        error = errors(sharp.ends, scene.mapped.segments)
+        known = ~np.isnan(error)
+        blurred = errors(old.segments.endpoints[sharp.segments], scene.mapped.segments)
+        before.append(blurred[~np.isnan(blurred)])
+        after.append(error[known])
+        ratios.append((error[known] / sharp.sigma[known]) ** 2)
+        progress(f"upkeep, grids, {scene.family}", len(after), len(families) * len(seeds))
+    if not sum(map(len, after)):
+        return []
+    one, two, nees = np.concatenate(before), np.concatenate(after), np.concatenate(ratios)
+    return [
+        at_most(
+            f"RMS of {len(two)} walls of 5 cm grids after {VISITS * PLACES} scans, mm", 1e3 * _rms(two), 8.0, form=".1f"
+        ),
+        at_most("  before, mm", 1e3 * _rms(one), form=".1f"),
+        within("  NEES of their sigma, mean", float(nees.mean()), 0.7, 1.5, form=".2f"),
+    ]
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+ROUNDS, ROUND_VISITS, ROUND_PLACES = 10, 2, 40
+
+
+def rounds(families: Sequence[str], seeds: Sequence[int]) -> list[Row]:
+    """Return the rows about ten updates one after the other, with people and doors, of buildings that stay the same."""
+    drift, wrong, done = [], 0, 0
+    for scene in drawn(families, seeds, ROUND_PLACES, 0.0):
+        rng, sigma = np.random.default_rng(13), 0.01
+        segments: Segments = scene.mapped.segments
+        for _ in range(ROUNDS):
+            taken = list(visits(scene, ROUND_VISITS, rng, doors=True))
+            update = map_quality.update(MapIndex.build(segments, sigma), with_poses(taken, rng))
+            wrong += sum(is_false(one, scene, segments) for one in update.changes)
+            segments, sigma = update.segments, update.sigma or sigma
+        off = errors(segments.endpoints, scene.mapped.segments)
+        drift.append(_rms(off[~np.isnan(off)]))
+        done += 1
+        progress(f"upkeep, rounds, {scene.family}", done, len(families) * len(seeds))
+    return [
+        at_most(f"drift after {ROUNDS} updates, worst of {done} buildings, mm", 1e3 * max(drift), 10.0, form=".1f"),
+        at_most("  wrong walls", float(wrong), 0.0, form=".0f"),
+    ]
+
+
+def foreign(families: Sequence[str], logs: int) -> list[Row]:
+    """Return the rows about scans of other buildings, of mirrored lasers and off scale: nothing may be proposed."""
+    proposed: dict[str, int] = {}
+    tried: dict[str, int] = {}
+    for number in range(logs):
+        own, other = (families[(number + k) % len(families)] for k in (0, 1))
+        try:
+            mapped, strange = draw(own, 100 + number, 8), draw(other, 500 + number, 8)
+        except SimulationError:
+            continue
+        rng, kind = np.random.default_rng(number), ("another building", "mirrored", "off scale by 2 %")[number % 3]
+        scans = [one for one, _ in visits(strange if number % 3 == 0 else mapped, 3, rng)]
+        if kind == "mirrored":
+            scans = flipped(scans)
+        elif kind != "another building":
+            scans = off_scale(scans, 1.02 if number % 2 else 0.98)
+        update = map_quality.update(MapIndex.build(mapped.mapped.segments, MAP_SIGMA), scans)
+        proposed[kind] = proposed.get(kind, 0) + bool(update.changes)
+        tried[kind] = tried.get(kind, 0) + 1
+        progress("upkeep, foreign logs", number + 1, logs)
+    return [
+        at_most(f"logs with proposed changes: {kind}, {tried[kind]} logs", float(proposed[kind]), 0.0, form=".0f")
+        for kind in tried
+    ]
+
+
+def speed(families: Sequence[str], scans: int, least: int) -> list[Row]:
+    """Return the rows about many scans in a large map: buildings next to one another."""
+    rng = np.random.default_rng(17)
+    shift, seed = 0.0, 0
+    walls: list[np.ndarray] = []
+    taken: list[list[VisitScan]] = []
+    while sum(len(one) for one in walls) < least:
+        scene = draw(families[seed % len(families)], seed, PLACES)
+        low, high = (f(scene.mapped.segments.endpoints[:, [0, 2]]) for f in (np.min, np.max))
+        walls.append(scene.mapped.segments.endpoints + np.array([shift - low, 0.0, shift - low, 0.0]))
+        taken.append([one for one, _ in visits(scene, VISITS, rng)])
+        shift, seed = shift + float(high - low) + 20.0, seed + 1
+    together = [one for some in zip(*taken, strict=True) for one in some][:scans]
+    index = MapIndex.build(Segments.from_array(np.concatenate(walls)), MAP_SIGMA)
+    map_quality.update(index, together[:20])
+    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    map_quality.update(index, together)
+    took, most = time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    what = f"{len(together)} scans in a map of {len(index.segments)} segments"
+    return [
+        at_most(f"seconds of a core for {what}", took, 20.0, form=".1f"),
+        at_most("  memory of the process at most, MB", most / 1024.0, 500.0, form=".0f"),
+        at_most("  of this before the update, MB", before / 1024.0, form=".0f"),
+    ]
+
+
+def upkeep(quick: int) -> list[Row]:
+    """Return the rows of all tables; buildings of which none is fitted on."""
+    families = [name for name, one in FAMILIES.items() if one.held_out]
+    seeds = range(max(1, 4 // quick))
+    parts: dict[str, Callable[[], list[Row]]] = {
+        "changes": lambda: changes(families, seeds),
+        "walls of grids": lambda: sharper(families, seeds[: max(1, len(seeds) // 2)]),
+        "rounds": lambda: rounds(families, seeds[:1]),
+        "foreign logs": lambda: foreign(families, max(6, 1000 // quick)),
+        "speed": lambda: speed(families, max(100, 1000 // quick), max(500, 2000 // quick)),
+    }
+    rows: list[Row] = []
+    for name, part in parts.items():
+        found = part()
+        print_rows(f"Map updates: {name}", found)
+        rows += found
+    return rows

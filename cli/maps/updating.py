@@ -1,0 +1,165 @@
+"""``linefix map update``: changes of a building, found in the scans of several visits."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from .. import here
+from ..asking import whole_map
+from ..contract import Json
+from ..errors import WrongUseError
+from ..inputs import line_map_of, needing_formats, read_map_or_id
+from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
+from ..options import AsJson, MapArgument, Picture
+from ..printing import print_json, print_rows
+from .drawing import write_document
+
+if TYPE_CHECKING:
+    from formats import LoggedScan
+
+SCANS = 200  # of a log; more cost time, and say the same again
+
+
+def update(
+    on: MapArgument,
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="A log of each visit; changes need two visits.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the new map to this file: json, dxf, svg, geojson or csv."),
+    ] = None,
+    picture: Picture = None,
+    accept: Annotated[
+        float | None,
+        typer.Option(
+            metavar="CONFIDENCE", min=0.0, max=1.0, help="Leave changes of less confidence out. Default: accept all."
+        ),
+    ] = None,
+    refuse: Annotated[
+        list[int] | None, typer.Option(metavar="INDEX", help="Leave this change out; repeat for more changes.")
+    ] = None,
+    scans: Annotated[int, typer.Option(metavar="N", min=3, help="Use so many scans of each log at most.")] = SCANS,
+    topic: Topic = None,
+    tf_namespace: TfNamespace = None,
+    as_json: AsJson = False,
+) -> None:
+    """Propose changes of a map that the scans of several visits show, and write the new map."""
+    target = read_map_or_id(on)
+    visits = dict(zip(visit_names(logs), (_scans(log, topic, tf_namespace, scans) for log in logs), strict=True))
+    answer = here.update(target, visits, accept, tuple(refuse or ()))
+    if out is not None:
+        write_document(answer["map"], out)
+    if picture is not None:
+        draw_changes(whole_map(target, None), answer, picture)
+    if as_json:
+        print_json(answer)
+    else:
+        print_rows(list(update_rows(answer)))
+
+
+def visit_names(logs: list[Path]) -> list[str]:
+    """Return a name for each visit: that of its log.
+
+    Raises
+    ------
+    WrongUseError
+        When a log is there twice.
+    """
+    if len({log.resolve() for log in logs}) < len(logs):
+        raise WrongUseError("LOG: found the same log twice, expected a log of each visit")
+    names = [log.name for log in logs]
+    return names if len(set(names)) == len(names) else [str(log) for log in logs]
+
+
+def _scans(log: Path, topic: str | None, tf_namespace: str | None, most: int) -> list[LoggedScan]:
+    """Return some scans of a log, evenly over all of it; print on stderr what was made of the log."""
+    source = opened(log, options_of(topic, tf_namespace))
+    taken = thinned(scans_of(source), most)
+    print_notes(source, sys.stderr)
+    return taken
+
+
+def thinned(found: Iterable[LoggedScan], most: int) -> list[LoggedScan]:
+    """Return at most so many, evenly over all, without all of them in memory."""
+    kept: list[LoggedScan] = []
+    step = 1
+    for number, one in enumerate(found):
+        if number % step:
+            continue
+        kept.append(one)
+        if len(kept) > most:
+            kept, step = kept[::2], 2 * step
+    return kept
+
+
+def update_by_drive(document: Json, log: Path) -> Json:
+    """Return the update of a map by one log; its halves count as two visits.
+
+    Raises
+    ------
+    RefusedError
+        When the log, or a scan, is not taken.
+    """
+    scans = _scans(log, None, None, 2 * SCANS)
+    half = len(scans) // 2
+    halves = {"first half": scans[:half], "second half": scans[half:]}
+    return here.update(document, halves, None, ())
+
+
+def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
+    """Yield a proposal as text for people."""
+    for one in answer["refused_visits"]:
+        yield "visit", f"{one['visit']} gives no evidence: {one['message']}"
+    for number, one in enumerate(answer["changes"]):
+        told = one["evidence"]
+        kept = "" if one["accepted"] else ", not accepted"
+        old = f" segments {', '.join(map(str, one['segments'][:8]))}{', ...' * (len(one['segments']) > 8)}"
+        new = f" {len(one['new'])} new"
+        yield (
+            f"change {number}",
+            f"{one['code']}{old * bool(one['segments'])}{new * bool(one['new'])}: confidence {one['confidence']:.4f}, "
+            f"{told['poses']} poses, {told['visits']} visits, {told['beams_through']} beams through, "
+            f"{told['beams_on']} on{kept}",
+        )
+    if not answer["changes"]:
+        yield "change", "none"
+    sharp = answer["sharpened"]["sigma"]
+    if sharp:
+        yield (
+            "sharper",
+            f"{len(sharp)} walls at better positions, sigma {1e3 * float(np.median(sharp)):.1f} mm (median)",
+        )
+    held = answer["held_back"]
+    yield "scans", f"{answer['usable_before']} of {answer['scans']} usable before, {answer['usable_after']} after"
+    yield (
+        "held back",
+        f"{held['usable_before']} of {held['scans']} usable before, {held['usable_after']} after; "
+        "they gave no evidence",
+    )
+    if not answer["complete"]:
+        yield "note", "the time limit ended the update; changes that were not verified are not proposed"
+
+
+def draw_changes(old: Json, answer: Json, picture: Path) -> None:
+    """Draw the old map, and the changes in colours: old walls that go dashed, new walls solid."""
+    with needing_formats("drawing a picture"):
+        from formats import draw_map
+        from formats.colours import CHANGES, rgb
+        from formats.picture import DrawnLines
+
+        line_map = line_map_of(old)
+        ends = line_map.segments.endpoints
+        lines = []
+        for code, colour in CHANGES.items():
+            mine = [one for one in answer["changes"] if one["code"] == code]
+            gone = [ends[k] for one in mine for k in one["segments"] if code != "extended"]
+            new = [one["segment"] for change in mine for one in change["new"]]
+            lines.append(DrawnLines(np.array(new).reshape(-1, 4), rgb(colour), code))
+            name = code if code == "removed" else f"{code}, before"
+            lines.append(DrawnLines(np.array(gone).reshape(-1, 4), rgb(colour), name, dashed=True))
+        draw_map(line_map, picture, lines=lines)

@@ -1,0 +1,1 @@
+"""Changes of a building that scans show, found in the scans that were localized in its map."""

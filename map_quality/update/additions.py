@@ -1,0 +1,200 @@
+"""Walls that are not in the map, from the lines of many scans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Segments
+
+from .scans import Localized
+from .tuning import (
+    BIN,
+    FULLY_ON_MAP,
+    LEAST_PIECE,
+    LEAST_POSES,
+    LEAST_SEEN,
+    LEAST_VISITS,
+    ON_MAP,
+    SAME_ANGLE,
+    SAME_GAP,
+    SAME_LINE,
+    SAME_SIDE,
+)
+from .walls import runs
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenLines:
+    """Lines of scans, in the map frame, that the map does not show.
+
+    Attributes
+    ----------
+    lines : Segments
+    visits : (n,)
+    places : (n, 2)
+        Squares in which they were seen from.
+    weights : (n,)
+        Information about the offset of each line, 1 / m^2.
+    """
+
+    lines: Segments
+    visits: Indices
+    places: Indices
+    weights: Floats
+
+    def take(self, rows: Indices | Bools) -> SeenLines:
+        """Return some of the lines."""
+        kept = np.flatnonzero(rows) if rows.dtype == bool else rows
+        return SeenLines(self.lines.take(kept), self.visits[kept], self.places[kept], self.weights[kept])
+
+
+def unexplained(found: Sequence[Localized], known: Segments) -> SeenLines:
+    """Return the lines of scans that lie along no wall of the map, or only in part."""
+    ends, visits, places, weights = [], [], [], []
+    for one in found:
+        seen = one.scan.measured
+        long = np.flatnonzero(seen.segments.lengths >= LEAST_SEEN)
+        lines = Segments.derived(one.pose.apply(seen.segments.endpoints[long].reshape(-1, 2)).reshape(-1, 4))
+        new = _fraction_on_map(lines, known) < FULLY_ON_MAP
+        rows = long[new]
+        ends.append(lines.endpoints[new])
+        visits.append(np.full(len(rows), one.visit))
+        places.append(np.tile(one.place, (len(rows), 1)))
+        weights.append(np.maximum(seen.point_counts[rows], 1.0) / np.maximum(seen.sigma[rows], 1e-3) ** 2)
+    if not ends:
+        nothing = np.zeros(0, dtype=np.intp)
+        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 2), dtype=np.intp), np.zeros(0))
+    return SeenLines(
+        Segments.derived(np.concatenate(ends)), np.concatenate(visits), np.concatenate(places), np.concatenate(weights)
+    )
+
+
+def _fraction_on_map(lines: Segments, known: Segments) -> Floats:
+    """Return which fraction of each line lies along walls of the map that face the same way, at most 1, (n,)."""
+    parallel = lines.directions @ known.directions.T >= np.cos(2.0 * SAME_ANGLE)
+    beside = np.abs(lines.midpoints @ known.normals.T - known.offsets[None, :]) <= ON_MAP
+    rows, walls = np.nonzero(parallel & beside)
+    direction = lines.directions[rows]
+    ends = [np.einsum("ij,ij->i", known.endpoints[walls, k : k + 2] - lines.endpoints[rows, :2], direction)
+            for k in (0, 2)]  # fmt: skip
+    low, high = np.maximum(np.minimum(*ends), 0.0), np.minimum(np.maximum(*ends), lines.lengths[rows])
+    covered = np.bincount(rows, np.maximum(0.0, high - low), len(lines))
+    return np.asarray(np.minimum(1.0, covered / lines.lengths))
+
+
+def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
+    """Join lines of several scans to walls that may be new.
+
+    Parameters
+    ----------
+    seen : SeenLines
+    known : Segments
+        Of the map; what lies along them, or along a longer new wall, is left out.
+
+    Returns
+    -------
+    (k, 4)
+        Their ends, metres, free space on the left.
+    (k,)
+        Standard deviation of each normal to itself, metres.
+    """
+    walls: list[Floats] = []
+    sigmas: list[float] = []
+    left = np.argsort(-seen.lines.lengths, kind="stable")
+    while len(left):
+        rest = seen.take(left)
+        mine = _along(rest)
+        left = left[~mine]
+        group = rest.take(mine)
+        if not _is_seen_often(group.visits, group.places):
+            continue
+        found = _pieces(group, known)
+        walls += [piece for piece, _ in found]
+        sigmas += [sigma for _, sigma in found]
+        if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
+            known = Segments.derived(np.concatenate([known.endpoints, [piece for piece, _ in found]]))
+    return np.array(walls).reshape(-1, 4), np.array(sigmas)
+
+
+def _is_seen_often(visits: Indices, places: Indices) -> bool:
+    return len(np.unique(visits)) >= LEAST_VISITS and len(np.unique(places, axis=0)) >= LEAST_POSES
+
+
+def _along(seen: SeenLines) -> Bools:
+    """Return which lines continue or repeat the first one, itself included."""
+    lines = seen.lines
+    direction, normal, offset = lines.directions[0], lines.normals[0], lines.offsets[0]
+    mine = lines.directions @ direction >= np.cos(SAME_ANGLE)
+    for ends in (lines.endpoints[:, :2], lines.endpoints[:, 2:]):
+        mine &= np.abs(ends @ normal - offset) <= SAME_LINE
+    begins, ends = lines.endpoints[:, :2] @ direction, lines.endpoints[:, 2:] @ direction
+    low, high = begins[0], ends[0]
+    inside = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
+    inside[0] = True
+    for _ in range(8):
+        low, high = begins[inside].min(), ends[inside].max()
+        more = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
+        if (more == inside).all():
+            break
+        inside = more | inside
+    return np.asarray(inside)
+
+
+def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
+    """Return the pieces of one line that several visits show, and that are no wall of the map, with their sigma."""
+    place, direction, sigma = _fit(group)
+    begins = (group.lines.endpoints[:, :2] - place) @ direction
+    ends = (group.lines.endpoints[:, 2:] - place) @ direction
+    low = float(begins.min())
+    count = int(np.ceil((float(ends.max()) - low) / BIN)) + 1
+    middles = low + BIN * (np.arange(count) + 0.5)
+    covered = np.zeros((int(group.visits.max()) + 1, count), dtype=bool)
+    for visit, begin, end in zip(group.visits, begins, ends, strict=True):
+        covered[visit] |= (middles >= begin) & (middles <= end)
+    new = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, place + middles[:, None] * direction, direction)
+    return [
+        (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
+        for a, b in runs(new)
+        if (b - a) * BIN >= LEAST_PIECE
+    ]
+
+
+def _fit(group: SeenLines) -> tuple[Floats, Floats, float]:
+    """Fit one line through lines: a place on it, its direction, and the standard deviation normal to it, metres."""
+    lines, weight = group.lines, group.weights
+    place = weight @ lines.midpoints / weight.sum()
+    off = lines.midpoints - place
+    half = 0.5 * lines.lengths[:, None] * lines.directions
+    spread = (off * weight[:, None]).T @ off + (half * weight[:, None]).T @ half / 3.0
+    direction: Floats = np.linalg.eigh(spread)[1][:, -1].astype(np.float64)
+    direction = direction if direction @ (weight @ lines.directions) > 0.0 else -direction
+    normal = np.array([-direction[1], direction[0]])
+    residuals = off @ normal
+    scatter = float(weight @ residuals**2 / weight.sum())
+    # Lines of one place share the error of its pose.
+    places = len(np.unique(group.places, axis=0))
+    return place, direction, float(np.sqrt(scatter / places + 1.0 / weight.sum()) + 0.002)
+
+
+def _on_map(known: Segments, points: Floats, direction: Floats) -> Bools:
+    """Return which points of a line lie on a wall of the map that faces about the same way, (k,).
+
+    A line across the sides of a round column is off their directions, too.
+    """
+    facing = np.flatnonzero(known.directions @ direction >= SAME_SIDE)
+    low, high = points.min(axis=0) - ON_MAP, points.max(axis=0) + ON_MAP
+    begins, ends = known.endpoints[facing, :2], known.endpoints[facing, 2:]
+    met = (np.maximum(begins, ends) >= low).all(axis=1) & (np.minimum(begins, ends) <= high).all(axis=1)
+    walls = known.take(facing[met])
+    off = points[:, None, :] - walls.endpoints[None, :, :2]
+    along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
+    gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
+    return np.asarray((gaps <= ON_MAP).any(axis=1))

@@ -1,0 +1,159 @@
+"""Beams of a scan that end on walls, or pass through them, in chunks along each wall."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Segments
+
+from .hanging import on_lines
+from .scans import Localized
+from .tuning import CHUNK, DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, MOST_BEAMS, THROUGH
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Chunks:
+    """Walls cut into pieces of about 0.2 m.
+
+    Attributes
+    ----------
+    walls : Segments
+        In the map frame.
+    first : (n + 1,)
+        The first chunk of each wall; chunks of a wall follow one another from its begin.
+    """
+
+    walls: Segments
+    first: Indices
+
+    @classmethod
+    def of(cls, walls: Segments) -> Chunks:
+        """Cut walls into chunks of equal length."""
+        counts = np.maximum(1, np.round(walls.lengths / CHUNK)).astype(np.intp)
+        return cls(walls, np.concatenate([[0], np.cumsum(counts)]).astype(np.intp))
+
+    def __len__(self) -> int:
+        return int(self.first[-1])
+
+    @property
+    def counts(self) -> Indices:
+        """Number of chunks of each wall, (n,)."""
+        return np.diff(self.first)
+
+    def of_wall(self, wall: int) -> slice:
+        """Return the chunks of a wall."""
+        return slice(int(self.first[wall]), int(self.first[wall + 1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """Beams of one scan at chunks of walls.
+
+    Attributes
+    ----------
+    chunks : (k,)
+        That beams meet, in order.
+    through, on, before : (k,)
+        Number of beams that pass through each, that end on it, and that end a little before it.
+    """
+
+    chunks: Indices
+    through: Indices
+    on: Indices
+    before: Indices
+
+    def and_behind(self, other: Followed, first: int) -> Followed:
+        """Return also the beams at further walls, whose chunks count from `first`."""
+        return Followed(
+            np.concatenate([self.chunks, other.chunks + first]),
+            np.concatenate([self.through, other.through]),
+            np.concatenate([self.on, other.on]),
+            np.concatenate([self.before, other.before]),
+        )
+
+
+def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, oriented: bool) -> Followed:
+    """Follow the beams of a scan through walls.
+
+    Parameters
+    ----------
+    chunks : Chunks
+    one : Localized
+    lines : (k, 3)
+        Lines of walls that the scan is no evidence for, as of `hanging_lines`.
+    sigma : float
+        Standard deviation of the walls, metres.
+    oriented : bool
+        True if a wall is seen from its left only.
+    """
+    origins, rays, ranges = beams_in_map(one)
+    near = _within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0)))
+    near = near[~on_lines(chunks.walls.take(near), lines)]
+    if not len(near) or not len(ranges):
+        return Followed(*(np.zeros(0, dtype=np.intp) for _ in range(4)))
+    walls = chunks.walls.take(near)
+    slant, across = rays @ walls.normals.T, rays @ walls.directions.T
+    to_line = walls.offsets[None, :] - origins @ walls.normals.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = to_line / slant
+        along = (
+            origins @ walls.directions.T
+            + distance * across
+            - np.einsum("ij,ij->i", walls.endpoints[:, :2], walls.directions)[None, :]
+        )
+        behind = (ranges[:, None] - distance) * np.abs(slant)
+        met = (np.abs(slant) >= LEAST_SLANT) & (distance > 0.0) & (along >= 0.0) & (along < walls.lengths[None, :])
+    beams, columns = np.nonzero(met)
+    gap, slanted, far = behind[beams, columns], slant[beams, columns], distance[beams, columns]
+    tolerance = _tolerance(one, sigma, far)
+    share = along[beams, columns] / walls.lengths[columns]
+    counts = chunks.counts[near[columns]]
+    chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
+    facing = (slanted < 0.0) | (not oriented)
+    # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
+    deep = along[beams, columns] + THROUGH * tolerance / np.abs(slanted) * across[beams, columns]
+    within = (deep >= 0.0) & (deep <= walls.lengths[columns])
+    passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
+    hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
+    seen, where = np.unique(chunk, return_inverse=True)
+    return Followed(seen, *(np.bincount(where[one], minlength=len(seen)) for one in (passed, ended, hidden)))
+
+
+def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
+    """Return the beams that came back: their origins (m, 2), unit directions (m, 2), and ranges (m,); map frame.
+
+    A beam without return is no evidence: dark and transparent walls return none.
+    """
+    beams = one.scan.beams
+    assert beams is not None
+    assert one.scan.viewpoint is not None
+    known = np.flatnonzero(np.isfinite(beams.ranges) & (beams.ranges < beams.range_max))
+    known = known[:: max(1, math.ceil(len(known) / MOST_BEAMS))]
+    at = np.tile(one.scan.viewpoint, (len(known), 1)) if beams.origins is None else beams.origins[known]
+    angles = beams.angles[known] + one.pose.theta
+    return one.pose.apply(at), np.stack([np.cos(angles), np.sin(angles)], axis=1), beams.ranges[known]
+
+
+def _within(walls: Segments, place: Floats, reach: float) -> Indices:
+    """Return the walls that come nearer than `reach` to a place."""
+    off = place - walls.endpoints[:, :2]
+    along = np.clip(np.einsum("ij,ij->i", off, walls.directions), 0.0, walls.lengths)
+    gaps = off - along[:, None] * walls.directions
+    return np.flatnonzero(np.einsum("ij,ij->i", gaps, gaps) <= (reach + 1.0) ** 2)
+
+
+def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
+    """Return how far a beam may end from a wall and still read it, metres."""
+    assert one.result.covariance is not None
+    position = float(np.linalg.eigvalsh(one.result.covariance[:2, :2]).max())
+    turn = float(one.result.covariance[2, 2])
+    noise = float(np.median(one.scan.measured.sigma)) if len(one.scan.measured) else 0.0
+    deviation = np.sqrt(noise**2 + sigma**2 + position + turn * distance**2)
+    return np.maximum(LEAST_TOLERANCE, DEVIATIONS * deviation)

@@ -1,0 +1,263 @@
+"""From evidence to drafts of changes: walls that belong together become one change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Segments
+
+from .evidence import WallEvidence
+from .result import Change, ChangeCode, Evidence
+from .tuning import (
+    CONTRADICTING,
+    DOOR_VISITS,
+    DOUBT_POSE,
+    DOUBT_VISIT,
+    JAMB,
+    JOINED,
+    LEAST_PIECE,
+    LEAST_POSES,
+    LEAST_VISITS,
+    LONGEST_LEAF,
+    MOST_CONFIDENCE,
+    NEAR_MOVE,
+    NEW_JOINED,
+    SAME_ANGLE,
+    SAME_GAP,
+    SAME_LENGTH,
+    SAME_LINE,
+)
+from .walls import Bools, Cut, find_cuts, runs
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+NO_WALLS = np.zeros((0, 4))
+NO_CHUNKS = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """A change before its evidence is counted.
+
+    Attributes
+    ----------
+    code : ChangeCode
+    segments : tuple of int
+        Of the map, that it replaces.
+    new : (k, 4)
+    sigma : (k,)
+    gone, there : (c,)
+        Chunks that it says are not there, and are there.
+    door : bool
+        True if a part of it may be the leaf of a door.
+    """
+
+    code: ChangeCode
+    segments: tuple[int, ...]
+    new: Floats
+    sigma: Floats
+    gone: Indices
+    there: Indices
+    door: bool = False
+
+    @property
+    def chunks(self) -> Indices:
+        """All chunks that it is about."""
+        return np.concatenate([self.gone, self.there])
+
+    def with_also(self, other: Draft, code: ChangeCode | None = None) -> Draft:
+        """Return one change that does both."""
+        return Draft(
+            code or self.code,
+            tuple(dict.fromkeys((*self.segments, *other.segments))),
+            np.concatenate([self.new, other.new]),
+            np.concatenate([self.sigma, other.sigma]),
+            np.concatenate([self.gone, other.gone]),
+            np.concatenate([self.there, other.there]),
+            self.door or other.door,
+        )
+
+
+def draft_changes(evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float) -> list[Draft]:
+    """Return the changes that the evidence shows.
+
+    Parameters
+    ----------
+    evidence : WallEvidence
+        About the walls of the map, and behind them about those that may be new.
+    known : Segments
+        Of the map.
+    sigmas : (k,)
+        Of the walls that may be new, metres.
+    sigma : float
+        Of the map's walls, metres.
+    """
+    cuts = find_cuts(evidence, len(known))
+    removed = [_removal(cut) for cut in cuts if not len(cut.left)]
+    shortened = [_shortening(cut, sigma) for cut in cuts if len(cut.left)]
+    extended, added = _new_walls(evidence, known, {cut.wall for cut in cuts}, sigmas)
+    ends = [known.endpoints[list(one.segments)] for one in removed]
+    removed = _joined(removed, ends, JOINED)
+    added = _joined(added, [one.new for one in added], NEW_JOINED)
+    moved, removed, added = _moves(removed, added, known)
+    return [*moved, *removed, *added, *extended, *shortened]
+
+
+def _removal(cut: Cut) -> Draft:
+    return Draft("removed", (cut.wall,), NO_WALLS, np.zeros(0), cut.chunks, NO_CHUNKS)
+
+
+def _shortening(cut: Cut, sigma: float) -> Draft:
+    return Draft("shortened", (cut.wall,), cut.left, np.full(len(cut.left), sigma), cut.chunks, NO_CHUNKS)
+
+
+def _new_walls(
+    evidence: WallEvidence, known: Segments, cut: set[int], sigmas: Floats
+) -> tuple[list[Draft], list[Draft]]:
+    """Return extensions of walls of the map, one for each wall, and walls that continue none."""
+    extended: dict[int, Draft] = {}
+    added = []
+    there, gone = evidence.there, evidence.gone
+    for number, sigma in enumerate(sigmas):
+        wall = len(known) + number
+        own = evidence.chunks.of_wall(wall)
+        for begin, end in runs(_filled(there[own], gone[own])):
+            piece = _part(evidence, wall, begin, end)
+            chunks = own.start + begin + np.flatnonzero(there[own][begin:end])
+            if np.hypot(*(piece[2:] - piece[:2])) < LEAST_PIECE:
+                continue
+            old = _continued(known, piece)
+            if old is None or old in cut:
+                door = _may_be_door(known, piece)
+                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, door))
+                continue
+            before = extended.get(old)
+            line = known.endpoints[old] if before is None else before.new[0]
+            whole = _prolonged(known, old, line, piece)
+            door = _may_be_door(known, piece)
+            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks, door)
+            if before is not None:
+                both = np.concatenate([before.there, chunks])
+                one = replace(one, there=both, door=door or before.door)
+            extended[old] = one
+    return list(extended.values()), added
+
+
+def _filled(there: Bools, gone: Bools) -> Bools:
+    """Return the chunks that are there, with single ones between them of which nothing is known."""
+    out = there.copy()
+    out[1:-1] |= there[:-2] & there[2:] & ~gone[1:-1]
+    return out
+
+
+def _part(evidence: WallEvidence, wall: int, begin: int, end: int) -> Floats:
+    """Return the ends of some chunks of a wall, (4,)."""
+    walls, count = evidence.chunks.walls, evidence.chunks.counts[wall]
+    step, place, along = walls.lengths[wall] / count, walls.endpoints[wall, :2], walls.directions[wall]
+    return np.concatenate([place + begin * step * along, place + end * step * along])
+
+
+def _continued(known: Segments, piece: Floats) -> int | None:
+    """Return the wall of the map that a new piece continues; None if there is none."""
+    along = piece[2:] - piece[:2]
+    direction = along / np.hypot(*along)
+    parallel = known.directions @ direction >= np.cos(SAME_ANGLE)
+    middle = 0.5 * (piece[:2] + piece[2:])
+    beside = np.abs(known.normals @ middle - known.offsets) <= SAME_LINE
+    begin = known.endpoints[:, :2] @ direction - piece[2:] @ direction
+    end = piece[:2] @ direction - known.endpoints[:, 2:] @ direction
+    gaps = np.maximum(begin, end)  # the wall lies ahead of the piece, or behind it
+    fitting = np.flatnonzero(parallel & beside & (gaps <= SAME_GAP) & (gaps >= -SAME_GAP))
+    return int(fitting[np.argmin(np.abs(gaps[fitting]))]) if len(fitting) else None
+
+
+def _may_be_door(known: Segments, piece: Floats) -> bool:
+    """Return whether a new wall is no longer than the leaf of a door, and begins or ends at the end of another wall."""
+    if np.hypot(*(piece[2:] - piece[:2])) > LONGEST_LEAF:
+        return False
+    gaps = known.endpoints.reshape(-1, 1, 2) - piece.reshape(1, 2, 2)
+    return bool(np.linalg.norm(gaps, axis=2).min() <= JAMB)
+
+
+def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Floats:
+    """Return a wall of the map that reaches as far as a piece that continues it, (4,)."""
+    place, along = known.endpoints[wall, :2], known.directions[wall]
+    reach = [(point - place) @ along for point in (line[:2], line[2:], piece[:2], piece[2:])]
+    return np.concatenate([place + min(reach) * along, place + max(reach) * along])
+
+
+def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float) -> list[Draft]:
+    """Join changes of walls whose ends are near one another: they are one thing."""
+    label = list(range(len(drafts)))
+    corners = [one.reshape(-1, 2) for one in ends]
+    for k in range(len(drafts)):
+        for other in range(k):
+            apart = np.linalg.norm(corners[k][:, None] - corners[other][None], axis=2)
+            if apart.min() <= gap:
+                old, new = label[k], label[other]
+                label = [new if one == old else one for one in label]
+    joined: dict[int, Draft] = {}
+    for one, of in zip(drafts, label, strict=True):
+        joined[of] = joined[of].with_also(one) if of in joined else one
+    return list(joined.values())
+
+
+def _moves(removed: list[Draft], added: list[Draft], known: Segments) -> tuple[list[Draft], list[Draft], list[Draft]]:
+    """Pair things that are gone with new ones of the same sides nearby; return moves, and what is left of both."""
+    moves, taken = [], set()
+    left = []
+    for old in removed:
+        sides = known.lengths[list(old.segments)]
+        middle = known.midpoints[list(old.segments)].mean(axis=0)
+        near = []
+        for k, new in enumerate(added):
+            if k in taken or not _fits(np.hypot(*(new.new[:, 2:] - new.new[:, :2]).T), sides):
+                continue
+            away = float(np.hypot(*(new.new.reshape(-1, 2).mean(axis=0) - middle)))
+            if away <= NEAR_MOVE:
+                near.append((away, k))
+        if near:
+            _, k = min(near)
+            taken.add(k)
+            moves.append(old.with_also(added[k], "moved"))
+        else:
+            left.append(old)
+    return moves, left, [one for k, one in enumerate(added) if k not in taken]
+
+
+def _fits(new: Floats, old: Floats) -> bool:
+    """Return whether each new side has an old one of its own that is as long; some may be hidden."""
+    free = sorted(old.tolist())
+    for length in sorted(new.tolist(), reverse=True):
+        best = min(free, key=lambda one: abs(one - length), default=None)
+        if best is None or abs(best - length) > SAME_LENGTH:
+            return False
+        free.remove(best)
+    return True
+
+
+def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Change | None:
+    """Return a change with its evidence; None if too little shows it, or too much contradicts it."""
+    through = int(evidence.through[:, draft.gone].sum())
+    on = int(evidence.on[:, draft.there].sum())
+    against = int(evidence.on[:, draft.gone].sum() + evidence.through[:, draft.there].sum())
+    if against > CONTRADICTING * (through + on + against):
+        return None
+    agreeing = np.zeros(len(names), dtype=bool)
+    poses = []
+    for chunks, is_on in ((draft.gone, False), (draft.there, True)):
+        if len(chunks):
+            agreeing |= evidence.visits_of(chunks, on=is_on)
+            poses.append(evidence.places_of(chunks, on=is_on))
+    visits = np.flatnonzero(agreeing)
+    if len(visits) < (DOOR_VISITS if draft.door else LEAST_VISITS) or min(poses) < LEAST_POSES:
+        return None
+    doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
+    told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])
+    return Change(
+        draft.code, draft.segments, draft.new, draft.sigma, told, float(np.clip(1.0 - doubt, 0.01, MOST_CONFIDENCE))
+    )

@@ -1,0 +1,280 @@
+"""Scans of several visits, and the poses that the search finds for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
+from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
+
+from .result import RefusedVisit
+from .tuning import (
+    AGREEING,
+    HELD_BACK,
+    LEAST_SCANS,
+    LEAST_USABLE,
+    MOST_OWN_SIGMA,
+    MOST_SIGMA,
+    MOST_TURN_SIGMA,
+    OFF_SCALE,
+    PLACE,
+    SURE_OF_SCALE,
+)
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
+DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_ranges", "scan_exceeds_map"))
+
+
+# Reasons that changes of a building alone may give.
+OF_OLD_MAPS = frozenset(("map_mismatch", "insufficient_evidence", "not_on_map"))
+
+
+class UpdateError(InputError):
+    """A scan cannot be evidence of a change."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisitScan:
+    """A scan with ranges, and the visit that it was taken on.
+
+    Attributes
+    ----------
+    scan : Scan
+        With its beams.
+    visit : str
+        Scans of one visit share it. A visit should be short, such as a drive or a day.
+    pose : RigidTransform or None
+        Pose as the sender knows it, map_from_scan; a prior of the search, which finds the pose in any case. A pose that
+        is not usable, because the map is too old there, is evidence if this pose confirms it.
+    covariance : (3, 3) or None
+        Of additive (x, y, theta) of `pose`; required with it.
+
+    Raises
+    ------
+    UpdateError
+        When the scan has no beams, or a pose comes without its covariance.
+    """
+
+    scan: Scan
+    visit: str
+    pose: RigidTransform | None = None
+    covariance: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.scan.beams is None or self.scan.viewpoint is None:
+            raise UpdateError("found a scan without ranges, expected ranges; segments do not show free space",
+                              argument="scan")  # fmt: skip
+        if (self.pose is None) != (self.covariance is None):
+            missing = "covariance" if self.covariance is None else "pose"
+            raise UpdateError("found none, expected pose and covariance together, or neither", argument=missing)
+
+    @property
+    def prior(self) -> SoftPrior | None:
+        """The stated pose as a prior."""
+        if self.pose is None or self.covariance is None:
+            return None
+        return SoftPrior(self.pose, self.covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Localized:
+    """A scan and its pose.
+
+    Attributes
+    ----------
+    number : int
+        Of the scan, in the order in which they came.
+    visit : int
+        Number of its visit.
+    scan : Scan
+    result : AssociationResult
+    on : Segments
+        The map that it was searched in; the result's correspondences name its segments.
+    held_back : bool
+        True if it gives no evidence, and tests the new map.
+    vouched : bool
+        True if the sender's own pose confirms one that is not usable because of the map's age.
+    """
+
+    number: int
+    visit: int
+    scan: Scan
+    result: AssociationResult
+    on: Segments
+    held_back: bool
+    vouched: bool = False
+
+    @property
+    def usable(self) -> bool:
+        """Return whether a robot may use the answer."""
+        return self.result.usable
+
+    @property
+    def located(self) -> bool:
+        """Return whether its pose is known: it is usable, or the sender vouches for it."""
+        return self.usable or self.vouched
+
+    @property
+    def precise(self) -> bool:
+        """Return whether the pose is known well enough, without a warning about the ranges."""
+        if not self.located or self.result.covariance is None:
+            return False
+        x, y, theta = np.sqrt(np.diag(self.result.covariance))
+        doubtful = any(one.code in DOUBTFUL for one in self.result.warnings)
+        return bool(max(x, y) <= MOST_SIGMA and theta <= MOST_TURN_SIGMA) and not doubtful
+
+    @property
+    def pose(self) -> RigidTransform:
+        """The pose of a usable scan, map_from_scan."""
+        assert self.result.pose is not None
+        return self.result.pose
+
+    @property
+    def score(self) -> float:
+        """Of its consensus set, nats; 0 where nothing was matched."""
+        return 0.0 if self.result.diagnostics is None else self.result.diagnostics.score
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """The square that it was taken in."""
+        return math.floor(self.pose.x / PLACE), math.floor(self.pose.y / PLACE)
+
+    @property
+    def pairs(self) -> Correspondences:
+        """The correspondences, by scan segment."""
+        pairs = [(one.scan, one.map) for one in self.result.correspondences]
+        return Correspondences.of(self.on, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
+
+
+def visit_numbers(scans: Sequence[VisitScan]) -> tuple[list[str], list[int]]:
+    """Return the names of the visits in the order in which they came, and the number of each scan's visit."""
+    names = list(dict.fromkeys(one.visit for one in scans))
+    numbers = {name: k for k, name in enumerate(names)}
+    return names, [numbers[one.visit] for one in scans]
+
+
+def held_back(visits: Sequence[int]) -> list[bool]:
+    """Return which scans are held back: one in ten of each visit."""
+    counts: dict[int, int] = {}
+    held = []
+    for visit in visits:
+        counts[visit] = counts.get(visit, -1) + 1
+        held.append(counts[visit] % HELD_BACK == HELD_BACK // 2)
+    return held
+
+
+def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
+    """Search a scan in a map, with the directions that count in the index.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    oriented = len(index.segments) == index.directed
+    options = AssociationOptions(max_alternatives=0, oriented=oriented, parts=("correspondences",))
+    return associate(index, one.scan, one.prior, options, deadline)
+
+
+def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
+    """Return whether the sender's pose confirms a pose that is not usable for reasons that an old map gives."""
+    if one.pose is None or one.covariance is None or result.pose is None or result.covariance is None:
+        return False
+    if not {reason.code for reason in result.reasons} <= OF_OLD_MAPS or result.usable:
+        return False
+    x, y, _ = np.sqrt(np.diag(one.covariance))
+    away = np.array([result.pose.x - one.pose.x, result.pose.y - one.pose.y,
+                     wrap_angle(result.pose.theta - one.pose.theta)])  # fmt: skip
+    square = float(away @ np.linalg.solve(np.asarray(one.covariance) + result.covariance, away))
+    return bool(max(x, y) <= MOST_OWN_SIGMA and square <= AGREEING)
+
+
+def choose_evidence(
+    names: Sequence[str], found: Sequence[Localized], sigma: float
+) -> tuple[list[Localized], list[RefusedVisit]]:
+    """Return the scans that give evidence, and the visits that give none.
+
+    A visit of another building has few usable scans. A laser with a wrong scale leaves residuals that grow with the
+    distance of the walls.
+    """
+    chosen: list[Localized] = []
+    refused: list[RefusedVisit] = []
+    for number, name in enumerate(names):
+        own = [one for one in found if one.visit == number]
+        precise = [one for one in own if one.precise]
+        told = _doubt(own, precise, sigma)
+        if told is None:
+            chosen += [one for one in precise if not one.held_back]
+        else:
+            refused.append(RefusedVisit(name, told))
+    return chosen, refused
+
+
+def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float) -> str | None:
+    """Return why a visit gives no evidence; None if it does."""
+    sure = sum(one.usable for one in precise)
+    if sure < max(LEAST_SCANS, LEAST_USABLE * len(own)):
+        return (
+            f"{sure} of {len(own)} scans are usable and precise, expected at least "
+            f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building."
+        )
+    factor, sigma_of_factor = scale_of(precise, sigma)
+    if sigma_of_factor > SURE_OF_SCALE:
+        return (
+            f"The scale of the scans is known to {100.0 * sigma_of_factor:.1f} % only, expected "
+            f"{100.0 * SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
+        )
+    if abs(factor) > OFF_SCALE:
+        return (
+            f"Lengths of the scans are off by {100.0 * factor:.1f} % from those of the map, expected at most "
+            f"{100.0 * OFF_SCALE:g} %. Check the scale of the map and of the ranges."
+        )
+    return None
+
+
+def scale_of(found: Sequence[Localized], sigma: float) -> tuple[float, float]:
+    """Estimate by which fraction the lengths of scans are off from those of the map.
+
+    The offset of a scan line from its wall is ``q s + k b + g . d`` with its lever arm ``q`` along the wall's normal,
+    the fraction ``s``, the cosine ``k`` between ray and normal, an error ``b`` of all ranges, and the error ``d`` of
+    the pose. Poses are marginal: only walls of one direction at several distances tell the scale.
+
+    Returns
+    -------
+    float
+        The fraction, above 0 where ranges are too long.
+    float
+        Its standard deviation.
+    """
+    information, right, square, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
+    for one in found:
+        pairs, c, s = one.pairs, math.cos(one.pose.theta), math.sin(one.pose.theta)
+        turn = np.array([[c, s], [-s, c]])
+        viewed, turned = (pairs.midpoints - np.asarray(one.scan.viewpoint)) @ turn, pairs.midpoints @ turn
+        normals, offsets = pairs.map_normals, np.array([pair.offset for pair in one.result.correspondences])
+        arms = np.einsum("ij,ij->i", normals, viewed)
+        scale = np.column_stack([arms, arms / np.maximum(np.hypot(*viewed.T), 1e-6)])
+        lever = normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]
+        pose = np.column_stack([normals, lever])
+        weight = 1.0 / (pairs.variances + sigma**2)
+        own = (pose * weight[:, None]).T @ pose + 1e-3 * np.eye(3)
+        gain = np.linalg.solve(own, (pose * weight[:, None]).T @ np.column_stack([scale, offsets]))
+        both = (scale * weight[:, None]).T @ np.column_stack([scale, offsets, pose])
+        information += both[:, :2] - both[:, 3:] @ gain[:, :2]
+        right += both[:, 2] - both[:, 3:] @ gain[:, 2]
+        square += float(weight @ offsets**2 - ((weight * offsets) @ pose) @ gain[:, 2])
+        count += len(offsets) - 3
+    # Of the range error 5 cm are usual; without that, and the scale of 10 %, they are not told apart in square rooms.
+    information += np.diag([1.0 / 0.1**2, 1.0 / 0.05**2])
+    covariance = np.linalg.inv(information)
+    solution = covariance @ right
+    inflation = max(1.0, (square - float(right @ solution)) / max(1, count))
+    return float(solution[0]), math.sqrt(covariance[0, 0] * inflation)

@@ -1,0 +1,226 @@
+"""The position of walls from all scans together: the joint estimator over poses and walls, poses marginal.
+
+A pair of a scan line and a wall has two residuals, to first order in the pose ``(x, y, theta)`` of its scan, and in the
+offset ``c`` and the tilt ``phi`` of its wall::
+
+    r + n . (dx, dy) + n . (R m)_perp dtheta - c - s phi   of variance sigma^2 / points
+    e + dtheta - phi                                       of variance sigma^2 / (points spread)
+
+with the map line's normal ``n``, the centroid ``m`` of the scan line, and its place ``s`` along the wall. The map's
+declared sigma is the prior of the walls. The normal equations are summed scan by scan, and the Schur complement takes
+each pose out: a pose that hangs on one wall tells nothing of that wall.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import MapIndex
+from registration import Segments
+
+from .result import Sharpened
+from .scans import Localized
+from .tuning import (
+    ANGLE_FLOOR,
+    CORNER,
+    CORNER_SINE,
+    FREE_POSE,
+    LEAST_POSES,
+    LEAST_VISITS,
+    LINE_FLOOR,
+    MOST_TILT,
+    OUTLYING,
+    SHARPER,
+)
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Pairs of scan lines and walls of all scans: rows of the normal equations, two for each pair.
+
+    Attributes
+    ----------
+    scan, wall : (m,)
+        Number of the scan, and of the wall.
+    of_pose, of_wall : (m, 3), (m, 2)
+        Derivatives by pose and by wall.
+    residual, variance : (m,)
+    """
+
+    scan: Indices
+    wall: Indices
+    of_pose: Floats
+    of_wall: Floats
+    residual: Floats
+    variance: Floats
+
+    def take(self, rows: Bools) -> _Pairs:
+        """Return some of the rows."""
+        return _Pairs(*(getattr(self, name)[rows] for name in self.__slots__))
+
+
+def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float) -> Sharpened:
+    """Estimate the position of the walls that many scans see.
+
+    Parameters
+    ----------
+    index : MapIndex
+        That the scans were searched in.
+    found : sequence of Localized
+        Scans that give evidence.
+    sigma : float
+        Declared standard deviation of the map's lines, metres.
+
+    Returns
+    -------
+    Sharpened
+        Of walls that several visits and places see, and whose position becomes clearly better known.
+    """
+    known = Segments.derived(index.segments.endpoints[: index.directed])
+    wall_of = np.asarray(index.wall_of_piece[: index.directed], dtype=np.intp)
+    walls, wall_of = np.unique(wall_of, return_inverse=True)
+    middles, lengths = _extents(known, wall_of, len(walls))
+    pairs = _pairs_of(known, wall_of, middles, found)
+    prior = np.stack([np.full(len(walls), sigma), np.minimum(MOST_TILT, 2.0 * sigma / lengths)], axis=1)
+    shift, covariance = _solve(pairs, prior)
+    off = np.abs(pairs.residual - np.einsum("ij,ij->i", pairs.of_wall, shift[pairs.wall]))
+    inliers = off <= OUTLYING * np.sqrt(pairs.variance + sigma**2)
+    shift, covariance = _solve(pairs.take(inliers), prior)
+    spread = _deviations(known, wall_of, middles, covariance)
+    widest = np.zeros(len(walls))
+    np.maximum.at(widest, wall_of, spread)
+    better = _seen_often(pairs, found, len(walls)) & (widest <= SHARPER * sigma)
+    better &= np.abs(shift[:, 0]) <= OUTLYING * sigma
+    moved = np.flatnonzero(better[wall_of])
+    ends = _moved(known, wall_of, middles, np.where(better[:, None], shift, 0.0))
+    ends = _joined(known, ends, better[wall_of])
+    return Sharpened(moved, ends[moved], spread[moved])
+
+
+def _extents(known: Segments, wall_of: Indices, count: int) -> tuple[Floats, Floats]:
+    """Return the middle (n, 2) of each wall, weighted by its pieces, and its length (n,), gaps included."""
+    weight = np.bincount(wall_of, known.lengths, count)
+    middles = np.stack([np.bincount(wall_of, known.lengths * known.midpoints[:, k], count) / weight for k in (0, 1)], 1)
+    reach = [np.einsum("ij,ij->i", known.endpoints[:, k : k + 2] - middles[wall_of], known.directions) for k in (0, 2)]
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, wall_of, np.minimum(*reach))
+    np.maximum.at(high, wall_of, np.maximum(*reach))
+    return middles, np.maximum(high - low, 1e-3)
+
+
+def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequence[Localized]) -> _Pairs:
+    """Return the rows of all pairs, those of offsets before those of angles in each scan."""
+    parts: list[_Pairs] = []
+    for number, one in enumerate(found):
+        pairs = one.pairs
+        on = np.array([pair.map for pair in one.result.correspondences], dtype=np.intp)
+        wall, normals = wall_of[on], known.normals[on]
+        c, s = np.cos(one.pose.theta), np.sin(one.pose.theta)
+        turned = pairs.centroids @ np.array([[c, s], [-s, c]])
+        places = turned + np.array([one.pose.x, one.pose.y])
+        lever = normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]
+        along = np.einsum("ij,ij->i", places - middles[wall], known.directions[on])
+        zero, one_ = np.zeros(len(on)), np.ones(len(on))
+        offset = np.einsum("ij,ij->i", normals, places) - known.offsets[on]
+        angle = -np.array([pair.angle for pair in one.result.correspondences])
+        angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi  # a map without directions has either
+        parts += [
+            _Pairs(
+                np.full(len(on), number),
+                wall,
+                np.column_stack([normals, lever]),
+                np.column_stack([one_, along]),
+                offset,
+                pairs.variances + LINE_FLOOR**2,
+            ),
+            _Pairs(
+                np.full(len(on), number),
+                wall,
+                np.column_stack([zero, zero, one_]),
+                np.column_stack([zero, one_]),
+                angle,
+                pairs.variances / np.maximum(pairs.spreads, 1e-6) + ANGLE_FLOOR**2,
+            ),
+        ]
+    return _Pairs(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Pairs.__slots__))
+
+
+def _solve(pairs: _Pairs, prior: Floats) -> tuple[Floats, Floats]:
+    """Return the shift of each wall, offset and tilt (n, 2), and its covariance (n, 2, 2); poses are marginal."""
+    count = 2 * len(prior)
+    information, right = np.diag(1.0 / np.square(prior).ravel()), np.zeros(count)
+    weight = 1.0 / pairs.variance
+    columns = 2 * pairs.wall[:, None] + np.arange(2)
+    order = np.argsort(pairs.scan, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(pairs.scan[order])) + 1):
+        w, pose, wall = weight[rows], pairs.of_pose[rows], pairs.of_wall[rows]
+        own, where = np.unique(columns[rows].ravel(), return_inverse=True)
+        jacobian = np.zeros((len(rows), len(own)))
+        jacobian[np.arange(len(rows))[:, None], where.reshape(-1, 2)] = wall
+        residual = pairs.residual[rows]
+        x, y = FREE_POSE
+        of_pose = (pose * w[:, None]).T @ pose + np.diag(1.0 / np.square([x, x, y]))
+        both, at_wall, at_pose = (pose * w[:, None]).T @ jacobian, jacobian.T @ (w * residual), pose.T @ (w * residual)
+        gain = np.linalg.solve(of_pose, np.column_stack([both, at_pose]))
+        information[np.ix_(own, own)] += (jacobian * w[:, None]).T @ jacobian - both.T @ gain[:, :-1]
+        right[own] += at_wall - both.T @ gain[:, -1]
+    covariance = np.linalg.inv(information)
+    blocks = covariance.reshape(len(prior), 2, len(prior), 2)
+    of_walls: Floats = np.asarray(blocks[np.arange(len(prior)), :, np.arange(len(prior)), :], dtype=np.float64)
+    return np.asarray((covariance @ right).reshape(-1, 2)), of_walls
+
+
+def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: Floats) -> Floats:
+    """Return the standard deviation of each segment normal to itself, the root mean square along it, (n,) metres."""
+    at = np.einsum("ij,ij->i", known.midpoints - middles[wall_of], known.directions)
+    own = covariance[wall_of]
+    square = own[:, 0, 0] + 2.0 * at * own[:, 0, 1] + (at**2 + known.lengths**2 / 12.0) * own[:, 1, 1]
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def _seen_often(pairs: _Pairs, found: Sequence[Localized], count: int) -> Bools:
+    """Return which walls are seen on several visits and from several places, (n,)."""
+    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
+    of_scan = np.array([(one.visit, places[one.place]) for one in found], dtype=np.intp).reshape(-1, 2)
+    often = np.ones(count, dtype=bool)
+    for column, least in ((0, LEAST_VISITS), (1, LEAST_POSES)):
+        seen = np.unique(np.stack([pairs.wall, of_scan[pairs.scan, column]], axis=1), axis=0)
+        often &= np.bincount(seen[:, 0], minlength=count) >= least
+    return often
+
+
+def _moved(known: Segments, wall_of: Indices, middles: Floats, shift: Floats) -> Floats:
+    """Return the ends of the segments of walls that are shifted and tilted, (n, 4)."""
+    out = known.endpoints.copy()
+    for k in (0, 2):
+        along = np.einsum("ij,ij->i", known.endpoints[:, k : k + 2] - middles[wall_of], known.directions)
+        out[:, k : k + 2] += (shift[wall_of, 0] + shift[wall_of, 1] * along)[:, None] * known.normals
+    return out
+
+
+def _joined(known: Segments, ends: Floats, moved: Bools) -> Floats:
+    """Return the ends with corners closed again: walls that moved end where they cross the wall that they met."""
+    new, out = Segments.derived(ends), ends.copy()
+    cells: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for k, corner in enumerate(np.round(known.endpoints.reshape(-1, 2) / CORNER).astype(int).tolist()):
+        cells.setdefault((corner[0], corner[1]), []).append((k // 2, 2 * (k % 2)))
+    for members in cells.values():
+        if len(members) != 2 or members[0][0] == members[1][0]:
+            continue
+        a, b = members[0][0], members[1][0]
+        normals = np.stack([new.normals[a], new.normals[b]])
+        if abs(float(np.linalg.det(normals))) < CORNER_SINE:
+            continue
+        point = np.linalg.solve(normals, [new.offsets[a], new.offsets[b]])
+        for wall, at in members:
+            if moved[wall]:
+                out[wall, at : at + 2] = point
+    return out

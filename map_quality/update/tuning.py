@@ -1,0 +1,79 @@
+"""Thresholds of map updates; `drawn` means chosen on buildings that `simulation` draws."""
+
+from __future__ import annotations
+
+import math
+
+# --- Scans that give evidence -----------------------------------------------------------------------------------------
+
+MOST_SIGMA, MOST_TURN_SIGMA = 0.05, math.radians(1.0)  # m, rad; deviations of a pose that is known well enough
+MOST_OWN_SIGMA = 0.5  # m; deviation of a sender's own pose that may confirm that of the search
+AGREEING = 11.3  # chi-square of 3 degrees of freedom, 99 %; of both poses
+LEAST_USABLE = 0.3  # fraction of a visit's scans, drawn; in another building nearly none are usable
+LEAST_SCANS = 3  # usable ones of a visit
+OFF_SCALE, SURE_OF_SCALE = 0.005, 0.0025  # fractions, drawn; lengths of a visit are off by, and known to
+HELD_BACK = 10  # one scan in so many gives no evidence, and tests the new map
+MOST_BEAMS = 720  # of a scan, time
+USUAL_SIGMA = 0.02  # m; of the walls of a map that does not declare it
+
+# --- Evidence of beams ------------------------------------------------------------------------------------------------
+
+CHUNK = 0.2  # m; walls are judged in pieces of about this length
+LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are no evidence
+LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
+DEVIATIONS = 3.0  # times the standard deviation, likewise
+THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
+HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
+PLACE = 0.5  # m; scans from the same square of this side count as one pose
+HANGING = 0.1  # m; deviation without a wall above which a pose depends on that wall, and is no evidence for it
+
+# --- Decisions about a chunk ------------------------------------------------------------------------------------------
+
+LEAST_BEAMS = 3  # of a visit
+FEW, MOST = 0.1, 0.7  # fractions of a visit's beams: those that contradict it, those that agree
+LEAST_VISITS, LEAST_POSES = 2, 3
+CONTRADICTING = 0.1  # fraction of all beams on a change, drawn
+
+# --- Changes ----------------------------------------------------------------------------------------------------------
+
+LEAST_GONE = 0.6  # fraction of a wall's length that is gone, if nothing reads the rest: the wall is removed
+THING = 30.0  # m; longest outline of a thing: a closed loop of walls
+LOOP_GAP = 0.01  # m; corners that are nearer are one
+LEAST_GONE_OF_THING = 0.3  # fraction of its outline that beams pass through, drawn
+FEW_ON_THING = 0.03  # fraction of the beams, drawn
+LEAST_CUT = 0.5  # m; a wall is shortened by no less
+LEAST_PIECE = 0.2  # m; that remains of a wall, or is added
+LEAST_SEEN = 0.25  # m; shorter lines of a scan do not suggest a wall
+SAME_ANGLE = math.radians(4.0)  # between lines of scans that show one wall
+SAME_LINE = 0.08  # m, likewise
+SAME_GAP = 0.3  # m; along the wall
+BIN = 0.05  # m; resolution of the ends of a new wall
+ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added
+SAME_SIDE = 0.5  # cosine between walls that face about the same way
+FULLY_ON_MAP = 0.85  # fraction of a scan line's length
+LONGEST_LEAF = 1.5  # m; of a door, and its width where it is a double door
+JAMB = 0.25  # m; between the end of a leaf and the end of a wall that it is fixed to, or shuts against
+DOOR_VISITS = 4  # that show a wall which may be a leaf; on fewer a door may happen to stand alike
+JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
+NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
+SAME_LENGTH = 0.15  # m; by which a side of a moved thing may differ
+
+# --- Sharper walls ----------------------------------------------------------------------------------------------------
+
+LEAST_BLUR = 0.008  # m; of a map's declared sigma below which its walls stay as they are
+SHARPER = 0.7  # times the declared sigma; the deviation of a wall above which it stays as it is
+LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one scan that do not average out
+MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
+FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
+OUTLYING = 4.0  # times the deviation; a line of a scan farther off its wall does not count
+CORNER, CORNER_SINE = 0.02, 0.35  # m, and sine of the angle; ends of two walls that are one corner
+
+# --- Confidence, and the check of the proposal ------------------------------------------------------------------------
+
+DOUBT_VISIT, DOUBT_POSE = 0.1, 0.7  # probability that a visit, or a pose, shows a change that is none; drawn
+MOST_CONFIDENCE = 0.9999
+LOWER_SCORE = 1.0  # nats; a change may lower the score of its scans by no more
+SAME_POSE = 0.3  # m; between the poses of one scan on the old and the new map
+FEWER_USABLE = 0.01  # fraction of the scans; a proposal that loses more is withdrawn
+DROPS = 3  # times that changes are dropped and the rest is verified again
+ROUNDS = 4  # scans that are usable on the new map only give more evidence

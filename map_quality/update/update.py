@@ -1,0 +1,298 @@
+"""The update of a map from scans of several visits."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import CancelledError, Deadline, MapIndex
+from registration import InvalidArgumentError, Segments
+
+from .additions import candidates, unexplained
+from .applying import apply, kept_indices, sharper_sigma, with_ends
+from .changes import Draft, change_of, draft_changes
+from .evidence import Gatherer, WallEvidence
+from .result import Change, MapUpdate, RefusedVisit, Sharpened
+from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
+from .sharpening import sharpen
+from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
+from .verifying import Proposed, is_better, keeps_usable, total_score, usable_of
+
+Floats = NDArray[np.float64]
+FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
+
+
+def update(
+    index: MapIndex,
+    scans: Sequence[VisitScan],
+    deadline: Deadline | None = None,
+    *,
+    accept: float | None = None,
+    refuse: Collection[int] = (),
+) -> MapUpdate:
+    """Propose changes of a map that scans of several visits show.
+
+    1. Localize: search each scan in the map. Usable and precise ones give evidence, except one in ten.
+    2. Suggest: join lines of scans that the map does not show to walls that may be new.
+    3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
+    4. Decide: at least two visits and three places agree, no visit contradicts.
+    5. Verify: search all scans in the new map. A change that lowers the score of its scans is dropped.
+    6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Directions count as they do in the index.
+    scans : sequence of VisitScan
+    deadline : Deadline, optional
+        If it passes before all is verified, nothing is proposed.
+    accept : float, optional
+        Confidence from 0 to 1 below which a change is proposed, but not in the new map. None: all are in it.
+    refuse : collection of int
+        Indices of proposed changes that are not in the new map.
+
+    Returns
+    -------
+    MapUpdate
+
+    Raises
+    ------
+    UpdateError
+        When there are no scans.
+    InvalidArgumentError
+        When `accept` or `refuse` is out of range.
+    CancelledError
+        When the deadline was cancelled.
+    """
+    steps = updating(index, scans, deadline, accept=accept, refuse=refuse)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            found: MapUpdate = done.value
+            return found
+
+
+def updating(
+    index: MapIndex,
+    scans: Sequence[VisitScan],
+    deadline: Deadline | None = None,
+    *,
+    accept: float | None = None,
+    refuse: Collection[int] = (),
+) -> Generator[None, None, MapUpdate]:
+    """Do what `update` does, one search at a step, and return the same; between steps others may have their turn.
+
+    Raises
+    ------
+    UpdateError, InvalidArgumentError, CancelledError
+        As `update`.
+    """
+    if not len(scans):
+        raise UpdateError("found no scans, expected scans of at least two visits", argument="scans")
+    if accept is not None and not 0.0 <= accept <= 1.0:
+        raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
+    begun = _Update.of(index, scans, deadline or Deadline())
+    names, _ = visit_numbers(scans)
+    first = yield from begun.localize()
+    latest, proposed = list(first), None
+    shown: list[tuple[str, tuple[int, ...], int]] = []
+    _, refused = choose_evidence(names, first, begun.sigma)
+    for number in range(ROUNDS):
+        chosen, _ = choose_evidence(names, latest, begun.sigma)
+        drafts, evidence = yield from begun.draft(chosen, names)
+        before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
+        if begun.deadline.passed:
+            break
+        if shown == before or number == ROUNDS - 1:
+            proposed = yield from begun.verify(drafts, evidence, first)
+            break
+        latest = yield from begun.search_others(drafts, first, latest)
+    sharper = (yield from begun.sharpen(proposed or Proposed(), first, names)) or proposed
+    return begun.proposal(sharper or Proposed(), first, refused, accept, refuse)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Update:
+    """An update in the making."""
+
+    index: MapIndex
+    scans: tuple[VisitScan, ...]
+    deadline: Deadline
+    gatherer: Gatherer
+
+    @classmethod
+    def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
+        """Begin an update."""
+        known = Segments.derived(index.segments.endpoints[: index.directed])
+        sigma, oriented = USUAL_SIGMA if index.sigma is None else index.sigma, len(index.segments) == index.directed
+        return cls(index, tuple(scans), deadline, Gatherer(known, sigma, oriented))
+
+    @property
+    def known(self) -> Segments:
+        """The map as sent."""
+        return self.gatherer.known
+
+    @property
+    def sigma(self) -> float:
+        """Of its walls, metres."""
+        return self.gatherer.sigma
+
+    def localize(self) -> Generator[None, None, list[Localized]]:
+        """Search all scans that there is time for."""
+        _, visits = visit_numbers(self.scans)
+        held, found = held_back(visits), []
+        now = time.monotonic()
+        at = math.inf if self.deadline.at is None else now + FIRST_SEARCHES * (self.deadline.at - now)
+        for number, one in enumerate(self.scans):
+            if self.deadline.cancelled:
+                raise CancelledError
+            if time.monotonic() > at:
+                break
+            result = search(self.index, one, self.deadline)
+            vouched = is_vouched(one, result)
+            found.append(
+                Localized(number, visits[number], one.scan, result, self.index.segments, held[number], vouched)
+            )
+            yield
+        return found
+
+    def draft(
+        self, chosen: Sequence[Localized], names: Sequence[str]
+    ) -> Generator[None, None, tuple[list[tuple[Draft, Change]], WallEvidence]]:
+        """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
+        known = self.known
+        new, sigmas = candidates(unexplained(chosen, known), known)
+        evidence = yield from self.gatherer.gather(Segments.derived(new), chosen, len(names))
+        drafts = draft_changes(evidence, known, sigmas, self.sigma)
+        told = [(one, change_of(one, evidence, names)) for one in drafts]
+        return [(one, change) for one, change in told if change is not None], evidence
+
+    def verify(
+        self, drafts: Sequence[tuple[Draft, Change]], evidence: WallEvidence, first: Sequence[Localized]
+    ) -> Generator[None, None, Proposed | None]:
+        """Search all scans on the new map; drop changes that lower the score of their scans, or move their poses.
+
+        Returns
+        -------
+        Proposed or None
+            The changes that remain; None if none remain, or if there is no time to verify them.
+        """
+        for _ in range(DROPS):
+            new = self._index(drafts) if drafts else None
+            if new is None:
+                return None
+            found = []
+            for one in first:
+                found.append((yield from self._search(new, one)))
+                if self.deadline.passed:
+                    return None
+            kept = [one for one in drafts if is_better(one[0], evidence, first, found)]
+            if len(kept) == len(drafts):
+                if not keeps_usable(first, found):
+                    return None
+                return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
+            drafts = kept
+        return None
+
+    def sharpen(
+        self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
+    ) -> Generator[None, None, Proposed | None]:
+        """Estimate the walls from all scans, and search all scans on the sharper map.
+
+        Returns
+        -------
+        Proposed or None
+            None if the map is sharp enough, if the sharper one fits the scans less, or if there is no time to try.
+        """
+        found = proposed.found or tuple(first)
+        chosen, _ = choose_evidence(names, found, self.sigma)
+        if self.index.sigma is None or self.index.sigma < LEAST_BLUR or not chosen or self.deadline.passed:
+            return None
+        whole = apply(self.known, proposed.changes)
+        if any(one.on is not chosen[0].on for one in chosen):
+            return None  # scans that were searched on different maps
+        index = self._indexed(whole)
+        better = sharpen(index, chosen, self.index.sigma)
+        old = kept_indices(len(self.known), proposed.changes)[better.segments]
+        mine = old >= 0
+        sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
+        if not mine.any():
+            return None
+        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
+        again = []
+        for one in first:
+            again.append((yield from self._search(new, one)))
+            if self.deadline.passed:
+                return None
+        if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
+            return None
+        return replace(proposed, found=tuple(again), sharpened=sharpened)
+
+    def _indexed(self, segments: Segments) -> MapIndex:
+        return MapIndex.build(segments, self.index.sigma, oriented=self.gatherer.oriented)
+
+    def search_others(
+        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]
+    ) -> Generator[None, None, list[Localized]]:
+        """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
+
+        Scans that were precise at first keep that pose, which depends on no change.
+        """
+        new = self._index(drafts)
+        if new is None:
+            return list(latest)
+        found = []
+        for one, now in zip(first, latest, strict=True):
+            again = not one.precise and not self.deadline.passed
+            found.append((yield from self._search(new, one)) if again else now)
+        return found
+
+    def _index(self, drafts: Sequence[tuple[Draft, Change]]) -> MapIndex | None:
+        """Return the index of the map with some changes; None if nothing of it is left."""
+        segments = apply(self.known, [change for _, change in drafts])
+        return self._indexed(segments) if len(segments) else None
+
+    def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
+        """Search one scan in another map."""
+        if self.deadline.cancelled:
+            raise CancelledError
+        sent = self.scans[one.number]
+        result = search(index, sent, self.deadline)
+        yield
+        return replace(one, result=result, on=index.segments, vouched=is_vouched(sent, result))
+
+    def proposal(
+        self,
+        proposed: Proposed,
+        first: Sequence[Localized],
+        refused: Sequence[RefusedVisit],
+        accept: float | None,
+        refuse: Collection[int],
+    ) -> MapUpdate:
+        """Return the proposal with the new map."""
+        changes = sorted(proposed.changes, key=lambda one: -one.confidence)
+        wrong = [k for k in refuse if not 0 <= k < len(changes)]
+        if wrong:
+            told = f"found {wrong[0]}, expected an index of the {len(changes)} proposed changes"
+            raise InvalidArgumentError(told, argument="refuse")
+        accepted = tuple(
+            (accept is None or one.confidence >= accept) and k not in refuse for k, one in enumerate(changes)
+        )
+        after, taken = proposed.found or first, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]
+        return MapUpdate(
+            apply(with_ends(self.known, proposed.sharpened), taken),
+            sharper_sigma(self.known, self.index.sigma, proposed.sharpened),
+            tuple(changes),
+            accepted,
+            usable_of(first, after, held=False),
+            usable_of(first, after, held=True),
+            proposed.sharpened,
+            tuple(refused),
+            len(first) == len(self.scans) and not self.deadline.passed,
+        )

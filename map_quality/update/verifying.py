@@ -1,0 +1,70 @@
+"""Scans on the old and on the new map: whether a proposal makes anything worse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .changes import Draft
+from .evidence import WallEvidence
+from .result import NOT_SHARPENED, Change, Sharpened, Usable
+from .scans import Localized
+from .tuning import FEWER_USABLE, LOWER_SCORE, SAME_POSE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposed:
+    """Verified changes.
+
+    Attributes
+    ----------
+    drafts : tuple of Draft
+    changes : tuple of Change
+        The same with their evidence.
+    found : tuple of Localized
+        All scans, searched on the new map; empty where nothing has changed.
+    sharpened : Sharpened
+    """
+
+    drafts: tuple[Draft, ...] = ()
+    changes: tuple[Change, ...] = ()
+    found: tuple[Localized, ...] = ()
+    sharpened: Sharpened = NOT_SHARPENED
+
+
+def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
+    """Return the score of the scans that were located before, nats."""
+    return sum(one.score for one, before in zip(found, of, strict=True) if before.located)
+
+
+def is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether a change leaves the poses of the scans that saw it, and does not lower their score."""
+    concerned = evidence.scans_of(draft.chunks)
+    gain = 0.0
+    for before, after in zip(first, found, strict=True):
+        if before.number not in concerned or not before.located:
+            continue
+        gain += after.score - before.score
+        if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
+            return False
+    return gain >= -LOWER_SCORE
+
+
+def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether hardly any usable scan fits the new map less, and may not be used there.
+
+    A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
+    its room looks like others.
+    """
+    lost = sum(
+        before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+        for before, after in zip(first, found, strict=True)
+    )
+    return lost <= max(1.0, FEWER_USABLE * len(first))
+
+
+def usable_of(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:
+    """Count the scans that are held back, or the others."""
+    chosen = [(one.usable, after.usable) for one, after in zip(first, found, strict=True) if one.held_back == held]
+    return Usable(len(chosen), sum(before for before, _ in chosen), sum(after for _, after in chosen))

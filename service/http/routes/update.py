@@ -1,0 +1,66 @@
+"""/v1/maps/{map_id}:update: what has changed in the building of a stored map."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+
+from ...admission.errors import DeadlinePassedError
+from ...maps.lookup import FoundMap
+from ...parsing.reading import read_model
+from ...schemas import examples
+from ...schemas.parts import StoredMap
+from ...schemas.updates import UpdateAnswer, UpdateRequest
+from ...work.job import Done, Job
+from ...work.updating import Progress, begin_update, take_steps, update_done
+from ..exchange import Exchange, begin_search
+from ..map_stage import index_map, looking_up
+from ..receiving import read
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from .maps import MapIdPath
+
+router = APIRouter(tags=["maps"])
+_FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
+
+
+@router.post(
+    "/v1/maps/{map_id}:update",
+    operation_id="update_map",
+    response_model=UpdateAnswer,
+    responses=problems(*_FAILS, *READS_BODY),
+    openapi_extra=takes(UpdateRequest, {"two visits": examples.UPDATE}),
+    summary="Propose changes of a stored map",
+)
+async def post_update(request: Request, map_id: MapIdPath) -> Response:
+    """Propose changes of a map that scans of several visits show; nothing is stored."""
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, UpdateRequest))
+    job = exchange.job(asked.deadline_ms)
+    return await answer(exchange, _work(exchange, map_id, asked, job), job.deadline)
+
+
+async def _work(exchange: Exchange, map_id: str, asked: UpdateRequest, job: Job) -> Done:
+    """Index the map in one slot at the gate, and go through the scans in as many short ones as it takes."""
+    lookup = exchange.services.lookup
+    async with looking_up(exchange, StoredMap(map_id=map_id), job.deadline, oriented=None) as on:
+        assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
+        await index_map(exchange, on, job.deadline, oriented=None)
+        work = partial(begin_update, lookup, on, asked, job)
+        progress = await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    await _take_steps(exchange, progress, job)
+    return await exchange.services.parse_threads.run(partial(update_done, progress, asked, job))
+
+
+async def _take_steps(exchange: Exchange, progress: Progress, job: Job) -> None:
+    """Go on on one core, so that an update leaves the others to searches that robots wait for."""
+    work = partial(take_steps, progress, job.deadline)
+    try:
+        while await in_slot(exchange, work, job.deadline):
+            await asyncio.sleep(0)
+    except DeadlinePassedError:  # no slot is left: it then ends without a proposal, and searches nothing
+        while await exchange.services.parse_threads.run(work):
+            await asyncio.sleep(0)

@@ -1,0 +1,118 @@
+"""Updates of maps, in steps of one slot of the gate: a scan, or the evidence of all, at a step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+from association import CancelledError, Deadline
+from linefix.answers import Json
+from linefix.map_answers import update_json
+from map_quality import MapUpdate, VisitScan, updating
+from registration import InputError
+
+from ..admission.errors import DeadlinePassedError
+from ..maps.lookup import FoundMap, MapLookup
+from ..schemas.errors import Fault, InvalidRequestError
+from ..schemas.updates import UpdateRequest
+from .association import reference_to
+from .inputs import fault_of, scanned_of, transform_of
+from .job import Done, Job
+
+TURN_SECONDS = 0.1  # of the gate, before others have theirs
+
+
+@dataclass(slots=True)
+class Progress:
+    """An update in the making; one per request.
+
+    Attributes
+    ----------
+    steps : generator
+    document : dict
+        Fields of the old map that the new one has.
+    reference : dict or None
+        Id and revision of the old map.
+    update : MapUpdate or None
+        Once it is done.
+    """
+
+    steps: Generator[None, None, MapUpdate]
+    document: Json
+    reference: Json | None
+    update: MapUpdate | None = None
+
+
+def begin_update(lookup: MapLookup, on: FoundMap, asked: UpdateRequest, job: Job) -> Progress:
+    """Index a map and read the scans.
+
+    Raises
+    ------
+    StoreError
+        When the map cannot be had.
+    ParserEndedError
+        When it is large and could not be read.
+    InvalidRequestError
+        When the libraries reject a scan.
+    DeadlinePassedError
+        When the deadline has passed before.
+    """
+    cached, old = lookup.indexed(on, oriented=None, deadline=job.deadline), lookup.document(on)
+    scans = [
+        _scan_of(asked, number, place) for number, one in enumerate(asked.visits) for place in range(len(one.scans))
+    ]
+    job.watch.lap("decode")
+    if job.deadline.passed and not job.deadline.cancelled:
+        raise DeadlinePassedError
+    job.searching.set()
+    steps = updating(cached.index, scans, job.deadline, accept=asked.accept, refuse=asked.refuse)
+    document: dict[str, Any] = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
+    return Progress(steps, document, reference_to(on))
+
+
+def _scan_of(asked: UpdateRequest, visit: int, number: int) -> VisitScan:
+    """Return a scan of a visit; an error names its place in the request."""
+    one, place = asked.visits[visit].scans[number], f"/visits/{visit}/scans/{number}"
+    try:
+        scan = scanned_of(one).scan
+        pose = None if one.pose is None else transform_of(one.pose)
+        return VisitScan(scan, asked.visits[visit].visit, pose, one.covariance)
+    except InvalidRequestError as error:
+        faults = [Fault(place + fault.pointer.removeprefix("/scan"), fault.message) for fault in error.faults]
+        raise InvalidRequestError(faults) from error
+    except InputError as error:
+        pointer = fault_of(error).pointer.removeprefix("/scan")
+        raise InvalidRequestError([Fault(place + pointer, error.message)]) from error
+
+
+def take_steps(progress: Progress, deadline: Deadline) -> bool:
+    """Go on for `TURN_SECONDS`; return whether there is more to do.
+
+    Raises
+    ------
+    CancelledError
+        When the client has gone.
+    InvalidArgumentError
+        When a change is refused that is not proposed.
+    """
+    until = time.monotonic() + TURN_SECONDS
+    while time.monotonic() < until:
+        try:
+            next(progress.steps)
+        except StopIteration as done:
+            progress.update = done.value
+            return False
+        if deadline.cancelled:
+            raise CancelledError
+    return True
+
+
+def update_done(progress: Progress, asked: UpdateRequest, job: Job) -> Done:
+    """Return the answer of an update that is done."""
+    assert progress.update is not None
+    job.watch.lap("search")
+    sealed = {"based_on": progress.reference, "client_ref": asked.client_ref}
+    answer = update_json(progress.update, progress.document)
+    return job.done({**answer, **sealed}, map=progress.reference, changes=len(progress.update.changes))

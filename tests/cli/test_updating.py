@@ -1,0 +1,102 @@
+"""linefix map update."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from registration import RigidTransform, Segments
+from simulation import scan
+from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
+
+from .running import Linefix
+
+HALL, TODAY = segments(RACK, PILLAR), segments(PILLAR)
+
+
+def write_visit(path: Path, walls: Segments, seed: int) -> None:
+    """Write a log of a visit, as CARMEN does."""
+    rng, lines = np.random.default_rng(seed), ["# a log"]
+    for k, (x, y) in enumerate(PLACES):
+        pose = RigidTransform(x, y, rng.uniform(-math.pi, math.pi))
+        ranges = scan(walls, pose, SCANNER, rng).ranges
+        told = " ".join(f"{r:.4f}" if math.isfinite(r) else "99" for r in ranges)
+        at = f"{pose.x:.6f} {pose.y:.6f} {pose.theta:.6f}"
+        head = f"ROBOTLASER1 0 {SCANNER.angle_min:.6f} {math.tau:.6f} {SCANNER.angle_increment:.9f}"
+        lines.append(f"{head} 20.0 0.01 0 {len(ranges)} {told} 0 {at} {at} 0 0 0 0 0 {100 + k} host {100 + k}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "hall.json").write_text(json.dumps({"segments": HALL.endpoints.tolist(), "sigma": 0.005, "meta": "A 3"}))
+    for day, walls in (("monday", TODAY), ("tuesday", TODAY)):
+        write_visit(folder / f"{day}.log", walls, len(day))
+
+
+def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) -> None:
+    told = linefix(
+        "map", "update", "hall.json", "monday.log", "tuesday.log", "--out", "new.json", "--picture", "changes.png"
+    )
+    assert told.code == 0, told.err
+    rows = dict(row.split("  ", 1) for row in told.out.splitlines())
+    assert rows["change 0"].strip().startswith("removed segments 12, 13, 14, 15: confidence 0.9")
+    assert "2 visits" in rows["change 0"]
+    assert "of 16 usable before" in rows["scans"]
+    new = json.loads((folder / "new.json").read_text())
+    assert new["segments"] == TODAY.endpoints.tolist()
+    assert (new["sigma"], new["meta"]) == (0.005, "A 3")
+    with Image.open(folder / "changes.png") as picture:
+        colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
+    assert (0xD5, 0x5E, 0x00) in colours  # what is removed
+
+
+def test_a_change_is_refused_by_its_number_or_for_its_confidence(linefix: Linefix, folder: Path) -> None:
+    logs = ("hall.json", "monday.log", "tuesday.log")
+    for more in (("--refuse", "0"), ("--accept", "1")):
+        told = linefix("map", "update", *logs, *more, "--out", "new.json", "--json")
+        assert told.code == 0, told.err
+        assert [one["accepted"] for one in json.loads(told.out)["changes"]] == [False]
+        assert json.loads((folder / "new.json").read_text())["segments"] == HALL.endpoints.tolist()
+
+
+def test_a_stored_map_is_updated_and_stays_as_it_is(linefix: Linefix) -> None:
+    assert linefix("map", "put", "hall", "hall.json").code == 0
+    told = linefix("map", "update", "hall", "monday.log", "tuesday.log", "--json")
+    assert json.loads(told.out)["based_on"] == {"map_id": "hall", "revision": 1}
+    assert json.loads(linefix("map", "get", "hall").out)["segments"] == HALL.endpoints.tolist()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("hall.json",), 2, "Missing argument"),
+        (("hall.json", "nowhere.log"), 2, "nowhere.log: there is no such file"),
+        (("hall.json", "monday.log", "monday.log"), 2, "found the same log twice"),
+        (("hall.json", "monday.log", "--accept", "3"), 2, "--accept"),
+        (("hall.json", "monday.log", "tuesday.log", "--refuse", "7"), 3, "expected an index of the 1 proposed changes"),
+    ],
+)
+def test_wrong_use_is_one_line(linefix: Linefix, arguments: tuple[str, ...], code: int, said: str) -> None:
+    told = linefix("map", "update", *arguments)
+    assert (told.code, said in told.err.splitlines()[-1]) == (code, True), told.err
+
+
+def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) -> None:
+    ends = HALL.endpoints.tolist()
+    (folder / "hall.csv").write_text("".join(f"{a},{b},{c},{d}\n" for a, b, c, d in ends))
+    lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
+    (folder / "drive.log").write_text("".join(lines))
+    plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
+    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json")
+    assert told.code == 0, told.err
+    answer = json.loads(told.out)
+    assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
+    assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
+    wrong = linefix(*plain, "--update")
+    assert (wrong.code, "--update: found no log" in wrong.err) == (2, True)

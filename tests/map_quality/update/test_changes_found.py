@@ -1,0 +1,144 @@
+"""Changes of a hall that scans of several visits show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import map_quality
+from association import MapIndex
+from map_quality import MapUpdate, VisitScan
+from registration import Segments
+
+from .hall import OUTLINE, PILLAR, RACK, box, segments, visit
+
+CART = box(6.0, 5.0, 7.2, 5.8)
+
+
+def updated(old: Segments, *visits: list[VisitScan]) -> MapUpdate:
+    return map_quality.update(MapIndex.build(old, 0.005), [one for some in visits for one in some])
+
+
+def visits(*today: Segments) -> list[list[VisitScan]]:
+    """One visit to each state of the hall."""
+    return [visit(walls, f"day {k}", k) for k, walls in enumerate(today)]
+
+
+def off_walls(new: np.ndarray, truth: Segments) -> np.ndarray:
+    """Return how far the ends of each segment are from the nearest wall of the truth that faces the same way, m."""
+    found = Segments.from_array(new)
+    far = []
+    for ends, direction in zip(found.endpoints, found.directions, strict=True):
+        off = []
+        for point in (ends[:2], ends[2:]):
+            along = np.einsum("ij,ij->i", point - truth.endpoints[:, :2], truth.directions)
+            near = truth.endpoints[:, :2] + np.clip(along, 0.0, truth.lengths)[:, None] * truth.directions
+            gaps = np.linalg.norm(near - point, axis=1)
+            off.append(np.where(truth.directions @ direction > 0.99, gaps, np.inf).min())
+        far.append(max(off))
+    return np.array(far)
+
+
+def test_an_unchanged_hall_stays_as_it_is() -> None:
+    hall = segments(RACK, PILLAR)
+    found = updated(hall, *visits(hall, hall, hall))
+    assert found.changes == ()
+    assert found.segments.endpoints.tolist() == hall.endpoints.tolist()
+    assert (found.usable.scans, found.held_back.scans) == (21, 3)
+    assert found.usable.before == found.usable.after > 18
+
+
+def test_a_thing_that_is_gone_is_removed_whole() -> None:
+    hall, today = segments(RACK, PILLAR), segments(PILLAR)
+    found = updated(hall, *visits(today, today))
+    assert [(one.code, one.segments) for one in found.changes] == [("removed", (12, 13, 14, 15))]
+    assert found.segments.endpoints.tolist() == today.endpoints.tolist()
+    told = found.changes[0].evidence
+    assert told.beams_through > 100
+    assert (told.visits, told.first, told.last) == (2, "day 0", "day 1")
+    assert found.changes[0].confidence > 0.99
+
+
+def test_a_new_thing_is_added_where_it_stands_with_its_free_side_outside() -> None:
+    hall, today = segments(RACK, PILLAR), segments(RACK, PILLAR, CART)
+    found = updated(hall, *visits(today, today))
+    assert [one.code for one in found.changes] == ["added"]
+    new = found.changes[0].new
+    assert len(new) == 4
+    assert off_walls(new, Segments.from_array(np.array(CART))).max() < 0.05
+    assert (found.changes[0].sigma < 0.02).all()
+    assert found.segments.endpoints[: len(hall)].tolist() == hall.endpoints.tolist()
+
+
+def test_a_thing_that_stands_elsewhere_is_moved() -> None:
+    there = box(9.1, 4.4, 9.7, 5.0)
+    hall, today = segments(RACK, PILLAR), segments(RACK, there)
+    found = updated(hall, *visits(today, today))
+    assert [(one.code, one.segments) for one in found.changes] == [("moved", (16, 17, 18, 19))]
+    assert off_walls(found.changes[0].new, Segments.from_array(np.array(there))).max() < 0.05
+
+
+def test_a_new_opening_shortens_its_wall_on_both_sides() -> None:
+    hall = segments(RACK, PILLAR)
+    recess = [[0, 0, 5, 0], [5, 0, 5, -2], [5, -2, 6.5, -2], [6.5, -2, 6.5, 0], [6.5, 0, 12, 0]]
+    today = Segments.from_array(np.array([*recess, *OUTLINE[1:], *RACK, *PILLAR], dtype=float))
+    found = updated(hall, *visits(today, today, today))
+    short = [one for one in found.changes if one.code == "shortened"]
+    assert [one.segments for one in short] == [(0,)]
+    assert np.abs(short[0].new - [[0, 0, 5, 0], [6.5, 0, 12, 0]]).max() < 0.35
+    assert {one.code for one in found.changes} <= {"shortened", "added"}
+    assert all(off_walls(one.new, today).max() < 0.25 for one in found.changes)
+
+
+def test_a_wall_that_has_grown_is_extended() -> None:
+    hall = segments(box(3.0, 4.0, 5.0, 4.2), PILLAR)
+    today = segments(box(3.0, 4.0, 6.5, 4.2), PILLAR)
+    found = updated(hall, *visits(*[today] * 4))
+    assert updated(hall, *visits(today, today)).changes == ()  # it may be a door
+    longer = {one.segments[0]: one.new[0] for one in found.changes if one.code == "extended"}
+    assert set(longer) == {13, 15}
+    assert longer[13] == pytest.approx([3.0, 4.2, 6.5, 4.2], abs=0.1)
+
+
+def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> None:
+    hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.5, 7.98, 7.0, 8.02))
+    assert updated(hall, *visits(shut, hall, shut, hall)).changes == ()
+    assert updated(shut, *visits(shut, hall, hall, shut)).changes == ()
+    assert updated(hall, *visits(shut, shut)).changes == ()
+
+
+def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:
+    hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.98, 6.9, 8.02))
+    assert [one.code for one in updated(hall, *visits(*[shut] * 5)).changes] == ["extended"]
+
+
+def test_people_and_carts_do_not_become_walls() -> None:
+    hall, rng = segments(RACK, PILLAR), np.random.default_rng(3)
+
+    def crowded(_number: int) -> Segments:
+        people = [box(x, y, x + 0.4, y + 0.4) for x, y in rng.uniform([1, 1], [11, 7], (4, 2))]
+        return segments(RACK, PILLAR, *people)
+
+    days = [visit(crowded, f"day {k}", k) for k in range(4)]
+    assert updated(hall, *days).changes == ()
+    assert updated(hall, *visits(segments(RACK, PILLAR, CART), hall, hall)).changes == ()
+
+
+def test_a_single_visit_changes_nothing() -> None:
+    hall, today = segments(RACK, PILLAR), segments(PILLAR)
+    assert updated(hall, *visits(today)).changes == ()
+
+
+def test_walls_that_are_not_seen_stay_as_they_are() -> None:
+    hidden = box(20.0, 0.0, 24.0, 3.0)
+    hall, today = segments(RACK, PILLAR, hidden), segments(PILLAR, hidden)
+    found = updated(hall, *visits(today, today))
+    assert found.segments.endpoints.tolist() == today.endpoints.tolist()
+
+
+def test_a_map_without_directions_is_updated_too() -> None:
+    hall, today = segments(RACK, PILLAR), segments(PILLAR)
+    scans = [one for some in visits(today, today, today) for one in some]
+    found = map_quality.update(MapIndex.build(hall, 0.005, oriented=False), scans)
+    assert [(one.code, one.segments) for one in found.changes] == [("removed", (12, 13, 14, 15))]
+    assert found.segments.endpoints.tolist() == today.endpoints.tolist()

@@ -1,0 +1,134 @@
+"""Scans that do not belong to a map, or that prove nothing, change nothing."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import map_quality
+from association import CancelledError, Deadline, MapIndex
+from map_quality import UpdateError, VisitScan
+from map_quality.update.hanging import hanging_lines, on_lines
+from map_quality.update.scans import Localized, scale_of, search
+from registration import InputError, RigidTransform, Segments
+from simulation import Scanner
+
+from .hall import PILLAR, RACK, SCANNER, box, segments, visit
+
+HALL = segments(RACK, PILLAR)
+TODAY = segments(PILLAR)
+
+
+def days(
+    walls: Segments, *, scanner: Scanner = SCANNER, change: Callable[[np.ndarray], np.ndarray] = lambda r: r
+) -> list[VisitScan]:
+    return [one for k in range(3) for one in visit(walls, f"day {k}", k, scanner, change)]
+
+
+def index() -> MapIndex:
+    return MapIndex.build(HALL, 0.005)
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_scans_off_scale_change_nothing(factor: float) -> None:
+    found = map_quality.update(index(), days(TODAY, change=lambda ranges: ranges * factor))
+    assert found.changes == ()
+
+
+def test_scans_of_a_mirrored_laser_change_nothing() -> None:
+    mirrored = replace(SCANNER, angle_min=-SCANNER.angle_min, angle_increment=-SCANNER.angle_increment)
+    scans = []
+    for one in days(TODAY, scanner=mirrored):
+        beams = one.scan.beams
+        assert beams is not None
+        flipped = map_quality.VisitScan(one.scan, one.visit)
+        scans.append(flipped)
+    from association import mirrored as mirror
+
+    scans = [replace(one, scan=mirror(one.scan)) for one in scans]
+    found = map_quality.update(index(), scans)
+    assert found.changes == ()
+    assert found.refused_visits
+
+
+def test_scans_of_another_building_change_nothing_and_the_visits_are_named() -> None:
+    other = Segments.from_array(np.array([*box(1, 1, 4, 3), [0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10],
+                                          [11, 10, 0, 10], [0, 10, 0, 0]], dtype=float))  # fmt: skip
+    found = map_quality.update(index(), days(other))
+    assert found.changes == ()
+    assert [one.visit for one in found.refused_visits] == ["day 0", "day 1", "day 2"]
+    assert "usable" in found.refused_visits[0].message
+
+
+def test_a_proposal_that_there_is_no_time_to_verify_is_none() -> None:
+    found = map_quality.update(index(), days(TODAY), Deadline(time.monotonic()))
+    assert (found.changes, found.complete) == ((), False)
+    deadline = Deadline()
+    deadline.cancel()
+    with pytest.raises(CancelledError):
+        map_quality.update(index(), days(TODAY), deadline)
+
+
+def test_single_changes_are_refused_and_unsure_ones_not_accepted() -> None:
+    scans = days(TODAY)
+    refused = map_quality.update(index(), scans, refuse=[0])
+    assert (len(refused.changes), refused.accepted) == (1, (False,))
+    assert refused.segments.endpoints.tolist() == HALL.endpoints.tolist()
+    assert map_quality.update(index(), scans, accept=1.0).accepted == (False,)
+    assert map_quality.update(index(), scans, accept=0.9).accepted == (True,)
+    with pytest.raises(InputError, match="refuse: found 1, expected an index of the 1 proposed"):
+        map_quality.update(index(), scans, refuse=[1])
+    with pytest.raises(InputError, match=r"accept: found 2.0, expected a confidence from 0 to 1"):
+        map_quality.update(index(), scans, accept=2.0)
+
+
+def test_a_pose_of_the_senders_needs_its_covariance_and_does_not_replace_the_search() -> None:
+    one = days(TODAY)[0]
+    with pytest.raises(UpdateError, match="covariance: found none"):
+        replace(one, pose=RigidTransform(1.0, 1.0, 0.0))
+    wrong = [replace(each, pose=RigidTransform(3.0, 3.0, 0.0), covariance=1e-4 * np.eye(3)) for each in days(TODAY)]
+    assert map_quality.update(index(), wrong).changes == ()
+
+
+def test_scans_are_needed_and_with_ranges() -> None:
+    with pytest.raises(UpdateError, match="scans: found no scans"):
+        map_quality.update(index(), [])
+    bare = replace(days(TODAY)[0].scan, beams=None)
+    with pytest.raises(UpdateError, match="without ranges"):
+        VisitScan(bare, "day 0")
+
+
+def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
+    """Without its end wall a corridor leaves the position along it free."""
+    corridor = Segments.from_array(np.array([[0, 0, 30, 0], [30, 0, 30, 2], [30, 2, 0, 2]], dtype=float))
+    known = MapIndex.build(corridor, 0.01)
+    at = RigidTransform(24.0, 1.0, 0.0)
+    from linefix import LaserScan, scan_of
+    from simulation import scan
+
+    ranges = scan(corridor, at, SCANNER, np.random.default_rng(1)).ranges
+    seen = scan_of(LaserScan(SCANNER.angle_min, SCANNER.angle_increment, ranges, 0.0, 20.0))
+    one = VisitScan(seen, "day 0", at, np.diag([0.01, 0.01, 0.01]))
+    result = search(known, one, Deadline())
+    assert result.pose is not None
+    assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
+    localized = Localized(0, 0, seen, result, corridor, False)
+    assert on_lines(corridor, hanging_lines(localized, 0.01)).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("factor", [0.98, 0.995, 1.0, 1.015])
+def test_the_scale_of_scans_is_estimated_beside_their_poses_and_an_error_of_all_ranges(factor: float) -> None:
+    known, found = index(), []
+    for number, one in enumerate(days(HALL, change=lambda ranges: ranges * factor + 0.01)):
+        result = search(known, one, Deadline())
+        if result.usable and not any(warning.code == "map_scale" for warning in result.warnings):
+            found.append(Localized(number, 0, one.scan, result, HALL, False))
+    assert len(found) > 3
+    estimated, sigma = scale_of(found, 0.005)
+    assert sigma < 0.003
+    assert estimated == pytest.approx(factor - 1.0, abs=3.0 * sigma + 5e-4)

@@ -1,0 +1,73 @@
+"""A change that makes the map worse for the scans that it came from is found out."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from association import Deadline, MapIndex
+from map_quality import Change, Evidence
+from map_quality.update.applying import apply, kept_indices
+from map_quality.update.changes import Draft
+from map_quality.update.evidence import Gatherer
+from map_quality.update.scans import Localized, search
+from map_quality.update.verifying import is_better, keeps_usable
+from registration import Segments
+
+from .hall import PILLAR, RACK, segments, visit
+
+HALL, EMPTY = segments(RACK, PILLAR), segments(PILLAR)
+NOTHING = np.zeros((0, 4))
+SHOWN = Evidence(1, 0, 3, 2, "day 0", "day 1")
+T = TypeVar("T")
+
+
+def done(steps: Generator[None, None, T]) -> T:
+    while True:
+        try:
+            next(steps)
+        except StopIteration as ended:
+            found: T = ended.value
+            return found
+
+
+def localized(on: Segments, today: Segments) -> list[Localized]:
+    index, scans = MapIndex.build(on, 0.005), [one for k in range(2) for one in visit(today, f"day {k}", k)]
+    found = [(one, search(index, one, Deadline())) for one in scans]
+    return [Localized(k, k // 8, one.scan, result, on, False) for k, (one, result) in enumerate(found)]
+
+
+@pytest.mark.parametrize(("today", "better"), [(EMPTY, True), (HALL, False)])
+def test_the_removal_of_a_rack_is_better_only_if_it_is_gone(today: Segments, better: bool) -> None:
+    first, after = localized(HALL, today), localized(EMPTY, today)
+    chosen = [one for one in first if one.precise]
+    evidence = done(Gatherer(HALL, 0.005, True).gather(Segments.derived(NOTHING), chosen, 2))
+    rack = np.concatenate([np.arange(len(evidence.chunks))[evidence.chunks.of_wall(k)] for k in range(12, 16)])
+    draft = Draft("removed", (12, 13, 14, 15), NOTHING, np.zeros(0), rack, rack[:0])
+    assert len(evidence.scans_of(rack)) > 5
+    assert is_better(draft, evidence, first, after) is better
+
+
+def test_a_map_on_which_many_scans_fit_less_is_withdrawn() -> None:
+    first = localized(HALL, HALL)
+    assert keeps_usable(first, first)
+    worse = localized(Segments.derived(HALL.endpoints[[0, 1, 6, 10]]), HALL)
+    assert sum(one.usable for one in worse) < sum(one.usable for one in first) - 2
+    assert not keeps_usable(first, worse)
+    assert keeps_usable(worse, first)
+
+
+def test_changes_replace_remove_and_append_segments_in_their_order() -> None:
+    old = Segments.from_array(np.array([[k, 0.0, k + 1.0, 0.0] for k in range(5)]))
+    shorter = np.array([[1.0, 0.0, 1.3, 0.0], [1.6, 0.0, 2.0, 0.0]])
+    new = np.array([[0.0, 5.0, 1.0, 5.0]])
+    changes = [
+        Change("shortened", (1,), shorter, np.full(2, 0.01), SHOWN, 0.99),
+        Change("moved", (3,), new, np.full(1, 0.01), SHOWN, 0.99),
+    ]
+    expected = [old.endpoints[0], shorter[0], old.endpoints[2], old.endpoints[4], shorter[1], new[0]]
+    assert apply(old, changes).endpoints.tolist() == np.array(expected).tolist()
+    assert kept_indices(5, changes).tolist() == [0, -1, 2, 4, -1, -1]
