@@ -129,7 +129,7 @@ class Case:
         description = describe_answer(context, found, found.answer)
         weighed, plain = description.alternatives, Features(*description.features.item())
         features = with_null_score(plain, best, find_null_score(context, best))
-        findings = findings_of(found, description, off_scale=to_scale.off_scale)
+        findings = findings_of(context, found, description, off_scale=to_scale.off_scale)
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle

@@ -59,8 +59,8 @@ SAME_FAMILY = 12.8  # squared deviations, geometry: 99.5 % of chi-square of thre
 
 END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
 SIGHT_TOLERANCE = 0.2  # m, tables; a wall this near before the end of a ray does not block it
-BLOCKED = 2.0  # nats per metre of wall, tables; against a pose, where rays to the consensus set pass through the wall
-BLOCKED_CLUTTER = 2.0  # nats per metre, tables; likewise for rays to clutter
+# Nats per metre of wall, tables; against a pose, where rays to the consensus set or to clutter pass through the wall.
+BLOCKED = 2.0
 BLOCKING_LENGTH = 3.0  # m, tables; beyond it a wall counts no more
 BLOCKING_RAYS = 4.0  # that count fully, tables
 FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of sight
@@ -83,7 +83,6 @@ LEAST_POINTS = 10  # tables; for the beams to move a pose
 BEAM_GATES = (0.35, 0.25, 0.15, 0.15)  # m, tables; of the rounds in which they do
 PASSED_SLACK = 0.01  # tables; fraction of beams that may pass more where a pose was moved
 FARTHER_BY = 0.05  # m, tables; across the wall that the map shows; a beam that reads farther by more, or
-NEARER_BY = 0.1  # m, tables; nearer, does not read it
 WALL_BEHIND = 30.0  # m, geometry; so far behind a reading a wall is looked for then
 SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have been people or carts
 

@@ -18,7 +18,6 @@ from .tuning import (
     CELL,
     CELL_GROWTH,
     CROSSING_BAND,
-    CROSSING_CELL,
     CROSSING_REACHES,
     CROSSING_SAMPLE,
     CROSSING_SAMPLE_LOOKS,
@@ -103,7 +102,7 @@ def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records
 
 def listed(chains: Records, found: Records, reach: float) -> Crossings:
     """List crossings (k,) of `CROSSING`, all those of the chains that there are up to `reach` metres."""
-    shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / CROSSING_CELL)))
+    shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / SWEEP_CELL)))
     return Crossings(shape, *list_crossings(chains, found, shape))
 
 

@@ -40,7 +40,7 @@ PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadlin
 # --- Grids ------------------------------------------------------------------------------------------------------------
 
 CELL = 1.0  # m, tables
-SWEEP_CELL = 2.0  # m, tables
+SWEEP_CELL = 2.0  # m, tables; of the sweep's grid, and of the cells of crossings about a base
 SWEEP_REACH = 0.02  # m, rounding
 RASTER_CELL = 0.5  # m, tables
 NEIGHBOURHOOD = 64.0  # m, squares of which the chains are numbered together; measured: 8 to 128 are as good
@@ -54,7 +54,6 @@ CELL_GROWTH = 1.25  # by which cells grow until their lists fit
 # Pairs of chains that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
 # entries in all lists, and pairs of chains that are near enough to be compared.
 CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
-CROSSING_CELL = 2.0  # m, tables
 CROSSING_BAND = 16.0  # m; height of the bands of chains among which crossings are searched
 MOST_BANDS = 200  # about
 # Tables: half of the first two take a seventh longer at 20,000 segments; twice as many take a twelfth less, for 2.3

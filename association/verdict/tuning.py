@@ -1,5 +1,7 @@
 """Every threshold of the verdict, with its unit and where it comes from; see `association.tuning` for the origins."""
 
+import math
+
 # --- Alternatives: compared again with walls off by more --------------------------------------------------------------
 
 # Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least,
@@ -12,9 +14,6 @@ LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 # The most that each thing counts which an alternative has and the scan does not show, tables: it was moved away, with a
 # probability of 1 in 55.
 ABSENCE = 4.0  # nats
-SAME_THING = 0.4  # m, tables; beams that speak against an alternative within that distance do so for one thing
-LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against it does not count
-FAR_BEHIND_BY_SHOWN = 12.0  # nats; an alternative that is behind by more has a weight below 1 in 2,900
 
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 
@@ -68,6 +67,9 @@ USABLE_CAUTIOUS_DRIVE = 0.95
 LEAST_IN_STEP = 0.55
 FEW_WALLS = 3  # geometry: three sides of a room; fewer are never enough if one of them alone decides, and as many
 OFFSET_OF_FEW = 0.002  # m, measured; only of segments, and where they are off by no more, root mean square
+TOLERANCE = (0.3, math.radians(3.0))  # m, rad; a pose that is off by less is right
+# The probability that is allowed of a pose beyond that, by its covariance. Measured: rejects 8 of 1,734 usable answers.
+MOST_BEYOND = 0.05
 NO_ALTERNATIVE = 8.0  # nats, tables; an explanation that scores so much less is no alternative
 TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not returned
 NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a similar place, other buildings included

@@ -16,7 +16,7 @@ from .features import Description, describe_answer
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import SENTENCES, Doubts, reasons_of
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
-from .unobservable import choose_along_direction
+from .unobservable import beyond_tolerance, choose_along_direction
 from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 
 
@@ -107,7 +107,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     if answer is None:
         return _no_match(explanations)
     description = describe_answer(context, explanations, answer)
-    findings = findings_of(explanations, description, off_scale=off_scale)
+    findings = findings_of(context, explanations, description, off_scale=off_scale)
     found = work_out_probabilities(context, description, applied(findings))
     pose = choose_along_direction(context, answer)
     vetoes = applied(_all_findings(context, findings, found, pose))
@@ -143,7 +143,9 @@ def _best(explanations: Explanations) -> float:
     return max((other.score for other in explanations.others), default=-math.inf)
 
 
-def findings_of(explanations: Explanations, description: Description, *, off_scale: bool) -> Findings:
+def findings_of(
+    context: SearchContext, explanations: Explanations, description: Description, *, off_scale: bool
+) -> Findings:
     """Return what the vetoes need, as far as it is known before the probabilities."""
     answer = description.answer
     return Findings(
@@ -155,6 +157,7 @@ def findings_of(explanations: Explanations, description: Description, *, off_sca
         few_walls=description.few_walls,
         in_step=answer.beams.in_step,
         off_scale=off_scale,
+        beyond_tolerance=beyond_tolerance(context, answer),
     )
 
 

@@ -14,7 +14,7 @@ from registration.values import value
 
 from ..consensus.tuning import CONTRADICTION
 from ..result import ReasonCode, Status
-from .tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER
+from .tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND
 
 
 @value(frozen=True, slots=True)
@@ -41,6 +41,8 @@ class Findings:
         Fraction of the beams of a drive's exact views that read the walls, over that of all views; 1 otherwise.
     off_scale : bool
         True if scan and map differ by a factor that is too great to be corrected.
+    beyond_tolerance : float
+        Probability by the covariance that the pose is off by more than `TOLERANCE`, 0 to 1.
     mirrored_better : float
         Score of the mirrored scan over the answer's, less 1; 0 where it is less, or was not searched.
     """
@@ -54,6 +56,7 @@ class Findings:
     few_walls: bool = False
     in_step: float = 1.0
     off_scale: bool = False
+    beyond_tolerance: float = 0.0
     mirrored_better: float = 0.0
 
 
@@ -107,6 +110,10 @@ OFF_SCALE = (
     "The scan fits this map better with its lengths changed by more than 4 %. Check that scan and map are in metres, "
     "and that this is the right map."
 )
+IMPRECISE = (
+    "The walls in view determine the pose too roughly: it may be off by more than 0.3 m or 3 degrees. Scan from "
+    "another place."
+)
 BETTER_ELSEWHERE = Veto(
     "better_elsewhere",
     lambda found: found.score_elsewhere > found.score + CONTRADICTION,
@@ -144,6 +151,16 @@ FEW_WALLS = Veto(
     counts_with=frozenset({Status.AMBIGUOUS}),
     settles=True,
 )
+TOO_ROUGH = Veto(
+    "imprecise",
+    lambda found: found.beyond_tolerance > MOST_BEYOND,
+    ("insufficient_evidence",),
+    Origin.MEASURED,
+    caps=Status.AMBIGUOUS,
+    counts_with=frozenset({Status.AMBIGUOUS}),
+    settles=True,
+    message=IMPRECISE,
+)
 OUT_OF_STEP = Veto(
     "out_of_step",
     lambda found: found.in_step < LEAST_IN_STEP,
@@ -178,6 +195,7 @@ VETOES: tuple[Veto, ...] = (
     INCOMPLETE,
     UNOBSERVABLE,
     FEW_WALLS,
+    TOO_ROUGH,
     OUT_OF_STEP,
     OFF_ITS_SCALE,
     MIRRORED_FITS_BETTER,

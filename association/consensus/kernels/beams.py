@@ -16,7 +16,6 @@ from ..tuning import (
     LEAST_INCIDENCE,
     LEAST_POINTS,
     NEAR,
-    NEARER_BY,
     PASSED_SLACK,
     SURE_LENGTH,
     WALL_BEHIND,
@@ -115,7 +114,7 @@ def beam_fractions(rays: Rays, poses: Records, place: Place, work: Workspace) ->
             continue
         if across > FARTHER_BY:
             farther += 1
-        elif across < -NEARER_BY:
+        elif across < -NEAR:
             nearer += 1
     n = max(1, len(beams))
     return farther / n, nearer / n

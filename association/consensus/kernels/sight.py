@@ -8,7 +8,7 @@ from registration.layout import Record, Records
 from ...layout import Integers
 from ...tables import Blockers, Place, Sights
 from ...tuning import MAX_RAYS, RAY_SPACING
-from ..tuning import BLOCKED, BLOCKED_CLUTTER, BLOCKING_LENGTH, BLOCKING_RAYS, END_MARGIN, SIGHT_TOLERANCE
+from ..tuning import BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, END_MARGIN, SIGHT_TOLERANCE
 
 
 @kernel
@@ -165,7 +165,7 @@ def sight_penalty(blockers: Blockers, count: int, walls: Records) -> float:
         w = blockers.touched[k]
         length = min(BLOCKING_LENGTH, walls[w].end - walls[w].begin)
         total += BLOCKED * length * min(1.0, counts[w].to_matched / BLOCKING_RAYS)
-        total += BLOCKED_CLUTTER * length * min(1.0, counts[w].to_clutter / BLOCKING_RAYS)
+        total += BLOCKED * length * min(1.0, counts[w].to_clutter / BLOCKING_RAYS)
         counts[w].to_matched = 0
         counts[w].to_clutter = 0
         counts[w].row = 0

@@ -14,10 +14,10 @@ from registration.layout import Floats, Record, Records
 
 from ...layout import CROSSING, Integers
 from ...tuning import CROSSING_ANGLES, MIN_CROSSING
-from ..tuning import CROSSING_CELL
+from ..tuning import SWEEP_CELL
 
 PER_HALF_TURN = CROSSING_ANGLES / math.pi
-PER_CELL = 1.0 / CROSSING_CELL
+PER_CELL = 1.0 / SWEEP_CELL
 STEPS = 127  # of a byte of a code
 
 

@@ -15,7 +15,6 @@ from association.consensus.tuning import (
     LEAST_INCIDENCE,
     LEAST_POINTS,
     NEAR,
-    NEARER_BY,
     PASSED_SLACK,
     SURE_LENGTH,
     WALL_BEHIND,
@@ -68,7 +67,7 @@ def beam_fractions(rays: Rays, pose: RigidTransform, place: Place) -> tuple[floa
     """Count the beams that read farther than the map shows, and nearer."""
     across = np.array([offset for offset, _ in offsets(rays, pose, place, WALL_BEHIND)])
     n = max(1, len(rays.beams))
-    return float((across > FARTHER_BY).sum()) / n, float((across < -NEARER_BY).sum()) / n
+    return float((across > FARTHER_BY).sum()) / n, float((across < -NEAR).sum()) / n
 
 
 def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:

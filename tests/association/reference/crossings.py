@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from association.index.tuning import CROSSING_CELL
+from association.index.tuning import SWEEP_CELL
 from association.tuning import CROSSING_ANGLES, MIN_CROSSING
 from registration.layout import Floats, Record, Records
 
@@ -47,8 +47,8 @@ def angle_bin(a: Record, b: Record) -> int:
 
 def cells_of(rectangle: Rectangle, reach: float) -> list[tuple[int, int]]:
     """Return the cells that a rectangle reaches into, of those up to `reach` either way."""
-    most = math.ceil(2.0 * reach / CROSSING_CELL) - 1
-    first, last, bottom, top = np.clip(np.floor((np.array(rectangle) + reach) / CROSSING_CELL), 0, most).astype(int)
+    most = math.ceil(2.0 * reach / SWEEP_CELL) - 1
+    first, last, bottom, top = np.clip(np.floor((np.array(rectangle) + reach) / SWEEP_CELL), 0, most).astype(int)
     return list(itertools.product(range(first, last + 1), range(bottom, top + 1)))
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from association.consensus.tuning import (
     BLOCKED,
-    BLOCKED_CLUTTER,
     BLOCKING_LENGTH,
     BLOCKING_RAYS,
     END_MARGIN,
@@ -65,5 +64,5 @@ def sight_penalty(counts: Counts, walls: Records) -> float:
     for wall, (to_matched, to_clutter) in counts.items():
         length = min(BLOCKING_LENGTH, float(walls[wall]["end"] - walls[wall]["begin"]))
         total += length * BLOCKED * min(1.0, to_matched / BLOCKING_RAYS)
-        total += length * BLOCKED_CLUTTER * min(1.0, to_clutter / BLOCKING_RAYS)
+        total += length * BLOCKED * min(1.0, to_clutter / BLOCKING_RAYS)
     return total

@@ -11,11 +11,14 @@ import pytest
 from association import HardPrior, MapIndex, SoftPrior
 from association.consensus.estimation import EstimatedPose
 from association.explain import search_and_explain
-from association.verdict.unobservable import choose_along_direction
+from association.verdict.tuning import MOST_BEYOND
+from association.verdict.unobservable import beyond_tolerance, choose_along_direction
+from association.verdict.verdict import judge
 from registration import RigidTransform
 from registration.layout import Floats
 
-from ..answers import answer_with, estimated_of, ranked, registered_room, room
+from ..answers import answer_with, estimated_of, explanations_of, ranked, registered_room, room
+from ..judged import PLAIN, judged_by
 from ..scenes import INSIDE, context_of, index_of, pose, scan_of
 
 
@@ -126,3 +129,45 @@ def test_of_a_family_the_member_at_which_the_beams_fit_best() -> None:
 
 def test_without_a_pose_there_is_no_family() -> None:
     assert choose_along_direction(room(), answer_with(ranked(), replace(registered_room(), pose=None))) is None
+
+
+@pytest.mark.parametrize(
+    ("deviations", "probability"),
+    [
+        ((0.01, 0.02, 0.001), 0.0),
+        ((0.01, 0.15306, 0.001), 0.05),  # 0.3 m are 1.96 standard deviations
+        ((0.01, 0.02, math.radians(1.5306)), 0.05),
+        ((0.15306, 0.02, math.radians(1.5306)), 1.0 - 0.95**2),
+    ],
+)
+def test_the_probability_of_an_error_beyond_the_tolerance(
+    deviations: tuple[float, float, float], probability: float
+) -> None:
+    estimated = replace(estimated_of(registered_room()), covariance=np.diag(np.square(deviations)))
+    assert beyond_tolerance(room(), answer_with(ranked(), estimated=estimated)) == pytest.approx(probability, abs=1e-4)
+
+
+def test_the_weakest_direction_counts_whatever_the_axes_are() -> None:
+    spread = np.diag([0.2**2, 0.01**2, 1e-6])
+    rotation = np.eye(3)
+    rotation[:2, :2] = [[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]]
+    plain, leaning = (
+        beyond_tolerance(
+            room(), answer_with(ranked(), estimated=replace(estimated_of(registered_room()), covariance=one))
+        )
+        for one in (spread, rotation @ spread @ rotation.T)
+    )
+    assert leaning == pytest.approx(plain)
+    assert plain > MOST_BEYOND
+
+
+@pytest.mark.parametrize(("degrees", "usable"), [(1.4, True), (1.7, False)])
+def test_a_heading_that_is_known_too_roughly_is_not_usable(degrees: float, usable: bool) -> None:
+    covariance = np.diag(np.square([0.02, 0.02, math.radians(degrees)]))
+    answer = answer_with(ranked(), estimated=replace(estimated_of(registered_room()), covariance=covariance))
+    with judged_by({name: {"constant": [30.0]} for name in PLAIN}):
+        verdict = judge(room(), explanations_of(answer))
+    assert verdict.usable is usable
+    assert [veto.name for veto in verdict.vetoes] == ([] if usable else ["imprecise"])
+    if not usable:
+        assert "3 degrees" in verdict.reasons[0].message
