@@ -5,7 +5,7 @@ Alternatives are compared three times.
 - As they were scored.
 - By what the scan shows. Suppose two rooms are equal but for a cupboard that the map shows in one of them. Today the
   cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But a
-  single removed cupboard explains all of these beams. Where another place explains everything that the scan does
+  single removed cupboard explains all of these beams. If another place explains everything that the scan does
   show, each thing that is missing there counts little therefore, however many beams miss it.
 - With walls taken to be off by more than the answer shows. Suppose a building repeats itself and its map is
   centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.

@@ -1,4 +1,4 @@
-"""How well the walls determine a pose: the probability of an error that counts, and poses along an open direction."""
+"""Evaluate how well the walls determine a pose, and choose a pose along a direction that they leave open."""
 
 from __future__ import annotations
 
