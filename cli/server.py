@@ -72,13 +72,13 @@ class Server:
 
     def check(self, on: Json, samples: Json | None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check``, which is for stored maps."""
-        map_id = id_of(on)
-        if map_id is None:
-            raise WrongUseError(
-                "found a map file, expected the id of a stored map with --server; "
-                "store it with linefix map put, or omit --server"
-            )
+        map_id = _stored(on)
         return self._answer(schema.CheckAnswer, Asked(map_id), self._client.check_map, map_id, samples)
+
+    def update(self, on: Json, visits: Any) -> Json:
+        """Return the answer of ``POST /v1/maps/{map_id}:update``, which is for stored maps."""
+        map_id = _stored(on)
+        return self._answer(schema.UpdateAnswer, Asked(map_id), self._client.update_map, map_id, visits)
 
     def put(self, map_id: str, document: Any) -> Json:
         """Store a map."""
@@ -148,6 +148,23 @@ class Server:
             return NoServerError(f"{self._url}: {error.detail}; set {KEY} in the environment to a key with this right")
         faults = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
         return error_of(error.status, error.code, f"{self._url}: {error.detail}", faults, asked)
+
+
+def _stored(on: Json) -> str:
+    """Return the id of a stored map.
+
+    Raises
+    ------
+    WrongUseError
+        When it is a map file.
+    """
+    map_id = id_of(on)
+    if map_id is None:
+        raise WrongUseError(
+            "found a map file, expected the id of a stored map with --server; "
+            "store it with linefix map put, or omit --server"
+        )
+    return map_id
 
 
 @cache

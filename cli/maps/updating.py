@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,12 +13,12 @@ import numpy as np
 import typer
 
 from .. import here
-from ..asking import whole_map
+from ..asking import server_at, whole_map
 from ..contract import Json
 from ..errors import WrongUseError
 from ..inputs import line_map_of, needing_formats, read_map_or_id
-from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
-from ..options import AsJson, MapArgument, Picture
+from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent
+from ..options import AsJson, MapArgument, Picture, Server
 from ..printing import print_json, print_rows
 from .drawing import write_document
 
@@ -46,20 +48,48 @@ def update(
     scans: Annotated[int, typer.Option(metavar="N", min=3, help="Use so many scans of each log at most.")] = SCANS,
     topic: Topic = None,
     tf_namespace: TfNamespace = None,
+    server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Propose changes of a map that the scans of several visits show, and write the new map."""
     target = read_map_or_id(on)
     visits = dict(zip(visit_names(logs), (_scans(log, topic, tf_namespace, scans) for log in logs), strict=True))
-    answer = here.update(target, visits, accept, tuple(refuse or ()))
+    if server is None:
+        answer = here.update(target, visits, accept, tuple(refuse or ()))
+    else:
+        with closing(server_at(server)) as remote:
+            answer = remote.update(target, _request_of(visits, accept, refuse or []))
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
-        draw_changes(whole_map(target, None), answer, picture)
+        draw_changes(whole_map(target, server), answer, picture)
     if as_json:
         print_json(answer)
     else:
         print_rows(list(update_rows(answer)))
+
+
+def _request_of(visits: Mapping[str, Sequence[LoggedScan]], accept: float | None, refuse: Sequence[int]) -> Json:
+    """Return a request for an update; poses are those of the sensor, so that mounts make no difference."""
+    sent_visits = [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]
+    request: Json = {"visits": sent_visits, "refuse": list(refuse)}
+    return request if accept is None else {**request, "accept": accept}
+
+
+def _sent(one: LoggedScan) -> Json:
+    """Return a scan of a log as a request for an update has it.
+
+    Raises
+    ------
+    WrongUseError
+        When the laser hangs upside down.
+    """
+    view = sent(replace(one, mount=None))["views"][0]
+    if view["flipped"]:
+        raise WrongUseError(
+            "LOG: found a laser that is mounted upside down, expected one that is not with --server; omit --server"
+        )
+    return {name: view[name] for name in ("laser", "twist") if name in view}
 
 
 def visit_names(logs: list[Path]) -> list[str]:

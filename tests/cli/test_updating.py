@@ -13,6 +13,7 @@ from PIL import Image
 from registration import RigidTransform, Segments
 from simulation import scan
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
+from tests.running import RunningService
 
 from .running import Linefix
 
@@ -54,6 +55,22 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
     with Image.open(folder / "changes.png") as picture:
         colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
     assert (0xD5, 0x5E, 0x00) in colours  # what is removed
+
+
+def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: RunningService) -> None:
+    """Of a stored map; a change is refused there, too."""
+    logs, server = ("monday.log", "tuesday.log", "--json"), ("--server", patient.url)
+    assert linefix("map", "put", "hall-u", "hall.json", *server).code == 0
+    here = json.loads(linefix("map", "update", "hall.json", *logs).out)
+    there = linefix("map", "update", "hall-u", *logs, "--refuse", "0", "--picture", "there.png", *server)
+    assert there.code == 0, there.err
+    found = json.loads(there.out)
+    assert [one["code"] for one in found["changes"]] == [one["code"] for one in here["changes"]] == ["removed"]
+    assert found["map"]["segments"] == HALL.endpoints.tolist()
+    assert (folder / "there.png").stat().st_size > 1000
+    wrong = linefix("map", "update", "hall.json", *logs, *server)
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "expected the id of a stored map with --server" in wrong.err
 
 
 def test_a_change_is_refused_by_its_number_or_for_its_confidence(linefix: Linefix, folder: Path) -> None:
