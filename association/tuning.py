@@ -59,7 +59,9 @@ AT_ONCE = 256  # runs, cells and poses that go through a stage together; measure
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
 RIVAL_SHARE = 0.75  # of the best value, tables; a pose above it must not have been missed, for the verdict weighs it
-FEW_KEPT = 24  # poses, tables; of a changed or mirrored scan, of which only the best matter
+# Distinct poses that are kept at least, tables: the verdict compares the best with the others. Of a changed or mirrored
+# scan only the best matter, and no more are kept.
+FEW_KEPT = 24
 DISTINCT_DISTANCE = 0.3  # m, tables
 DISTINCT_ANGLE = 0.1  # rad, tables
 SOFT_FLOOR = -20.0  # nats, tables; the most that a soft prior speaks against a pose

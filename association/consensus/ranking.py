@@ -16,7 +16,7 @@ from ..deadline import CancelledError
 from ..layout import ESTIMATE, MATCH, SET_SCORE, Integers
 from ..options import MapsPrior
 from ..search.candidates import Candidates
-from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, INSIDE, MOST_LOOKED_AT
+from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, FEW_KEPT, INSIDE, MOST_LOOKED_AT
 from .beams import beam_evidence_at, beam_score
 from .consensus_set import ConsensusSet, poses_of
 from .kernels.priors import prior_values
@@ -28,7 +28,6 @@ from .tuning import (
     FEW_BEAMS,
     LATE_CANDIDATES,
     LATE_FINALISTS,
-    LEAST_DISTINCT,
     MOST_BEAMS,
     RANKED_AT_ONCE,
     SAME_FAMILY,
@@ -75,7 +74,7 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Cons
     if context.with_beams:
         scored = _add_beams(context, scored)
     bonuses = NO_PRIOR if context.prior is None else _prior_values(context, scored.estimates)
-    most = max(LEAST_DISTINCT, context.options.max_alternatives + 1, context.index.least_kept)
+    most = max(FEW_KEPT, context.options.max_alternatives + 1, context.index.least_kept)
     order = _distinct(scored, bonuses, most)
     return [_consensus_set(context, scored, bonuses, k) for k in order.tolist()]
 

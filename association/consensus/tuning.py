@@ -52,7 +52,6 @@ COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against tha
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------
 
-LEAST_DISTINCT = 24  # tables; explanations at least: the verdict compares the best with the others
 SAME_FAMILY = 12.8  # squared deviations, geometry: 99.5 % of chi-square of three; two nearer poses are one
 
 # --- Lines of sight ---------------------------------------------------------------------------------------------------

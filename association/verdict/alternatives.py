@@ -67,7 +67,7 @@ def probability_by_shown(context: SearchContext, best: ConsensusSet, others: Seq
     behind = shown[0] - shown[1:]
     rest = np.array([best.posterior - one.posterior for one in others]) - behind
     limits = np.full(len(others), ABSENCE)
-    near = (behind + np.minimum(rest, limits) < NO_ALTERNATIVE) & (rest > limits)
+    near = (behind + np.minimum(rest, limits) < NO_ALTERNATIVE + ABSENCE) & (rest > limits)
     limits[near] = np.maximum(ABSENCE, absences(context, best, [others[k] for k in np.flatnonzero(near).tolist()]))
     behind += np.minimum(rest, limits)
     return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind) / ALTERNATIVE_TEMPERATURE).sum()))

@@ -14,6 +14,7 @@ LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 # The most that each thing counts which an alternative has and the scan does not show, tables: it was moved away, with a
 # probability of 1 in 55.
 ABSENCE = 4.0  # nats
+LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 

@@ -10,14 +10,14 @@ from registration.layout import Floats, Records
 from ...consensus.kernels.beams import across_wall, evidence_of_beam, put_beam
 from ...consensus.tuning import BEAMS_PASSED, BEAMS_READ, BEHIND, CERTAIN, LEAST_INCIDENCE
 from ...tables import Place, Rays, Workspace
+from ..tuning import LEAST_OF_BEAM
 
 
 @kernel
 def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readings: Floats) -> None:
-    """Write what each beam reads at the first of the poses, `readings` (n, 3).
+    """Write for each beam its part of the score at the first of the poses, nats, and where the map stops it, metres.
 
-    Its part of the score, nats; where the map stops it, metres, or its range where it passes through no wall; and 1 if
-    it reads the wall that the map shows, 2 if it passes through it, else 0.
+    `readings` (n, 2). The second is the range of the beam where it does not pass through a wall.
     """
     beams = rays.beams
     walls = place.walls
@@ -28,7 +28,6 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
     for i in range(len(beams)):
         readings[i, 0] = 0.0
         readings[i, 1] = beams[i].range
-        readings[i, 2] = 0.0
         if math.isinf(beams[i].range):
             continue
         put_beam(ray, beams[i], c, s, pose)
@@ -38,9 +37,7 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
             continue
         read, passed = evidence_of_beam(across, walls[w])
         readings[i, 0] = (BEAMS_READ * read - BEAMS_PASSED * passed) / len(beams)
-        readings[i, 2] = 1.0 if abs(across) <= CERTAIN else 0.0
         if across > CERTAIN:
-            readings[i, 2] = 2.0
             incidence = max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx))
             readings[i, 1] = beams[i].range - across / incidence
 
@@ -49,7 +46,7 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
 def limit_by_things(rays: Rays, here: Floats, there: Floats, reach: float, limit: float) -> float:
     """Return what beams count against an alternative, nats, where each thing counts `limit` at most.
 
-    `here` and `there` (n, 3) are what `read_beams` writes at the answer and at the alternative. Things are components
+    `here` and `there` (n, 2) are what `read_beams` writes at the answer and at the alternative. Things are components
     of the places where beams differ, linked where they are within `reach` metres.
     """
     n = len(rays.beams)
@@ -59,7 +56,7 @@ def limit_by_things(rays: Rays, here: Floats, there: Floats, reach: float, limit
     for i in range(n):
         more = here[i, 0] - there[i, 0]
         distance = there[i, 1] if more > 0.0 else here[i, 1]
-        differs[i] = here[i, 2] != there[i, 2]
+        differs[i] = abs(more) > LEAST_OF_BEAM
         x[i] = rays.beams[i].x + distance * rays.beams[i].dx
         y[i] = rays.beams[i].y + distance * rays.beams[i].dy
     waiting = np.empty(n, np.int64)

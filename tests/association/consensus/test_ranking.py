@@ -24,7 +24,6 @@ from association.consensus.tuning import (
     BEAMS_PASSED,
     BEAMS_READ,
     LATE_FINALISTS,
-    LEAST_DISTINCT,
     MOST_BEAMS,
 )
 from association.context import SearchContext
@@ -32,6 +31,7 @@ from association.explain import search_and_explain
 from association.layout import ESTIMATE, FOUND, record
 from association.search.candidates import Candidates, find_candidates
 from association.tables import Place, Rays
+from association.tuning import FEW_KEPT
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -122,7 +122,7 @@ def test_lines_of_sight_count_where_there_are_no_beams() -> None:
     assert blind.score - sighted.score > 3.0
 
 
-@pytest.mark.parametrize(("wanted", "count"), [(5, LEAST_DISTINCT), (LEAST_DISTINCT + 2, LEAST_DISTINCT + 3), (50, 30)])
+@pytest.mark.parametrize(("wanted", "count"), [(5, FEW_KEPT), (FEW_KEPT + 2, FEW_KEPT + 3), (50, 30)])
 def test_so_many_are_told_apart_as_may_be_deciding_place(wanted: int, count: int) -> None:
     """One more than the alternatives, and enough for the verdict."""
     context = context_of(index_of(equal_rooms(30)), ROOM_SCAN, max_alternatives=wanted)
