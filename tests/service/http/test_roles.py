@@ -39,7 +39,8 @@ CALLS: dict[tuple[str, str], tuple[Role | None, Any]] = {
     ("POST", "/v1/maps:import"): (Role.ASSOCIATE, {}),
     ("POST", "/v1/scans:import"): (Role.ASSOCIATE, {}),
 }
-FORMS = frozenset({("POST", "/v1/maps:import"), ("POST", "/v1/scans:import")})  # what may send one is told so: 415
+# A key with the right gets 415, because the body is no form.
+FORMS = frozenset({("POST", "/v1/maps:import"), ("POST", "/v1/scans:import")})
 NAMES_A_MAP = {call for call, (_, body) in CALLS.items() if "{map_id}" in call[1] or "{map_id}" in str(body)}
 TOLD = [(method, path, role) for method, path in CALLS for role in Role]
 
