@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from buildings import OfficePlan, World, offices, with_obstacles
 from registration import MeasuredSegments, RigidTransform, Segments
-from simulation import OfficePlan, Scanner, World, offices, scan, with_obstacles
+from simulation import Scanner, scan
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 from .collection import LEVELS, SIGMA, Collection, Query

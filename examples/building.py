@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from buildings import OfficePlan, World, oblique, offices, with_obstacles
+from buildings.rooms import outline
 from registration import RigidTransform, Segments
-from simulation import OfficePlan, Scanner, SimulatedScan, World, oblique, offices, scan, with_obstacles
-from simulation.worlds import outline
+from simulation import Scanner, SimulatedScan, scan
 
 Floats = NDArray[np.float64]
 

@@ -20,8 +20,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy import ndimage
 
+from buildings import OfficePlan, World, offices
 from registration import RigidTransform, Segments
-from simulation import OfficePlan, Scanner, World, offices, scan
+from simulation import Scanner, scan
 
 Floats = NDArray[np.float64]
 

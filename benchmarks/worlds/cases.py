@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import HardPrior, MapIndex, Scan
+from buildings import CONDITIONS, FAMILIES, Case, draw_case
 from registration import MeasuredSegments
-from simulation import CONDITIONS, FAMILIES, Case, Scanner, draw_case
+from simulation import Scanner
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 FORMS = ("ranges", "segments")
@@ -45,9 +46,9 @@ def questions(worlds: Iterable[str], conditions: Iterable[str], numbers: Iterabl
     Parameters
     ----------
     worlds : iterable of str
-        Names in `simulation.FAMILIES`.
+        Names in `buildings.FAMILIES`.
     conditions : iterable of str
-        Names in `simulation.CONDITIONS`.
+        Names in `buildings.CONDITIONS`.
     numbers : iterable of int
         From 0 up.
     """

@@ -31,8 +31,9 @@ from association import (
     message_of,
 )
 from association.index.joint import JointIndex, gap_of, joint_sigma, places_of
+from buildings import FLOOR_KINDS, draw_floors
 from registration import RigidTransform, Segments
-from simulation import FLOOR_KINDS, Scanner, draw_floors, scan
+from simulation import Scanner, scan
 
 SCANNER = Scanner(beams=720, sigma=0.01)
 KIND = FLOOR_KINDS["laboratories"]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from buildings import OfficePlan, offices
 from examples.sample import SEED, way_through, write_sample
-from simulation import OfficePlan, offices
 
 from .running import Linefix
 

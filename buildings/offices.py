@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import SimulationError
-from .worlds import World, drawn
+from simulation import SimulationError
+
+from .rooms import World, drawn
 
 Floats = NDArray[np.float64]
 Opening = tuple[float, float]

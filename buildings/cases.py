@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
+from simulation import Scanner, SimulationError, scan
 
-from .buildings import FAMILIES, Style
 from .changes import clutter
 from .conditions import CONDITIONS, Stranger
-from .errors import SimulationError
+from .families import FAMILIES, Style
 from .map_errors import clipped
 from .places import free_place
-from .scanner import Scanner, scan
 
 Floats = NDArray[np.float64]
 

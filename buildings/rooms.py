@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-
-from .errors import SimulationError
+from simulation import SimulationError
 
 Floats = NDArray[np.float64]
 Corner = tuple[float, float]
