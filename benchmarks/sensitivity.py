@@ -37,16 +37,7 @@ STEP = 3  # one case in three of the four kinds in turn: some of each kind
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """The part of an answer that is compared, and whether it is right.
-
-    Attributes
-    ----------
-    status : str
-    usable : bool
-    pose : RigidTransform or None
-    probability : float or None
-    right : bool
-    """
+    """The part of an answer that is compared, and whether it is right."""
 
     status: str
     usable: bool

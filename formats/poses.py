@@ -30,13 +30,7 @@ class StampedPose:
 
 
 def write_tum(poses: Iterable[StampedPose], path: str | os.PathLike[str]) -> int:
-    """Write poses as TUM has them: ``seconds x y z qx qy qz qw`` a line; return how many.
-
-    Parameters
-    ----------
-    poses : iterable of StampedPose
-    path : str or path
-    """
+    """Write poses as TUM has them: ``seconds x y z qx qy qz qw`` a line; return how many."""
     count = 0
     with Path(path).open("w", encoding="ascii", newline="\n") as file:
         for one in poses:
