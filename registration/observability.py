@@ -1,4 +1,4 @@
-"""How far the directions of parallel lines may differ by noise."""
+"""The limit up to which lines count as parallel, by noise alone."""
 
 from __future__ import annotations
 
