@@ -171,10 +171,9 @@ BROKEN: dict[str, Callable[[Robots], None]] = {
 }
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
 @pytest.mark.parametrize("name", BROKEN)
-def test_one_broken_transform_costs_nothing_else(tmp_path: Path, kind: str, name: str) -> None:
-    bag = Robots(kind, tmp_path)
+def test_one_broken_transform_costs_nothing_else(tmp_path: Path, name: str) -> None:
+    bag = Robots("mcap", tmp_path)
     BROKEN[name](bag)
     bag.drive("/tf", "odom", "base_link")
     fixed(bag, "base_link", "laser")
