@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from buildings import OfficePlan, World, offices, with_obstacles
 from registration import MeasuredSegments, RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import OfficePlan, Scanner, World, offices, scan, with_obstacles
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 from .collection import LEVELS, SIGMA, Collection, Query

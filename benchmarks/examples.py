@@ -18,9 +18,9 @@ from association.verdict.features import Features, describe_answer, with_null_sc
 from association.verdict.models import USUAL
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
-from buildings import CONDITIONS, FAMILIES
-from buildings import Case as DrawnCase
 from registration import RigidTransform
+from simulation import CONDITIONS, FAMILIES
+from simulation import Case as DrawnCase
 from vectorization import vectorize
 
 from .collection import Collection, MapKey, Query, fold

@@ -37,9 +37,8 @@ from association import (
     associate_on_maps,
     map_set,
 )
-from buildings import FLOOR_KINDS, FloorKind, draw_floors, free_places
 from registration import MeasuredSegments, RigidTransform, Segments, wrap_angle
-from simulation import Scanner, scan
+from simulation import FLOOR_KINDS, FloorKind, Scanner, draw_floors, free_places, scan
 
 from .collection import SIGMA
 from .growth import campus_plans, draw_query

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import linefix
-from buildings import draw_case
 from formats.grids.cells import FREE, OCCUPIED, UNKNOWN_GREY, classify
 from formats.grids.map_server import read_grid
 from formats.options import DEFAULT_OPTIONS
 from formats.report import Notes
 from registration import RigidTransform, Segments
+from simulation import draw_case
 from vectorization import LaserScan
 
 from .grid_scans import GRIDS, PosedScan, grid_path, simulated

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import MapIndex, Scan, associate
-from buildings import OfficePlan
 from registration import Correspondences, JointSums, MeasuredSegments, RigidTransform, Segments
 from service.work.warmup import warm_up
+from simulation import OfficePlan
 
 from .collection import FLOOR_PLANS, SIGMA
 from .drawn import NEAR, campus_of_offices, cluttered_scan, nearby, take_scan

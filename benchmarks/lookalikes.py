@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import AssociationOptions, AssociationResult, MapIndex, Scan, Status, associate
-from buildings import corridor, rectangle_room, square_room
 from registration import RigidTransform, Segments, wrap_angle
+from simulation import corridor, rectangle_room, square_room
 
 from .drawn import SCANNER, take_scan
 from .outcomes import progress

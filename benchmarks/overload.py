@@ -23,8 +23,8 @@ import numpy as np
 import orjson
 from scipy import stats
 
-from buildings import World
 from examples.running import running_service
+from simulation import World
 from simulation import scan as simulate
 
 from .drawn import SCANNER, campus_of_offices

@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import linefix
-from buildings.changes import rearranged
-from buildings.families import FAMILIES
-from buildings.places import free_place, is_free
 from registration import InputError, RigidTransform, Segments, wrap_angle
 from ros2.agreement import Agreement, Event, Observation
 from ros2.locating import OPTIONS, Located
 from ros2.messages import Time
 from simulation import Scanner, scan
+from simulation.buildings import FAMILIES
+from simulation.changes import rearranged
+from simulation.places import free_place, is_free
 
 from .outcomes import progress
 from .queries import logs

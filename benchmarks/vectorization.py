@@ -18,9 +18,19 @@ from pathlib import Path
 
 import numpy as np
 
-from buildings import OfficePlan, cut_square, l_room, oblique, offices, pillars, with_obstacles
 from registration import RigidTransform, Segments, wrap_angle
-from simulation import Scanner, SimulatedScan, scan
+from simulation import (
+    OfficePlan,
+    Scanner,
+    SimulatedScan,
+    cut_square,
+    l_room,
+    oblique,
+    offices,
+    pillars,
+    scan,
+    with_obstacles,
+)
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 DATA = Path(os.environ.get("LINEFIX_BENCH_DATA", Path(__file__).parents[1] / ".." / "shared" / "data"))

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from buildings import OfficePlan, World, oblique, offices, with_obstacles
-from buildings.rooms import outline
 from registration import RigidTransform, Segments
-from simulation import Scanner, SimulatedScan, scan
+from simulation import OfficePlan, Scanner, SimulatedScan, World, oblique, offices, scan, with_obstacles
+from simulation.worlds import outline
 
 Floats = NDArray[np.float64]
 

@@ -11,12 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import linefix
-from buildings import FAMILIES, free_place
-from buildings.changes import rearranged
 from formats.colours import CHANGES, INK, WALL
 from map_quality import MapUpdate
 from registration import RigidTransform, Segments
-from simulation import Scanner
+from simulation import FAMILIES, Scanner, free_place
+from simulation.changes import rearranged
 
 PICTURE = Path(__file__).parents[1] / "docs" / "keep-the-map-true.png"
 SCANNER = Scanner.over(math.tau, 720, range_max=20.0, sigma=0.02)

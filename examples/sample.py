@@ -20,9 +20,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy import ndimage
 
-from buildings import OfficePlan, World, offices
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import OfficePlan, Scanner, World, offices, scan
 
 Floats = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from buildings import FAMILIES, OfficePlan, corridor, free_place, offices
-from buildings.rooms import outline
 from registration import RigidTransform, Segments
+from simulation import FAMILIES, OfficePlan, corridor, free_place, offices
+from simulation.worlds import outline
 
 FOLDER = Path(__file__).parents[1] / "service" / "page" / "examples"
 DIGITS = 3  # millimetres

@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from buildings import World
 from registration import MeasuredSegments, RigidTransform, Segments
-from simulation import Scanner, SimulatedScan, scan
+from simulation import Scanner, SimulatedScan, World, scan
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 from .scenes import REACH, UNIT, Places

@@ -10,9 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from buildings import World, cut_square, oblique, pillars
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import Scanner, World, cut_square, oblique, pillars, scan
 
 Floats = NDArray[np.float64]
 Places = Literal["path", "scattered"]

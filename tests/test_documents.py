@@ -19,9 +19,7 @@ MADE = "out/"  # what a command writes is there only afterwards
 LINK = re.compile(r"\]\((?!https?:|#)([^)\s#]+)")
 PLACE = re.compile(r"\]\((?!https?:)([^)\s#]*)#([^)\s]+)\)")
 FILE = re.compile(r"(?<![\w./-])(?:[\w.*-]+/)+[\w*-]+\.(?:py|json|md|png|csv|cpp|toml)\b")
-FOLDER = re.compile(
-    r"`((?:service|association|registration|vectorization|simulation|buildings|tests|docs|examples)/[\w/.-]*)`"
-)
+FOLDER = re.compile(r"`((?:service|association|registration|vectorization|simulation|tests|docs|examples)/[\w/.-]*)`")
 MODULE = re.compile(r"python -m ([a-z_.]+)")
 TARGET = re.compile(r"`make ([a-z-]+)|^make ([a-z-]+)", re.MULTILINE)
 TEST = re.compile(r"`(test_\w+)`")

@@ -28,7 +28,7 @@ from .suites import SUITES, Suite, changed_lines, known_equivalents, suite_of
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "out" / "mutants"
-PACKAGES = ("registration", "vectorization", "service", "simulation", "buildings", "map_quality", "association")
+PACKAGES = ("registration", "vectorization", "service", "simulation", "map_quality", "association")
 LEFT_OUT = ("tuning.py", "layout.py", "migrations", "examples.py")
 """Modules and folders of measured numbers or of names."""
 WITHOUT_EFFECT = re.compile(r"core/(RemoveDecorator|ReplaceBinaryOperator_BitOr_\w+|ExceptionReplacer)")

@@ -69,7 +69,6 @@ SUITES = {
     "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),
-    "buildings/": Suite(("tests/buildings",)),
     "map_quality/analyze/": Suite(("tests/map_quality/analyze",)),
     "map_quality/": Suite(("tests/map_quality",)),
     "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from buildings import OfficePlan, offices
 from registration import RigidTransform, Segments
+from simulation import OfficePlan, offices
 
 from ..collection import LEVELS, SIGMA
 from ..queries import floor_plans

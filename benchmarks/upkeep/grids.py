@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from buildings import free_place
 from formats import LineMap, read_map
 from registration import Segments
-from simulation import Scanner, scan
+from simulation import Scanner, free_place, scan
 
 CELL = 0.05  # m
 PLACES = 150

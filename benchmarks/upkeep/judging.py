@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from buildings import Building
 from map_quality import Change, MapUpdate
 from registration import RigidTransform, Segments
-from simulation import scan
+from simulation import Building, scan
 
 from .scenes import SCANNER, Scene
 

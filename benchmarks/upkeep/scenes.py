@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import mirrored
-from buildings import FAMILIES, Building, free_place
-from buildings.changes import clutter, rearranged, with_doors
 from linefix import scan_of
 from map_quality import VisitScan
 from registration import RigidTransform, Segments
-from simulation import Scanner, SimulationError, scan
+from simulation import FAMILIES, Building, Scanner, SimulationError, free_place, scan
+from simulation.changes import clutter, rearranged, with_doors
 from vectorization import LaserScan
 
 SCANNER = Scanner.over(math.tau, 720, range_max=20.0, sigma=0.02)

@@ -10,11 +10,10 @@ import numpy as np
 
 import map_quality
 from association import Deadline, MapIndex
-from buildings import FAMILIES
 from map_quality import MapUpdate, VisitScan
 from map_quality.update.scans import search
 from registration import RigidTransform, Segments
-from simulation import SimulationError
+from simulation import FAMILIES, SimulationError
 
 from ..outcomes import progress
 from ..table import Row, at_least, at_most, print_rows, within

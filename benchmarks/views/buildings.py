@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from association import AssociationOptions, MapIndex, associate
-from buildings import FAMILIES, draw_case
 from registration import RigidTransform, Segments
-from simulation import SimulationError, scan
+from simulation import FAMILIES, draw_case, scan
+from simulation.errors import SimulationError
 
 from ..drawn import SCANNER
 from ..lookalikes import draw_pose, scenes

@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import Scan, View, assemble
-from buildings import CONDITIONS, Case
-from buildings.conditions import Stranger
-from buildings.places import is_free
 from linefix.mounted import ranges_scan
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import CONDITIONS, Case, Scanner, scan
+from simulation.conditions import Stranger
+from simulation.places import is_free
 from vectorization import LaserScan
 
 from ..collection import Query

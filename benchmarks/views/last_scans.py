@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import MapIndex, Scan
-from buildings import FAMILIES, draw_case
 from registration import RigidTransform
-from simulation import SimulationError
+from simulation import FAMILIES, draw_case
+from simulation.errors import SimulationError
 
 from ..outcomes import progress
 from ..queries import logs

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from association import MapIndex, Scan, View, assemble
-from buildings import free_place
-from buildings.changes import clutter
 from linefix.mounted import ranges_scan
 from registration import RigidTransform, Segments
-from simulation import Scanner, SimulationError, scan
+from simulation import Scanner, free_place, scan
+from simulation.changes import clutter
+from simulation.errors import SimulationError
 from vectorization import LaserScan, Motion
 
 from ..queries import floor_plans

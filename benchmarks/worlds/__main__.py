@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from buildings import CONDITIONS, FAMILIES
+from simulation import CONDITIONS, FAMILIES
 
 from ..engines import add_engine, engine_of
 from ..table import machine

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import HardPrior, MapIndex, Scan
-from buildings import CONDITIONS, FAMILIES, Case, draw_case
 from registration import MeasuredSegments
-from simulation import Scanner
+from simulation import CONDITIONS, FAMILIES, Case, Scanner, draw_case
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 FORMS = ("ranges", "segments")
@@ -46,9 +45,9 @@ def questions(worlds: Iterable[str], conditions: Iterable[str], numbers: Iterabl
     Parameters
     ----------
     worlds : iterable of str
-        Names in `buildings.FAMILIES`.
+        Names in `simulation.FAMILIES`.
     conditions : iterable of str
-        Names in `buildings.CONDITIONS`.
+        Names in `simulation.CONDITIONS`.
     numbers : iterable of int
         From 0 up.
     """

@@ -13,9 +13,8 @@ import numpy as np
 import orjson
 
 from association import AssociationResult, Status, associate
-from buildings import Case, wall_of_segment
 from registration import RigidTransform, Segments, wrap_angle
-from simulation import Scanner, scan
+from simulation import Case, Scanner, scan, wall_of_segment
 
 from ..outcomes import offset
 from .cases import Question, in_map, kept_for_report

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from buildings import Case, draw_case
 from registration.layout import Floats
+from simulation import Case, draw_case
 
 from ..pictures import COLOURS, FOLDER, INK, save
 

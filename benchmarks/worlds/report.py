@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from buildings import CONDITIONS, FAMILIES
+from simulation import CONDITIONS, FAMILIES
 
 from ..table import Row, print_rows, print_table
 from .cases import FORMS, HALVES, in_map

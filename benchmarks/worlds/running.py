@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from batch import Engine, Lost, Processes
-from buildings import CONDITIONS, FAMILIES
+from simulation import CONDITIONS, FAMILIES
 
 from .cases import FORMS, in_map, questions
 from .outcomes import WorldOutcome, answer

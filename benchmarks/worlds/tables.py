@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from association import Status
-from buildings import CONDITIONS, FAMILIES
+from simulation import CONDITIONS, FAMILIES
 
 from ..table import mean, print_table, quantile
 from .cases import FORMS, in_map, kept_for_report

@@ -31,9 +31,8 @@ from association import (
     message_of,
 )
 from association.index.joint import JointIndex, gap_of, joint_sigma, places_of
-from buildings import FLOOR_KINDS, draw_floors
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import FLOOR_KINDS, Scanner, draw_floors, scan
 
 SCANNER = Scanner(beams=720, sigma=0.01)
 KIND = FLOOR_KINDS["laboratories"]

@@ -26,11 +26,10 @@ from association.explain import search_and_explain
 from association.explanations import Explanations, add_alternatives
 from association.search.candidates import Effort
 from association.to_scale import search_to_scale
-from buildings import l_room
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 from registration.options import Estimator
-from simulation import Scanner, scan
+from simulation import Scanner, l_room, scan
 from vectorization import LaserScan, vectorize
 
 from ..map_quality.check.drawn import faces, sampled

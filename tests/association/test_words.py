@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from association import AssociationResult, MapIndex, Scan, associate, message_of
-from buildings import World, corridor, l_room, rectangle_room, square_room
 from registration import MeasuredSegments, RigidTransform, Segments
+from simulation import World, corridor, l_room, rectangle_room, square_room
 
 NOTHING = Segments.from_array(np.zeros((0, 4)))
 

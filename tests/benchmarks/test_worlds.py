@@ -18,8 +18,8 @@ from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, w
 from benchmarks.worlds.pictures import draw_worlds
 from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
-from buildings import CONDITIONS, FAMILIES, draw_case
 from registration import RigidTransform
+from simulation import CONDITIONS, FAMILIES, draw_case
 
 FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=125)
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from association import causes
-from buildings import OfficePlan, offices
 from examples.sample import SEED, main, way_through, write_sample
 from map_quality.check import samples
+from simulation import OfficePlan, offices
 
 from .running import Linefix
 

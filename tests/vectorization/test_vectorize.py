@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from buildings import World, l_room, oblique, offices, square_room
 from registration import RigidTransform, Segments
 from registration.layout import Floats
-from simulation import Scanner, SimulatedScan, scan
+from simulation import Scanner, SimulatedScan, World, l_room, oblique, offices, scan, square_room
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 POSE = RigidTransform(0.7, -0.4, 0.3)

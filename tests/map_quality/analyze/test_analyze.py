@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex, Status
-from buildings import corridor, l_room, rectangle_room
-from buildings.rooms import outline
 from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.standing import is_free
 from map_quality.views import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from registration import Segments
+from simulation import corridor, l_room, rectangle_room
+from simulation.worlds import outline
 
 L = [(0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (5.0, 3.0), (5.0, 6.0), (0.0, 6.0)]
 

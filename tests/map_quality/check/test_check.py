@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex
-from buildings import OfficePlan, offices
 from map_quality import MapCheck, check_map
 from map_quality.views import Robot, look
 from registration import RigidTransform, Segments
 from registration.layout import Floats
+from simulation import OfficePlan, offices
 
 from .drawn import centre_lines, faces, index_of, reversed_ends
 

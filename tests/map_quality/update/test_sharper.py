@@ -6,9 +6,9 @@ import numpy as np
 
 import map_quality
 from association import MapIndex
-from buildings.map_errors import walls_off
 from map_quality import MapUpdate
 from registration import Segments
+from simulation.map_errors import walls_off
 
 from .hall import PILLAR, RACK, box, segments, visit
 

@@ -9,8 +9,8 @@ import httpx
 import numpy as np
 import pytest
 
-from buildings import offices
 from service.schemas import examples
+from simulation import offices
 
 URL = "/v1/maps/analyzed:analyze"
 LASER = {"fov": 6.2831853, "beams": 360, "range_max": 12.0, "sigma": 0.02}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex
-from buildings import rectangle_room
 from map_quality import Analysis, Robot, standing_places
 from registration import Segments
 from service.work import analyzing
 from service.work.analyzing import Tally, take_looks
+from simulation import rectangle_room
 
 BOX = np.array([[-2.5, -1.5, -2.5, 0.0], [-2.5, 0.0, -1.0, 0.0], [-1.0, 0.0, -1.0, -1.5], [-1.0, -1.5, -2.5, -1.5]])
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-from simulation import Scanner
-from simulation.kernels.casting import cast
 
+from .buildings.building import FIXED, Building
+from .buildings.shapes import box, edges, oblong, ring, turned
 from .crossings import crosses
-from .families.building import FIXED, Building
-from .families.shapes import box, edges, oblong, ring, turned
+from .kernels.casting import cast
+from .scanner import Scanner
 
 Floats = NDArray[np.float64]
 

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-from simulation import Scanner, SimulationError, scan
 
+from .buildings import FAMILIES, Style
 from .changes import clutter
 from .conditions import CONDITIONS, Stranger
-from .families import FAMILIES, Style
+from .errors import SimulationError
 from .map_errors import clipped
 from .places import free_place
+from .scanner import Scanner, scan
 
 Floats = NDArray[np.float64]
 

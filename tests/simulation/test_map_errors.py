@@ -3,11 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from buildings import FAMILIES, free_place, wall_of_segment
-from buildings.map_errors import clipped, exact, in_pieces, stretched, walls_off
 from registration import RigidTransform, Segments
 from registration.layout import Floats
-from simulation import Scanner, scan
+from simulation import FAMILIES, Scanner, free_place, scan, wall_of_segment
+from simulation.map_errors import clipped, exact, in_pieces, stretched, walls_off
 
 # A wall with a doorway, one that faces it, one in line with the first but far off, and one across.
 ENDS = [[0.0, 0.0, 2.0, 0.0], [3.0, 0.0, 6.0, 0.0], [6.0, 3.0, 0.0, 3.0], [9.0, 0.0, 12.0, 0.0], [6.0, 0.0, 6.0, 3.0]]

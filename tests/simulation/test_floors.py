@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from buildings import FLOOR_KINDS, draw_floors, free_places
+from simulation import FLOOR_KINDS, draw_floors, free_places
 
 
 @pytest.mark.parametrize("name", FLOOR_KINDS)

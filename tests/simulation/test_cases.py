@@ -4,12 +4,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from buildings import CONDITIONS, FAMILIES, Case, Stranger, draw_case
-from buildings.cases import BEAMS, RANGE_MAX, _unmapped_part, _window_elsewhere
-from buildings.places import distances
 from registration import RigidTransform, Segments
 from registration.layout import Floats
-from simulation import Scanner, SimulationError, scan
+from simulation import CONDITIONS, FAMILIES, Case, Scanner, SimulationError, Stranger, draw_case, scan
+from simulation.cases import BEAMS, RANGE_MAX, _unmapped_part, _window_elsewhere
+from simulation.places import distances
 
 
 def shown(case: Case) -> Floats:

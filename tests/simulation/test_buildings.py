@@ -3,12 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from buildings import FAMILIES, free_place
-from buildings.crossings import crosses
-from buildings.families import FIXED, Building
-from buildings.families.plan import Plan
-from buildings.families.shapes import arc, box, chamfered, edges, oblong, ring
-from simulation import Scanner, SimulationError, scan
+from simulation import FAMILIES, Scanner, SimulationError, free_place, scan
+from simulation.buildings import FIXED, Building
+from simulation.buildings.plan import Plan
+from simulation.buildings.shapes import arc, box, chamfered, edges, oblong, ring
+from simulation.crossings import crosses
 
 ALL_AROUND = Scanner.over(math.tau, 720, range_max=500.0, sigma=0.0)
 SEEDS = (1, 2)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import Segments
-from simulation import SimulationError
 
 from ..crossings import crosses
+from ..errors import SimulationError
 from .building import FIXED, Building
 from .shapes import edges
 

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from buildings import free_place
-from buildings.families.shapes import box, edges
-from buildings.places import distances, is_free
 from registration import Segments
-from simulation import SimulationError
+from simulation import SimulationError, free_place
+from simulation.buildings.shapes import box, edges
+from simulation.places import distances, is_free
 
 ROOM = np.vstack([edges(box(0, 0, 6, 4)), edges(box(2, 1, 3, 2)[::-1])])  # with a pillar
 

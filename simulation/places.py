@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-from simulation import SimulationError
-from simulation.kernels.casting import cast
+
+from .errors import SimulationError
+from .kernels.casting import cast
 
 Floats = NDArray[np.float64]
 

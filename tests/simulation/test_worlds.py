@@ -5,8 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from buildings import (
+import simulation
+from registration import RigidTransform
+from simulation import (
     OfficePlan,
+    Scanner,
+    SimulationError,
     corridor,
     cut_square,
     l_room,
@@ -14,11 +18,10 @@ from buildings import (
     offices,
     pillars,
     rectangle_room,
+    scan,
     square_room,
     with_obstacles,
 )
-from registration import RigidTransform
-from simulation import Scanner, SimulationError, scan
 
 CLOSED = {
     "rectangle_room": rectangle_room(),
@@ -118,3 +121,11 @@ def test_a_world_that_cannot_be_is_refused(make: Callable[[], object], argument:
     with pytest.raises(SimulationError) as caught:
         make()
     assert caught.value.argument == argument
+
+
+def test_everything_exported_exists_and_is_listed_in_order() -> None:
+    # Constants, classes, functions; each by name.
+    assert simulation.__all__ == sorted(
+        simulation.__all__, key=lambda name: (not name.isupper(), name[0].islower(), name)
+    )
+    assert all(hasattr(simulation, name) for name in simulation.__all__)

@@ -1,6 +1,6 @@
 """Buildings and cases are drawn as they were: figures of benchmarks compare only while the same seed draws the same.
 
-After a change that is meant to draw others: ``python -m tests.buildings.test_as_drawn``.
+After a change that is meant to draw others: ``python -m tests.simulation.test_as_drawn``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from buildings import CONDITIONS, FAMILIES, OfficePlan, World, draw_case, offices
+from simulation import CONDITIONS, FAMILIES, OfficePlan, World, draw_case, offices
 
 FILE = Path(__file__).with_name("as_drawn.json")
 SEEDS = range(1, 9)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulation import SimulationError
-
-from .rooms import World, drawn
+from .errors import SimulationError
+from .worlds import World, drawn
 
 Floats = NDArray[np.float64]
 Opening = tuple[float, float]

@@ -3,14 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from buildings import FAMILIES, free_place
-from buildings.changes import clutter, rearranged, with_doors
-from buildings.crossings import crosses
-from buildings.families import FIXED, Building
-from buildings.families.plan import Plan
-from buildings.families.shapes import box
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from simulation import FAMILIES, Scanner, free_place, scan
+from simulation.buildings import FIXED, Building
+from simulation.buildings.plan import Plan
+from simulation.buildings.shapes import box
+from simulation.changes import clutter, rearranged, with_doors
+from simulation.crossings import crosses
 
 AHEAD = Scanner(1, 0.0, 0.1, sigma=0.0, range_max=100.0)
 

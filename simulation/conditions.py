@@ -10,11 +10,11 @@ from enum import StrEnum
 import numpy as np
 
 from registration import Segments
-from simulation import Scanner
 
+from .buildings import Building
 from .changes import rearranged, with_doors
-from .families import Building
 from .map_errors import DrawnMap, exact, in_pieces, stretched, walls_off
+from .scanner import Scanner
 
 SWEEP = 0.1  # s; of a full turn of the laser
 TURNING = math.radians(90.0)  # rad/s

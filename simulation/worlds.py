@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-from simulation import SimulationError
+
+from .errors import SimulationError
 
 Floats = NDArray[np.float64]
 Corner = tuple[float, float]
