@@ -71,10 +71,6 @@ def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     verdict : Verdict
         Of the drive.
 
-    Returns
-    -------
-    LastView
-
     Raises
     ------
     CancelledError

@@ -384,18 +384,5 @@ class Workspace(NamedTuple):
         held.fill(-1)
         hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
         matches, wall_sums, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SUMS), record(SCRATCH)
-        return cls(
-            matches,
-            spreads,
-            shifts,
-            later,
-            possible,
-            hypotheses,
-            near,
-            held,
-            shifts_held,
-            weights_held,
-            listed,
-            wall_sums,
-            scratch,
-        )
+        arrays = matches, spreads, shifts, later, possible, hypotheses, near
+        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch)

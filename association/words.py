@@ -15,12 +15,7 @@ OTHER_WAY_ROUND = 0.5 * math.pi  # rad
 
 
 def message_of(result: AssociationResult) -> str:
-    """Return the verdict in words.
-
-    Parameters
-    ----------
-    result : AssociationResult
-    """
+    """Return the verdict in words."""
     if result.status is Status.NO_MATCH or result.pose is None or result.diagnostics is None:
         return f"No pose on {'these maps' if result.maps else 'this map'} explains the scan."
     least = result.diagnostics.score - AS_WELL

@@ -19,19 +19,8 @@ from typing import Any
 
 from compiled import cache_directory
 
-from .sensitivity import (
-    MOVED,
-    Effect,
-    Threshold,
-    Told,
-    effect_of,
-    moved,
-    print_effects,
-    sample,
-    sample_of,
-    thresholds,
-    timed,
-)
+from .sensitivity import MOVED, Effect, Told, effect_of, print_effects, sample, sample_of, timed
+from .thresholds import Threshold, moved, thresholds
 
 
 def run_compiled(count: int, chosen: Sequence[Threshold]) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated, TextIO
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import track
@@ -80,8 +79,7 @@ class Tally:
         self.times.append(found.timing_ms["total"])
         self.stays.take(stamp_ns, found)
         if found.pose is not None and found.usable:
-            covariance = None if found.covariance is None else np.array(found.covariance)
-            self.usable.append(StampedPose(stamp_ns, found.pose, covariance))
+            self.usable.append(StampedPose(stamp_ns, found.pose))
             self.on_map.setdefault(found.map_id or "", ([], []))[0].append(found.pose)
         elif found.pose is not None:
             self.on_map.setdefault(found.map_id or "", ([], []))[1].append(found.pose)

@@ -16,7 +16,7 @@ from .logs.sending import scan_json
 from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
-from .poses import StampedPose, pose_message, write_tum
+from .poses import StampedPose, write_tum
 from .recordings import LOG_SUFFIXES, read_log
 from .report import ImportReport, Note
 from .writing import write_map
@@ -46,7 +46,6 @@ __all__ = [
     "UprightFrameError",
     "draw_map",
     "map_of_grid",
-    "pose_message",
     "read_log",
     "read_map",
     "rgb",

@@ -2,7 +2,6 @@
 
 MAX_MAP_BYTES = 32 * 2**20  # of a drawing or a picture
 MAX_YAML_BYTES = 16 * 2**10  # of a map_server description
-MAX_LOG_BYTES = 64 * 2**30  # of a log, which is streamed
 MAX_LINE_BYTES = 2 * 2**20  # of a text log: some 200,000 ranges
 MAX_CELLS = 40_000_000  # of a grid
 MAX_SEGMENTS = 500_000  # of a map

@@ -4,7 +4,6 @@ from .beams import Beams
 from .correspondences import Correspondences
 from .errors import InputError, InvalidArgumentError, InvalidSegmentsError, RegistrationError
 from .joint import JointSums
-from .observability import Freedom, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
@@ -17,7 +16,6 @@ __all__ = [
     "Ambiguity",
     "Beams",
     "Correspondences",
-    "Freedom",
     "InputError",
     "InvalidArgumentError",
     "InvalidSegmentsError",
@@ -30,7 +28,6 @@ __all__ = [
     "RegistrationResult",
     "RigidTransform",
     "Segments",
-    "find_freedom",
     "register",
     "register_estimating",
     "wrap_angle",

@@ -14,11 +14,6 @@ class Threads:
     """Some threads under one name.
 
     Each kind of call has its own, so that none waits for the threads of another.
-
-    Parameters
-    ----------
-    count : int
-    name : str
     """
 
     def __init__(self, count: int, name: str) -> None:

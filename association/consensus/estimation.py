@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from registration import RigidTransform
+from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
-from registration.observability import MAX_DEVIATION
 from registration.values import value
 
 from ..context import SearchContext

@@ -54,7 +54,7 @@ SUITES = {
         )
     ),
     "vectorization/": Suite(("tests/vectorization",)),
-    "association/consensus/kernels/view_settling.py": Suite(("tests/association/scan/test_views.py",)),
+    "association/consensus/kernels/view_estimation.py": Suite(("tests/association/scan/test_views.py",)),
     "association/index/kernels/": Suite(("tests/association/index/kernels",)),
     "association/scan/kernels/": Suite(("tests/association/scan/kernels",)),
     "association/consensus/kernels/": Suite(("tests/association/consensus/kernels",)),

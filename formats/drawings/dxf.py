@@ -55,12 +55,6 @@ PROXIES = ("ACAD_PROXY", "AEC_", "ACDBZOMBIE")  # beginnings of the kinds of ent
 def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """Read the lines of a DXF's model space, blocks taken apart.
 
-    Parameters
-    ----------
-    path : Path
-    options : ImportOptions
-    notes : Notes
-
     Raises
     ------
     FormatError

@@ -11,12 +11,7 @@ NS = 1e-9
 
 @dataclass(slots=True)
 class Stamps:
-    """Takes the stamps of scans in the order of the log, and notes what is wrong with them.
-
-    Attributes
-    ----------
-    notes : Notes
-    """
+    """Takes the stamps of scans in the order of the log, and notes what is wrong with them."""
 
     notes: Notes
     _last: int | None = None

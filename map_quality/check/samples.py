@@ -84,10 +84,6 @@ def try_sample(
     said : RigidTransform, optional
         Pose of the scan as its sender states it, map_from_scan.
 
-    Returns
-    -------
-    Sample
-
     Raises
     ------
     CancelledError

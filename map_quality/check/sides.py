@@ -40,10 +40,6 @@ class Looker:
     """Follows single rays from places in the index frame, by the grid of the search: some 5 microseconds each.
 
     `simulation.scan` takes time for every segment of the map, whatever a ray meets; this needs 24 rays from each wall.
-
-    Attributes
-    ----------
-    index : MapIndex
     """
 
     index: MapIndex

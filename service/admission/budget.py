@@ -68,12 +68,7 @@ class ByteBudget:
 
 
 class ByteAccount:
-    """The bytes that one request holds of the budget.
-
-    Attributes
-    ----------
-    taken : int
-    """
+    """The bytes that one request holds of the budget."""
 
     def __init__(self, budget: ByteBudget, holder: Holder) -> None:
         self._budget = budget

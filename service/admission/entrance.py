@@ -25,15 +25,7 @@ def search_of(method: str, path: str) -> str | None:
 
 
 class Entrance:
-    """Gives tickets, and refuses requests without permission, and searches while the queue is full.
-
-    Parameters
-    ----------
-    gate : Gate
-    keyring : Keyring
-    origins : Origins
-    max_body_bytes : int
-    """
+    """Gives tickets, and refuses requests without permission, and searches while the queue is full."""
 
     def __init__(self, gate: Gate, keyring: Keyring, origins: Origins, max_body_bytes: int) -> None:
         self._gate = gate

@@ -13,12 +13,7 @@ from typing import Any
 
 
 class Running:
-    """A function that a thread runs, or is about to.
-
-    Attributes
-    ----------
-    result : Future
-    """
+    """A function that a thread runs, or is about to."""
 
     __slots__ = ("_function", "_lock", "_low", "_thread", "result")
 

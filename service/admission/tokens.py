@@ -30,12 +30,7 @@ logger = logging.getLogger("linefix")
 
 
 class Tokens:
-    """Checks tokens against keys that are in memory; nothing is fetched while a request waits.
-
-    Parameters
-    ----------
-    issuer : Issuer
-    """
+    """Checks tokens against keys that are in memory; nothing is fetched while a request waits."""
 
     def __init__(self, issuer: Issuer) -> None:
         self._issuer = issuer

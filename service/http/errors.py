@@ -33,12 +33,7 @@ class NotHttpError(HttpError):
 
 
 class ControlCharacterError(HttpError):
-    """A control character in the path.
-
-    Parameters
-    ----------
-    character : str
-    """
+    """A control character in the path."""
 
     def __init__(self, character: str) -> None:
         super().__init__(f"the path has the control character U+{ord(character):04X}; expected none; remove it")
@@ -75,12 +70,7 @@ class MethodNotAllowedError(HttpError):
 
 
 class MediaTypeError(HttpError):
-    """The body is not of the media type that is taken, by its head.
-
-    Parameters
-    ----------
-    taken : str
-    """
+    """The body is not of the media type that is taken, by its head."""
 
     def __init__(self, taken: str) -> None:
         super().__init__(f"the media type of the body is not supported; send {taken} and state it as Content-Type")

@@ -13,12 +13,7 @@ ANSWERS_WITHIN = 2.0  # s
 
 
 class StoreProbe:
-    """Looks at the store in a thread of its own; belongs to one event loop.
-
-    Parameters
-    ----------
-    store : MapStore
-    """
+    """Looks at the store in a thread of its own; belongs to one event loop."""
 
     def __init__(self, store: MapStore) -> None:
         self._store = store

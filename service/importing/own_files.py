@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..schemas.errors import Fault, InvalidRequestError
 from .fields import KNOWN, pointer_of
 
 if TYPE_CHECKING:
     from formats import FormatError
+
+    from .form import Form
+
+Lines = list[dict[str, Any]]
+"""The answer of the bounded process: a report and the content, or an error."""
 
 METADATA, BAG = "metadata.yaml", "bag"
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
@@ -66,6 +72,54 @@ def own_files(names: list[str], map_name: str, folder: Path) -> OwnFiles:
         ending = PurePosixPath(name).suffix.lower()
         paths[name] = folder / f"file-{number}{ending if ENDING.fullmatch(ending) else ''}"
     return OwnFiles(paths[map_name], paths)
+
+
+def read_own(
+    form: Form, folder: Path, read: Callable[[OwnFiles], Lines], suffixes: tuple[str, ...], kind: str, one: str
+) -> Lines:
+    """Put the files of a form into a folder and read them; an error for which there is another status is the answer.
+
+    The file that is read first ends in one of `suffixes`; `kind` names it in messages, and `one` what is expected.
+
+    Raises
+    ------
+    InvalidRequestError
+        When a file is wrong, or it is not clear which one is to be read.
+    """
+    from formats import FormatError, TooLargeError, UnsupportedFormatError
+
+    names = list(form.files)
+    try:
+        files = own_files(names, _first_read(names, suffixes, kind, one), folder)
+        for name, data in form.files.items():
+            files.paths[name].write_bytes(data)
+        form.files.clear()
+        return read(files)
+    except TooLargeError as error:
+        return [{"too_large": error.message}]
+    except UnsupportedFormatError as error:
+        return [{"unknown": error.message}]
+    except FormatError as error:
+        raise InvalidRequestError([fault_of(error, files)]) from None
+
+
+def _first_read(names: list[str], suffixes: tuple[str, ...], kind: str, one: str) -> str:
+    """Return which file is the map, or the log; the others are those that it names. Of a bag it is the metadata."""
+    from formats import UnsupportedFormatError
+
+    if METADATA in names:
+        return METADATA
+    found = [name for name in names if PurePosixPath(name).suffix.lower() in suffixes]
+    if len(found) > 1:
+        raise InvalidRequestError([Fault("/files", f"expected {one}; found {len(found)} {kind}s")])
+    if not names:
+        raise InvalidRequestError(
+            [Fault("/files", "expected a file, found none; send a part of the form that has a filename")]
+        )
+    if not found:
+        known = ", ".join(suffixes)
+        raise UnsupportedFormatError(f"found no {kind}; expected a file that ends in one of {known}", argument="files")
+    return found[0]
 
 
 def fault_of(error: FormatError, files: OwnFiles) -> Fault:

@@ -16,13 +16,13 @@ import shutil
 import sys
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import orjson
 
-from ..schemas.errors import Fault, InvalidRequestError
-from .own_files import METADATA, OwnFiles, fault_of, own_files
+from ..schemas.errors import InvalidRequestError
+from .own_files import Lines, OwnFiles, read_own
 from .scans import read_scans
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def _bind(bounds: Bounds) -> None:
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE)
 
 
-def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> list[dict[str, Any]]:
+def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> Lines:
     """Return a report and a map, or an error for which there is another status than 422.
 
     Raises
@@ -120,68 +120,26 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
     InvalidRequestError
         When the form, an option or a file is wrong.
     """
-    from formats import FormatError, TooLargeError, UnsupportedFormatError, read_map
+    from formats import MAP_SUFFIXES, read_map
 
     from .fields import options_of
     from .form import read_form
 
     form = read_form(content, content_type)
     options = options_of(form.fields)
-    names = list(form.files)
-    try:
-        files = own_files(names, _map_among(names), folder)
-        for name, data in form.files.items():
-            files.paths[name].write_bytes(data)
-        form.files.clear()
+
+    def read(files: OwnFiles) -> Lines:
         imported = read_map(files.map, options, files.paths)
-    except TooLargeError as error:
-        return [{"too_large": error.message}]
-    except UnsupportedFormatError as error:
-        return [{"unknown": error.message}]
-    except FormatError as error:
-        raise InvalidRequestError([fault_of(error, files)]) from None
-    if len(imported.map.segments) > bounds.segments:
-        return [
-            {
-                "too_large": f"expected at most {bounds.segments} segments, found {len(imported.map.segments)}; "
-                "simplify the file"
-            }
-        ]
-    return _answer(imported, files)
+        found = len(imported.map.segments)
+        if found > bounds.segments:
+            told = f"expected at most {bounds.segments} segments, found {found}; simplify the file"
+            return [{"too_large": told}]
+        return _answer(imported, files)
+
+    return read_own(form, folder, read, MAP_SUFFIXES, "map", "one map and the files that it names, such as a picture")
 
 
-def _map_among(names: list[str]) -> str:
-    """Return which file is the map; the others are those that it names. Of a bag of ROS 2 it is the metadata.
-
-    Raises
-    ------
-    InvalidRequestError
-        When there is none, or more than one.
-    """
-    from formats import MAP_SUFFIXES, UnsupportedFormatError
-
-    if METADATA in names:
-        return METADATA
-    maps = [name for name in names if PurePosixPath(name).suffix.lower() in MAP_SUFFIXES]
-    if len(maps) > 1:
-        raise InvalidRequestError(
-            [
-                Fault(
-                    "/files", f"expected one map and the files that it names, such as a picture; found {len(maps)} maps"
-                )
-            ]
-        )
-    if not names:
-        raise InvalidRequestError(
-            [Fault("/files", "expected a file, found none; send a part of the form that has a filename")]
-        )
-    if not maps:
-        known = ", ".join(MAP_SUFFIXES)
-        raise UnsupportedFormatError(f"found no map; expected a file that ends in one of {known}", argument="files")
-    return maps[0]
-
-
-def _answer(imported: ImportedMap, files: OwnFiles) -> list[dict[str, Any]]:
+def _answer(imported: ImportedMap, files: OwnFiles) -> Lines:
     line_map, report = imported.map, asdict(imported.report)
     document = {
         "segments": line_map.segments.endpoints,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..schemas.errors import Fault, InvalidRequestError
 from .fields import Fields
-from .own_files import METADATA, fault_of, own_files
+from .own_files import Lines, OwnFiles, read_own
 
 if TYPE_CHECKING:
     from formats import LoggedScan
@@ -19,7 +19,7 @@ DEFAULT_SCANS = 100
 KNOWN = ("topic", "max_scans")
 
 
-def read_scans(content: bytes, content_type: str, folder: Path) -> list[dict[str, Any]]:
+def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
     """Return a report and scans, or an error for which there is another status than 422.
 
     Raises
@@ -27,29 +27,21 @@ def read_scans(content: bytes, content_type: str, folder: Path) -> list[dict[str
     InvalidRequestError
         When the form, an option or a file is wrong.
     """
-    from formats import FormatError, LogOptions, TooLargeError, UnsupportedFormatError, read_log, scan_json
+    from formats import LOG_SUFFIXES, LogOptions, read_log, scan_json
 
     from .form import read_form
 
     form = read_form(content, content_type)
     topic, most = _options_of(form.fields)
-    names = list(form.files)
-    try:
-        files = own_files(names, _log_among(names), folder)
-        for name, data in form.files.items():
-            files.paths[name].write_bytes(data)
-        form.files.clear()
+
+    def read(files: OwnFiles) -> Lines:
         log = read_log(files.map, LogOptions(topic=topic))
         chosen, count = spread(log, most)
         report = asdict(log.report)
-    except TooLargeError as error:
-        return [{"too_large": error.message}]
-    except UnsupportedFormatError as error:
-        return [{"unknown": error.message}]
-    except FormatError as error:
-        raise InvalidRequestError([fault_of(error, files)]) from None
-    report["files"] = tuple(map(files.as_sent, report["files"]))
-    return [{"report": report, "count": count}, {"scans": list(map(scan_json, chosen))}]
+        report["files"] = tuple(map(files.as_sent, report["files"]))
+        return [{"report": report, "count": count}, {"scans": list(map(scan_json, chosen))}]
+
+    return read_own(form, folder, read, LOG_SUFFIXES, "log", "one log, or a bag with its metadata.yaml")
 
 
 def spread(scans: Iterable[LoggedScan], most: int) -> tuple[list[LoggedScan], int]:
@@ -88,25 +80,3 @@ def _options_of(fields: Fields) -> tuple[str | None, int]:
     if not (most.isascii() and most.isdecimal() and len(most) < 5 and 1 <= int(most) <= MAX_SCANS):
         raise InvalidRequestError([Fault("/max_scans", f"expected an integer from 1 to {MAX_SCANS}")])
     return topic, int(most)
-
-
-def _log_among(names: list[str]) -> str:
-    """Return which file is the log; of a bag of ROS 2 in several files it is the metadata."""
-    from formats import LOG_SUFFIXES, UnsupportedFormatError
-
-    if METADATA in names:
-        return METADATA
-    logs = [name for name in names if PurePosixPath(name).suffix.lower() in LOG_SUFFIXES]
-    if len(logs) > 1:
-        raise InvalidRequestError(
-            [Fault("/files", f"expected one log, or a bag with its metadata.yaml; found {len(logs)} logs")]
-        )
-    if not names:
-        raise InvalidRequestError(
-            [Fault("/files", "expected a file, found none; send a part of the form that has a filename")]
-        )
-    if not logs:
-        raise UnsupportedFormatError(
-            f"found no log; expected a file that ends in one of {', '.join(LOG_SUFFIXES)}", argument="files"
-        )
-    return logs[0]

@@ -80,12 +80,7 @@ class TooManyError(RequestError):
 
 
 class BodyTooLargeError(RequestError):
-    """A body is too long, as it arrives or unpacked; its rest is of no use.
-
-    Parameters
-    ----------
-    max_bytes : int
-    """
+    """A body is too long, as it arrives or unpacked; its rest is of no use."""
 
     def __init__(self, max_bytes: int) -> None:
         super().__init__(max_bytes)

@@ -190,29 +190,29 @@ def scans_of(asked: CheckRequest) -> list[Scan]:
     InvalidRequestError
         When the libraries reject one.
     """
-    return [_scan_of(asked, number) for number in range(len(asked.scans))]
-
-
-def _scan_of(asked: CheckRequest, number: int) -> Scan:
-    with _placed(number):
-        # A motion that is not known would only loosen the fit.
-        return scanned_of(asked.scans[number], timed=False).scan
+    found = []
+    for number, one in enumerate(asked.scans):
+        with placed(f"/scans/{number}"):
+            # A motion that is not known would only loosen the fit.
+            found.append(scanned_of(one, timed=False).scan)
+    return found
 
 
 @contextmanager
-def _placed(number: int) -> Iterator[None]:
-    """Add the number of the sample to the errors of the libraries."""
+def placed(place: str) -> Iterator[None]:
+    """Name the place of a scan in the request, where the libraries refuse the scan.
+
+    Raises
+    ------
+    InvalidRequestError
+        With pointers below `place`, in place of `/scan`.
+    """
     try:
         yield
-    except InvalidRequestError as error:
-        faults = [Fault(_moved(fault.pointer, number), fault.message) for fault in error.faults]
-        raise InvalidRequestError(faults) from error
-    except InputError as error:
-        raise InvalidRequestError([Fault(_moved(fault_of(error).pointer, number), error.message)]) from error
-
-
-def _moved(pointer: str, number: int) -> str:
-    return f"/scans/{number}" + pointer.removeprefix("/scan")
+    except (InvalidRequestError, InputError) as error:
+        faults = error.faults if isinstance(error, InvalidRequestError) else (fault_of(error),)
+        moved = [Fault(place + one.pointer.removeprefix("/scan"), one.message) for one in faults]
+        raise InvalidRequestError(moved) from error
 
 
 def fault_of(error: InputError) -> Fault:

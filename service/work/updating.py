@@ -11,14 +11,12 @@ from association import CancelledError, Deadline
 from linefix.answers import Json
 from linefix.map_answers import update_json
 from map_quality import MapUpdate, VisitScan, updating
-from registration import InputError
 
 from ..admission.errors import DeadlinePassedError
 from ..maps.lookup import FoundMap, MapLookup
-from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.updates import UpdateRequest
 from .association import reference_to
-from .inputs import fault_of, scanned_of, transform_of
+from .inputs import placed, scanned_of, transform_of
 from .job import Done, Job
 
 TURN_SECONDS = 0.1  # of the gate, before others have theirs
@@ -74,17 +72,10 @@ def begin_update(lookup: MapLookup, on: FoundMap, asked: UpdateRequest, job: Job
 
 def _scan_of(asked: UpdateRequest, visit: int, number: int) -> VisitScan:
     """Return a scan of a visit; an error names its place in the request."""
-    one, place = asked.visits[visit].scans[number], f"/visits/{visit}/scans/{number}"
-    try:
-        scan = scanned_of(one).scan
+    one = asked.visits[visit].scans[number]
+    with placed(f"/visits/{visit}/scans/{number}"):
         pose = None if one.pose is None else transform_of(one.pose)
-        return VisitScan(scan, asked.visits[visit].visit, pose, one.covariance)
-    except InvalidRequestError as error:
-        faults = [Fault(place + fault.pointer.removeprefix("/scan"), fault.message) for fault in error.faults]
-        raise InvalidRequestError(faults) from error
-    except InputError as error:
-        pointer = fault_of(error).pointer.removeprefix("/scan")
-        raise InvalidRequestError([Fault(place + pointer, error.message)]) from error
+        return VisitScan(scanned_of(one).scan, asked.visits[visit].visit, pose, one.covariance)
 
 
 def take_steps(progress: Progress, deadline: Deadline) -> bool:

@@ -24,7 +24,7 @@ from tests.cli.test_replay_bags import (
     swept,
     write_drive,
 )
-from tests.formats.test_log_frames import Robots
+from tests.formats.robots import Robots
 from tests.formats.test_logs import SECOND
 
 from .logs import rows

@@ -99,7 +99,8 @@ def test_every_module_has_tests_that_exist() -> None:
     for package in PACKAGES:
         for path in modules_of(ROOT, package):
             assert SUITES[suite_of(str(path))].tests
-    for suite in SUITES.values():
+    for begin, suite in SUITES.items():
+        assert (ROOT / begin).exists(), begin
         assert all((ROOT / test).exists() for test in suite.tests), suite
 
 

@@ -18,17 +18,8 @@ from association.verdict import probabilities, tuning
 from benchmarks import sensitivity
 from benchmarks.compiled_thresholds import dependent_kernels
 from benchmarks.examples import Case
-from benchmarks.sensitivity import (
-    Effect,
-    Sampled,
-    Threshold,
-    Told,
-    effect_of,
-    effects,
-    moved,
-    readers,
-    thresholds,
-)
+from benchmarks.sensitivity import Effect, Sampled, Told, effect_of, effects
+from benchmarks.thresholds import Threshold, moved, readers, thresholds
 from registration import MeasuredSegments, RigidTransform, Segments
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], float)

@@ -12,7 +12,7 @@ import pytest
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
-from tests.formats.test_log_frames import Robots
+from tests.formats.robots import Robots
 from tests.formats.test_logs import SECOND
 from tests.running import RunningService
 from vectorization import Motion

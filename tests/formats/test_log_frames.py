@@ -4,76 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from formats import FormatError, IncompleteFileError, Log, LoggedScan, LogOptions, read_log
+from formats import FormatError, IncompleteFileError, LogOptions, read_log
 from registration import RigidTransform
 
-from .test_logs import SECOND, Recorder, near
-
-Quaternion = tuple[float, float, float, float]
-UP: Quaternion = (0.0, 0.0, 0.0, 1.0)
-
-
-def pitched(degrees: float) -> Quaternion:
-    half = math.radians(degrees) / 2
-    return (0.0, math.sin(half), 0.0, math.cos(half))
-
-
-class Robots(Recorder):
-    """Writes transforms of any topic."""
-
-    def transform(
-        self,
-        topic: str,
-        ns: int,
-        parent: str,
-        child: str,
-        place: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        turn: Quaternion = UP,
-    ) -> None:
-        value = self.type(
-            "geometry_msgs/msg/Transform",
-            self.point("Vector3", *place),
-            self.type("geometry_msgs/msg/Quaternion", *turn),
-        )
-        one = self.type("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, value)
-        kind = "tf2_msgs/msg/TFMessage"
-        self.write(topic, kind, ns, self.type(kind, [one]))
-
-    def drive(self, topic: str, parent: str, child: str, speed: float = 1.0) -> None:
-        for k in range(5):
-            self.transform(topic, k * SECOND // 2, parent, child, (0.5 * speed * k, 0.0, 0.0))
-
-    def says(self, ns: int, x: float, child: str = "base_link", topic: str = "/odom", turn: Quaternion = UP) -> None:
-        kind = "nav_msgs/msg/Odometry"
-        place = self.type(
-            "geometry_msgs/msg/Pose", self.point("Point", x, 0.0), self.type("geometry_msgs/msg/Quaternion", *turn)
-        )
-        zero, sure = self.point("Vector3", 0.0, 0.0), np.zeros(36)
-        twist = self.type("geometry_msgs/msg/Twist", zero, zero)
-        pose = self.type("geometry_msgs/msg/PoseWithCovariance", place, sure)
-        speed = self.type("geometry_msgs/msg/TwistWithCovariance", twist, sure)
-        self.write(topic, kind, ns, self.type(kind, self.header(ns, "odom"), child, pose, speed))
-
-
-def fixed(bag: Robots, *chain: str, topic: str = "/tf_static") -> None:
-    for parent, child in pairwise(chain):
-        bag.transform(topic, 0, parent, child, (0.2, 0.0, 0.3))
-
-
-def codes(log: Log) -> dict[str, int]:
-    report = log.report
-    return {note.code: note.count for note in (*report.dropped, *report.assumed)}
-
-
-def read(bag: Robots, options: LogOptions | None = None) -> tuple[list[LoggedScan], Log]:
-    log = read_log(bag.done(), options or LogOptions())
-    return list(log), log
+from .robots import Quaternion, Robots, codes, fixed, pitched, read
+from .test_logs import SECOND, near
 
 
 def no_odom(bag: Robots) -> None:
@@ -232,10 +171,9 @@ BROKEN: dict[str, Callable[[Robots], None]] = {
 }
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
 @pytest.mark.parametrize("name", BROKEN)
-def test_one_broken_transform_costs_nothing_else(tmp_path: Path, kind: str, name: str) -> None:
-    bag = Robots(kind, tmp_path)
+def test_one_broken_transform_costs_nothing_else(tmp_path: Path, name: str) -> None:
+    bag = Robots("mcap", tmp_path)
     BROKEN[name](bag)
     bag.drive("/tf", "odom", "base_link")
     fixed(bag, "base_link", "laser")
@@ -394,68 +332,6 @@ def test_a_tilt_is_said_and_upside_down_is_none(tmp_path: Path, degrees: float, 
     assert ("tilted" in codes(log)) is (degrees in (12.0, 172.0))
 
 
-BEGUN = 100 * SECOND
-
-
-def turning(bag: Robots, *, rate: float, flip: bool = False) -> None:
-    """A robot that turns and drives, at 0.5 rad/s and 0.4 m/s along its own x axis; a transform 1 / rate seconds."""
-    for k in range(-10, 11):
-        t = k / rate
-        half, x, y = 0.25 * t, 0.8 * math.sin(0.5 * t), 0.8 * (1.0 - math.cos(0.5 * t))
-        at = BEGUN + round(t * SECOND)
-        bag.transform("/tf", at, "odom", "base_link", (x, y, 0.0), (0.0, 0.0, math.sin(half), math.cos(half)))
-    bag.transform("/tf_static", 0, "base_link", "laser", (0.2, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0) if flip else UP)
-
-
-@pytest.mark.parametrize("flip", [False, True])
-def test_a_scan_that_takes_time_has_the_motion_of_its_sensor(tmp_path: Path, flip: bool) -> None:
-    bag = Robots("mcap", tmp_path)
-    turning(bag, rate=20.0, flip=flip)
-    bag.scan(BEGUN)
-    (scan,), log = read(bag)
-    motion = scan.laser.motion
-    assert motion is not None
-    assert motion.time_increment == pytest.approx(0.001)
-    # The sensor is 0.2 m ahead of the axis that the robot turns about; upside down, left is right.
-    expected = (0.4, -0.1, -0.5) if flip else (0.4, 0.1, 0.5)
-    assert (motion.vx, motion.vy, motion.omega) == pytest.approx(expected, abs=6e-3)
-    assert "motion" not in codes(log)
-
-
-def test_a_given_mount_says_how_the_sensor_moves(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
-    turning(bag, rate=20.0)
-    bag.scan(BEGUN)
-    (scan,), _ = read(bag, LogOptions(mount=RigidTransform(0.0, 0.3, math.pi / 2)))
-    motion = scan.laser.motion
-    assert motion is not None
-    assert (motion.vx, motion.vy, motion.omega) == pytest.approx((0.0, -0.25, 0.5), abs=6e-3)
-
-
-@pytest.mark.parametrize("rate", [0.5, 0.0])
-def test_a_motion_that_odometry_does_not_say_is_not_known(tmp_path: Path, rate: float) -> None:
-    bag = Robots("mcap", tmp_path)
-    if rate:
-        turning(bag, rate=rate)
-    bag.scan(BEGUN)
-    (scan,), log = read(bag)
-    assert scan.laser.motion is None
-    assert scan.time_increment == pytest.approx(0.001)
-    assert codes(log)["motion"] == 1
-
-
-def test_a_robot_that_stands_has_a_motion_of_zero(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
-    fixed(bag, "base_link", "laser")
-    for k in range(4):
-        bag.says(k * SECOND, 0.0)
-    bag.scan(SECOND)
-    (scan,), _ = read(bag)
-    motion = scan.laser.motion
-    assert motion is not None
-    assert (motion.vx, motion.vy, motion.omega) == (0.0, 0.0, 0.0)
-
-
 def carmen(laser: str, robot: str, stamp: int) -> str:
     return f"FLASER 4 1.0 2.0 3.0 3.0 {laser} {robot} {stamp} host {stamp}\n"
 
@@ -468,15 +344,3 @@ def test_a_carmen_log_whose_robot_is_never_anywhere_has_no_odometry(tmp_path: Pa
     assert [scan.pose is not None for scan in log] == [known] * 3
     assert ("no_odometry" in codes(log)) is not known
     assert near(next(iter(log)).mount, 0.1, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(("scan_time", "expected"), [(0.1, 0.025), (0.0, 0.05), (math.nan, 0.05), (30.0, 0.05)])
-def test_a_time_increment_in_another_unit_is_replaced(tmp_path: Path, scan_time: float, expected: float) -> None:
-    bag = Robots("mcap", tmp_path)
-    kind = "sensor_msgs/msg/LaserScan"
-    ranges, nothing = np.ones(4, dtype=np.float32), np.zeros(0, dtype=np.float32)
-    numbers = (-0.2, 0.1, 0.1, 100.0, scan_time, 0.05, 10.0)
-    bag.write("/scan", kind, 1, bag.type(kind, bag.header(1, "laser"), *numbers, ranges, nothing))
-    (scan,), log = read(bag)
-    assert scan.time_increment == pytest.approx(expected)
-    assert codes(log)["time_increment"] == 1

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from registration import MeasuredSegments, Segments
-from registration.observability import are_parallel
+from registration import Correspondences, MeasuredSegments, Segments
+from registration.kernels.pairs import angle_chi_square
+from registration.observability import most_parallel
 
 from .scenes import correspondences, noisy_pairs
+
+
+def are_parallel(pairs: Correspondences, inverse_variances: NDArray[np.float64]) -> bool:
+    unlike, count = angle_chi_square(pairs.rows, inverse_variances)
+    return bool(unlike <= most_parallel(count))
 
 
 def parallel(degrees: list[float], sigma: float, lengths: tuple[float, ...] = (4.0, 4.0, 4.0)) -> bool:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import vectorization
 from vectorization import InvalidOptionError, InvalidScanError, LaserScan, VectorizationOptions, vectorize
 
 
@@ -87,11 +86,6 @@ def test_no_points_are_no_segments() -> None:
         assert len(vectorize([], viewpoint=viewpoint).measured) == 0
         assert len(vectorize([[0.0, 0.0]], viewpoint=viewpoint).measured) == 0
         assert len(vectorize([[1.0, 1.0]] * 50, viewpoint=viewpoint).measured) == 0
-
-
-def test_everything_exported_exists_and_is_listed_in_order() -> None:
-    assert vectorization.__all__ == sorted(vectorization.__all__)
-    assert all(hasattr(vectorization, name) for name in vectorization.__all__)
 
 
 @pytest.mark.parametrize("nearest", [5e-324, 1e-200, 9e-7])

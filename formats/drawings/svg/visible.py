@@ -68,13 +68,7 @@ class Place:
 
 
 class Visible:
-    """Goes through a document and yields the shapes that are drawn; the notes count the others.
-
-    Parameters
-    ----------
-    root : Element
-    drawing : Drawing
-    """
+    """Goes through a document and yields the shapes that are drawn; the notes count the others."""
 
     def __init__(self, root: Element, drawing: Drawing) -> None:
         self._root, self._drawing = root, drawing

@@ -23,8 +23,9 @@ from association.consensus.tuning import (
 from association.layout import Integers
 from association.tuning import ROUGHNESS
 from registration import RigidTransform
+from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
-from registration.observability import MAX_DEVIATION, most_parallel
+from registration.observability import most_parallel
 
 from .consensus import Pairs, solve
 from .geometry import wrap

@@ -72,12 +72,10 @@ def distinct(
     scores: Floats,
     order: Any,
     most: int,
-    distance: float,
-    angle: float,
-    family: float,
-    much_better: float,
+    rules: tuple[float, float, float, float],
 ) -> list[int]:
-    """Take the best pose, strike what it stands for, and so on."""
+    """Take the best pose, strike what it stands for by the last four arguments of `distinct_poses`, and so on."""
+    distance, angle, family, much_better = rules
     left: list[int] = np.asarray(order).tolist()
     kept: list[int] = []
     while left and len(kept) < most:

@@ -18,7 +18,7 @@ from association.verdict import tuning
 from association.verdict.absences import absences
 from association.verdict.alternatives import probability_with_loose_walls
 from association.verdict.chance import NullScore, find_null_score
-from registration.observability import MAX_DEVIATION
+from registration.kernels import MAX_DEVIATION
 
 Numbers = dict[str, float]
 Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend; pairs

@@ -93,7 +93,7 @@ def test_distinct_poses(seed: int) -> None:
     rules = DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, 6.0
     for most in (5, 40):
         got = ranking.distinct_poses(estimates, scores_of(scores), values - scores, most, *rules)
-        assert got.tolist() == twin.distinct(poses, covariances, scores, order[:36], most, *rules)
+        assert got.tolist() == twin.distinct(poses, covariances, scores, order[:36], most, rules)
 
 
 def test_a_pose_of_a_family_does_not_stand_for_a_much_better_one() -> None:
