@@ -1,8 +1,9 @@
-"""Records the answers to 1,000 varied requests, and compares them with those of other code.
+"""Records the answers to 1,000 varied requests, and compares them with those of other code or another machine.
 
 For changes that must not change an answer: record before, compare after.
 
-``python -m benchmarks.answers record FILE``, then ``python -m benchmarks.answers compare FILE``
+``python -m benchmarks.answers record FILE``, then ``python -m benchmarks.answers compare FILE``; ``--one-in 5`` takes
+200 of the requests.
 """
 
 from __future__ import annotations
@@ -163,24 +164,26 @@ def difference(one: Any, other: Any) -> float:
     return 0.0 if one == other and type(one) is type(other) else math.inf
 
 
-def answers() -> dict[str, Any]:
-    """Answer all requests; their names with their answers."""
+def answers(one_in: int = 1) -> dict[str, Any]:
+    """Answer one in so many requests; their names with their answers."""
     found: dict[str, Any] = {}
     for k, asked in enumerate(requests()):
+        if k % one_in:
+            continue
         result = associate(asked.index, asked.scan, asked.prior, asked.options)
         found[f"{k} {asked.name}"] = plain(result)
         progress("answers", k + 1, REQUESTS)
     return found
 
 
-def compare(before: dict[str, Any], after: dict[str, Any]) -> int:
+def compare(before: dict[str, Any], after: dict[str, Any], rounding: float = ROUNDING) -> int:
     """Print how many answers differ and by how much; return how many differ by more than rounding."""
     found = {name: difference(before[name], after[name]) for name in before.keys() & after.keys()}
     missing = len(before.keys() ^ after.keys())
-    rounded = [name for name, off in found.items() if 0.0 < off <= ROUNDING]
-    changed = [name for name, off in found.items() if off > ROUNDING]
+    rounded = [name for name, off in found.items() if 0.0 < off <= rounding]
+    changed = [name for name, off in found.items() if off > rounding]
     print(f"{len(found)} answers: {len(found) - len(rounded) - len(changed)} equal to the bit, {len(rounded)} to")
-    print(f"{ROUNDING:g}, {len(changed)} changed; {missing} on one side only")
+    print(f"{rounding:g}, {len(changed)} changed; {missing} on one side only")
     for name in changed[:20]:
         print(f"- {name}: {found[name]:.3g}")
     return len(changed) + missing
@@ -190,13 +193,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=("record", "compare"))
     parser.add_argument("file", type=Path)
+    parser.add_argument("--one-in", type=int, default=1, metavar="N", help="answer one in N of the requests")
+    parser.add_argument(
+        "--rounding",
+        type=float,
+        default=ROUNDING,
+        help="relative difference that counts as equal; by default %(default)s",
+    )
     args = parser.parse_args()
-    after = answers()
+    after = answers(args.one_in)
     if args.what == "record":
         args.file.write_bytes(pickle.dumps(after))
         return 0
     before = pickle.loads(args.file.read_bytes())
-    return 1 if compare(before, after) else 0
+    return 1 if compare(before, after, args.rounding) else 0
 
 
 if __name__ == "__main__":

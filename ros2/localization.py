@@ -47,7 +47,7 @@ class Localization:
         self._options, self._topics, self._health = options, topics, health
         self._frames, self._odometry = frames, odometry
         self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
-        self._watch, self._correction = Watch(), MapToOdom()
+        self._watch, self._correction = Watch(transforms=not options.publish_tf), MapToOdom()
         self._requests = Requests(topics.named_requests, topics.results)
         self._pending: tuple[Time, Observation, str] | None = None
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
@@ -102,6 +102,8 @@ class Localization:
         stamp = nanoseconds(located.stamp) or time.time_ns()
         scan = located.observation(self._odometry_at(stamp), stamp)
         event = self._agreement.take(scan)
+        if self._agreement.latest is None:
+            self._correction.reset()  # where the clock was set back, the agreement forgets the pose
         self._correction.take(event, scan)
         if event is Event.CONTRADICTED:
             self._pending = None
@@ -164,7 +166,9 @@ class Localization:
         name, place = self._topics.initial.name, f"x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
         place = place if scan.map_id is None else f"{place} on {scan.map_id}"
         if not subscribed:
-            self._health.note(f"not published, because {name} has no subscriber ({reason}): {place}", "no subscriber")
+            if self._topics.tf is None:  # else the transform is enough
+                problem = f"not published, because {name} has no subscriber ({reason}): {place}"
+                self._health.note(problem, "no subscriber")
             return
         widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
         self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame_of(scan)))

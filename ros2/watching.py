@@ -36,9 +36,16 @@ class _Estimate:
 
 
 class Watch:
-    """Compares poses with ``amcl_pose``, or with the transform from the map to the odometry frame."""
+    """Compares poses with ``amcl_pose``, or with the transform from the map to the odometry frame.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    transforms : bool
+        False where this node publishes the transform itself: it is not that of a localizer.
+    """
+
+    def __init__(self, *, transforms: bool = True) -> None:
+        self._transforms = transforms
         self._amcl: _Estimate | None = None
         self._against = 0
 
@@ -83,7 +90,7 @@ class Watch:
     def _at(
         self, scan: Observation, names: tuple[str, str], frames: Frames, odometry: OdometryHistory
     ) -> _Estimate | None:
-        matrix = frames.lookup(*names, scan.stamp)
+        matrix = frames.lookup(*names, scan.stamp) if self._transforms else None
         if matrix is not None and scan.odometry is not None:
             covariance = np.zeros((3, 3)) if self._amcl is None else self._amcl.covariance
             return _Estimate(scan.stamp, planar(matrix)[0].compose(scan.odometry), covariance)

@@ -281,6 +281,37 @@ def test_the_transform_from_the_map_is_published_where_that_is_wanted(domain: in
     assert one.transform.translation.y == pytest.approx(0.0, abs=0.05)
 
 
+def test_a_new_subscriber_gets_the_pose_from_a_node_that_publishes_the_transform(
+    domain: int, room: linefix.MapIndex
+) -> None:
+    with running(NodeOptions(domain=domain, publish_tf=True), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        _, second = drive_until(robot, robot.initial)
+        _, second = drive_until(robot, robot.transforms, second)
+        late = Subscription(robot.net, "/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
+        drive_until(robot, late, second)
+
+
+def test_a_transform_from_before_the_clock_was_set_back_is_not_published(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, publish_tf=True), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        _, second = drive_until(robot, robot.transforms, 50.0)
+        drive_until(robot, robot.status, second, lambda one: one.message == "the pose is agreed")
+        clock = [1.0]
+
+        def rest() -> None:
+            clock[0] += 0.1
+            robot.drive(moved(1.0), clock[0])
+
+        robot.until(robot.status, rest, lambda one: one.message == "no pose is agreed yet")
+        robot.until(robot.poses, rest)
+        robot.transforms.take()
+        robot.until(robot.poses, rest)
+        assert robot.transforms.take() == []
+
+
 def test_odometry_may_be_of_another_frame_than_the_base(domain: int, room: linefix.MapIndex) -> None:
     footprint = messages.Transform(messages.Vector3(0.2, 0.1, 0.0), quaternion(1.0))
     with running(NodeOptions(domain=domain), room):

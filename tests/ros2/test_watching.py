@@ -77,6 +77,14 @@ def test_the_transform_of_the_map_counts_where_it_is_published() -> None:
     assert watch.compare(confirmed(10), NAMES, frames, history()) is False  # by amcl_pose: the transform is too old
 
 
+def test_a_transform_of_this_node_is_not_that_of_a_localizer() -> None:
+    watch, frames = Watch(transforms=False), Frames()
+    assert frames.take(published(7.0), static=False) == []
+    assert watch.compare(confirmed(7, off=2.0), NAMES, frames, history()) is None
+    watch.take(amcl(7.0, MAP_FROM_ODOM.compose(RigidTransform(2.1, 0.0, 0.0))))
+    assert watch.compare(confirmed(7), NAMES, frames, history()) is True
+
+
 def test_a_localizer_is_lost_after_some_scans_and_found_again() -> None:
     watch, frames = Watch(), Frames()
     frames.take(published(7.0), static=False)
