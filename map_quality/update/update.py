@@ -14,7 +14,7 @@ from association import CancelledError, Deadline, MapIndex
 from registration import InvalidArgumentError, Segments
 
 from .additions import candidates, unexplained
-from .applying import apply, kept_indices, sharper_sigma, with_ends
+from .applying import apply, apply_changes, kept_indices, with_ends
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
@@ -285,9 +285,10 @@ class _Update:
             (accept is None or one.confidence >= accept) and k not in refuse for k, one in enumerate(changes)
         )
         after, taken = proposed.found or first, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]
+        segments, sigma = apply_changes(self.known, self.index.sigma, taken, proposed.sharpened)
         return MapUpdate(
-            apply(with_ends(self.known, proposed.sharpened), taken),
-            sharper_sigma(self.known, self.index.sigma, proposed.sharpened),
+            segments,
+            sigma,
             tuple(changes),
             accepted,
             usable_of(first, after, held=False),
