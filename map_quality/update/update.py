@@ -22,7 +22,7 @@ from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
 from .sharpening import sharpen
 from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
-from .verifying import Proposed, is_better, keeps_usable, total_score, usable_of
+from .verifying import Proposed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 
 Floats = NDArray[np.float64]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
@@ -190,22 +190,42 @@ class _Update:
         Proposed or None
             The changes that remain; None if none remain, or if there is no time to verify them.
         """
+        found, changed = list(first), self._changed(drafts)
         for _ in range(DROPS):
             new = self._index(drafts) if drafts else None
             if new is None:
                 return None
             # What is sharpened needs all scans on one map.
-            changed = None if self.is_blurred else self._changed(drafts)
-            found = yield from self._search_all(new, first, changed)
+            found = yield from self._search_all(new, found, None if self.is_blurred else changed)
             if self.deadline.passed:
                 return None
-            kept = [one for one in drafts if is_better(one[0], evidence, first, found)]
-            if len(kept) == len(drafts):
+            dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
+            dropped = dropped or self._blamed(drafts, first, found)
+            if not dropped:
                 if not keeps_usable(first, found):
                     return None
                 return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
-            drafts = kept
+            changed = self._changed([drafts[k] for k in dropped])
+            drafts = [one for k, one in enumerate(drafts) if k not in dropped]
         return None
+
+    def _blamed(
+        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], found: Sequence[Localized]
+    ) -> list[int]:
+        """Return the changes that usable scans see which fit the new map less; none if it keeps enough of them usable.
+
+        The one that most of these scans see comes first.
+        """
+        lost, blamed = lost_scans(first, found), []
+        walls = [self._changed([one]) for one in drafts]
+        while len(lost) > most_lost(len(first)):
+            seen = [[sees(one, scan, self.sigma) for scan in lost] for one in walls]
+            worst = max(range(len(walls)), key=lambda k: sum(seen[k]))
+            if not any(seen[worst]):
+                break
+            blamed.append(worst)
+            lost = [scan for scan, saw in zip(lost, seen[worst], strict=True) if not saw]
+        return blamed
 
     def sharpen(
         self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
@@ -259,14 +279,14 @@ class _Update:
         return found
 
     def _search_all(
-        self, index: MapIndex, first: Sequence[Localized], changed: Chunks | None
+        self, index: MapIndex, before: Sequence[Localized], changed: Chunks | None
     ) -> Generator[None, None, list[Localized]]:
         """Search the scans again that see changed walls, and all that are held back; None: all walls have changed.
 
         The others keep their answer: at their poses, nothing has changed.
         """
         found = []
-        for one in first:
+        for one in before:
             if self.deadline.passed:
                 return found
             again = changed is None or one.held_back or sees(changed, one, self.sigma)

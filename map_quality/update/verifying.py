@@ -57,11 +57,21 @@ def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool
     A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
     its room looks like others.
     """
-    lost = sum(
-        before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+    return len(lost_scans(first, found)) <= most_lost(len(first))
+
+
+def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> list[Localized]:
+    """Return the usable scans, as they were located before, that fit the new map less and may not be used there."""
+    return [
+        before
         for before, after in zip(first, found, strict=True)
-    )
-    return lost <= max(1.0, FEWER_USABLE * len(first))
+        if before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+    ]
+
+
+def most_lost(count: int) -> float:
+    """Return how many of so many scans a proposal may lose."""
+    return max(1.0, FEWER_USABLE * count)
 
 
 def usable_of(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:
