@@ -39,8 +39,8 @@ class SeenLines:
     ----------
     lines : Segments
     visits : (n,)
-    places : (n, 2)
-        Squares in which they were seen from.
+    places : (n, 3)
+        Visits, and squares that they were seen from.
     weights : (n,)
         Information about the offset of each line, 1 / m^2.
     """
@@ -71,7 +71,7 @@ def unexplained(found: Sequence[Localized], known: Segments) -> SeenLines:
         weights.append(np.maximum(seen.point_counts[rows], 1.0) / np.maximum(seen.sigma[rows], 1e-3) ** 2)
     if not ends:
         nothing = np.zeros(0, dtype=np.intp)
-        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 2), dtype=np.intp), np.zeros(0))
+        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 3), dtype=np.intp), np.zeros(0))
     return SeenLines(
         Segments.derived(np.concatenate(ends)), np.concatenate(visits), np.concatenate(places), np.concatenate(weights)
     )

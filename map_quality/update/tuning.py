@@ -24,7 +24,7 @@ LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
 HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
-PLACE = 0.5  # m; scans from the same square of this side count as one pose
+PLACE = 0.5  # m; scans of one visit from the same square of this side count as one pose
 HANGING = 0.1  # m; deviation without a wall above which a pose depends on that wall, and is no evidence for it
 
 # --- Decisions about a chunk ------------------------------------------------------------------------------------------
@@ -46,6 +46,7 @@ LEAST_PIECE = 0.2  # m; that remains of a wall, or is added
 LEAST_SEEN = 0.25  # m; shorter lines of a scan do not suggest a wall
 SAME_ANGLE = math.radians(4.0)  # between lines of scans that show one wall
 SAME_LINE = 0.08  # m, likewise
+LEAST_STEP = 0.02  # m; a wall that continues another is no farther off its line, where both are known well
 SAME_GAP = 0.3  # m; along the wall
 BIN = 0.05  # m; resolution of the ends of a new wall
 ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added
