@@ -22,7 +22,7 @@ from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
 from .sharpening import sharpen
 from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
-from .verifying import Proposed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
+from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 
 Floats = NDArray[np.float64]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
@@ -212,20 +212,13 @@ class _Update:
     def _blamed(
         self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], found: Sequence[Localized]
     ) -> list[int]:
-        """Return the changes that usable scans see which fit the new map less; none if it keeps enough of them usable.
-
-        The one that most of these scans see comes first.
-        """
-        lost, blamed = lost_scans(first, found), []
+        """Return the changes that are seen by usable scans which fit the new map less; none if these are few."""
+        lost = lost_scans(first, found)
+        if len(lost) <= most_lost(len(first)):
+            return []
         walls = [self._changed([one]) for one in drafts]
-        while len(lost) > most_lost(len(first)):
-            seen = [[sees(one, scan, self.sigma) for scan in lost] for one in walls]
-            worst = max(range(len(walls)), key=lambda k: sum(seen[k]))
-            if not any(seen[worst]):
-                break
-            blamed.append(worst)
-            lost = [scan for scan, saw in zip(lost, seen[worst], strict=True) if not saw]
-        return blamed
+        seen = np.array([[sees(one, scan, self.sigma) for scan in lost] for one in walls])
+        return blamed(seen, most_lost(len(first)))
 
     def sharpen(
         self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .changes import Draft
 from .evidence import WallEvidence
 from .result import NOT_SHARPENED, Change, Sharpened, Usable
@@ -72,6 +75,28 @@ def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> list[L
 def most_lost(count: int) -> float:
     """Return how many of so many scans a proposal may lose."""
     return max(1.0, FEWER_USABLE * count)
+
+
+def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:
+    """Return changes without which few of the lost scans are left; the one that most of them see comes first.
+
+    Parameters
+    ----------
+    seen : (k, n)
+        Whether each of k changes is seen by each of n lost scans.
+    most : float
+        Number of lost scans that may be left.
+    """
+    found: list[int] = []
+    left = np.ones(seen.shape[1], dtype=bool)
+    while left.sum() > most:
+        counts = seen[:, left].sum(axis=1)
+        worst = int(np.argmax(counts))
+        if counts[worst] == 0:
+            break
+        found.append(worst)
+        left &= ~seen[worst]
+    return found
 
 
 def usable_of(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:

@@ -10,7 +10,7 @@ from association import MapIndex
 from map_quality import MapUpdate, VisitScan
 from registration import Segments
 
-from .hall import OUTLINE, PILLAR, RACK, box, segments, visit
+from .hall import OUTLINE, PILLAR, PLACES, RACK, box, segments, visit
 
 CART = box(6.0, 5.0, 7.2, 5.8)
 
@@ -110,6 +110,22 @@ def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> 
 def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:
     hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.98, 6.9, 8.02))
     assert [one.code for one in updated(hall, *visits(*[shut] * 5)).changes] == ["extended"]
+
+
+def test_a_leaf_off_the_line_of_its_wall_stands_where_it_was_seen() -> None:
+    """It is no extension of the wall, whose line the scans then would contradict."""
+    hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.93, 6.9, 7.97))
+    (one,) = updated(hall, *visits(*[shut] * 5)).changes
+    assert one.code == "added"
+    assert one.new[0] == pytest.approx([6.9, 7.93, 5.6, 7.93], abs=0.1)
+    assert np.abs(one.new[0, [1, 3]] - 7.93).max() < 0.01
+
+
+def test_a_place_counts_on_each_visit() -> None:
+    """A robot that stops at one place in a room has seen its walls at as many poses as visits."""
+    hall, today = segments(RACK, PILLAR), segments(PILLAR)
+    found = updated(hall, *[visit(today, name, 0) for name in "abc"])
+    assert found.changes[0].evidence.poses > len(PLACES)
 
 
 def test_people_and_carts_do_not_become_walls() -> None:
