@@ -278,7 +278,7 @@ class _Update:
 
         The others keep their answer: at their poses, nothing has changed.
         """
-        found = []
+        found: list[Localized] = []
         for one in before:
             if self.deadline.passed:
                 return found
