@@ -33,8 +33,13 @@ class Judged:
 
     def and_also(self, other: Judged) -> Judged:
         """Return the changes of two buildings."""
-        counts = (getattr(self, name) + getattr(other, name) for name in ("all", "shown", "found"))
-        return Judged(*counts, self.right + other.right, self.false + other.false)
+        return Judged(
+            self.all + other.all,
+            self.shown + other.shown,
+            self.found + other.found,
+            self.right + other.right,
+            self.false + other.false,
+        )
 
 
 def outlines(building: Building) -> dict[tuple[float, ...], np.ndarray]:
