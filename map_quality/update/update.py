@@ -42,7 +42,8 @@ def update(
     2. Suggest: join lines of scans that the map does not show to walls that may be new.
     3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
     4. Decide: at least two visits and three places agree, no visit contradicts.
-    5. Verify: search all scans in the new map. A change that lowers the score of its scans is dropped.
+    5. Verify: search the scans that see a change in the new map. A change that lowers the score of its scans, or that
+       scans see which are no longer usable, is dropped.
     6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.
 
     Parameters
