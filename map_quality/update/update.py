@@ -196,7 +196,7 @@ class _Update:
             new = self._index(drafts) if drafts else None
             if new is None:
                 return None
-            # What is sharpened needs all scans on one map.
+            # To sharpen walls, all scans have to be searched on one map.
             found = yield from self._search_all(new, found, None if self.is_blurred else changed)
             if self.deadline.passed:
                 return None

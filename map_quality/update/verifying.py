@@ -83,7 +83,7 @@ def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:
     Parameters
     ----------
     seen : (k, n)
-        Whether each of k changes is seen by each of n lost scans.
+        True where a lost scan sees a change: k changes, n scans.
     most : float
         Number of lost scans that may be left.
     """
