@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
+from .evidence import are_enough
 from .scans import Localized
 from .tuning import (
     BIN,
     FULLY_ON_MAP,
     LEAST_PIECE,
-    LEAST_POSES,
     LEAST_SEEN,
     LEAST_VISITS,
     ON_MAP,
@@ -39,8 +39,8 @@ class SeenLines:
     ----------
     lines : Segments
     visits : (n,)
-    places : (n, 3)
-        Visits, and squares that they were seen from.
+    places : (n, 2)
+        Squares in which they were seen from.
     weights : (n,)
         Information about the offset of each line, 1 / m^2.
     """
@@ -71,7 +71,7 @@ def unexplained(found: Sequence[Localized], known: Segments) -> SeenLines:
         weights.append(np.maximum(seen.point_counts[rows], 1.0) / np.maximum(seen.sigma[rows], 1e-3) ** 2)
     if not ends:
         nothing = np.zeros(0, dtype=np.intp)
-        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 3), dtype=np.intp), np.zeros(0))
+        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 2), dtype=np.intp), np.zeros(0))
     return SeenLines(
         Segments.derived(np.concatenate(ends)), np.concatenate(visits), np.concatenate(places), np.concatenate(weights)
     )
@@ -125,7 +125,7 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
 
 
 def _is_seen_often(visits: Indices, places: Indices) -> bool:
-    return len(np.unique(visits)) >= LEAST_VISITS and len(np.unique(places, axis=0)) >= LEAST_POSES
+    return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
 
 def _along(seen: SeenLines) -> Bools:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .evidence import WallEvidence
+from .evidence import WallEvidence, are_enough
 from .result import Change, ChangeCode, Evidence
 from .tuning import (
     CONTRADICTING,
@@ -21,9 +21,7 @@ from .tuning import (
     JAMB,
     JOINED,
     LEAST_PIECE,
-    LEAST_POSES,
     LEAST_STEP,
-    LEAST_VISITS,
     LONGEST_LEAF,
     MOST_CONFIDENCE,
     NEAR_MOVE,
@@ -256,7 +254,7 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
             agreeing |= evidence.visits_of(chunks, on=is_on)
             poses.append(evidence.places_of(chunks, on=is_on))
     visits = np.flatnonzero(agreeing)
-    if len(visits) < (DOOR_VISITS if draft.door else LEAST_VISITS) or min(poses) < LEAST_POSES:
+    if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < DOOR_VISITS):
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
     told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])

@@ -25,7 +25,7 @@ class Evidence:
     beams_on : int
         Beams that end on the new walls.
     poses : int
-        Places that the scans were taken from, squares of 0.5 m, counted on each visit.
+        Places that the scans were taken from, squares of 0.5 m.
     visits : int
         Visits that agree with the change.
     first, last : str

@@ -143,9 +143,9 @@ class Localized:
         return 0.0 if self.result.diagnostics is None else self.result.diagnostics.score
 
     @property
-    def place(self) -> tuple[int, int, int]:
-        """The visit and the square that it was taken in; scans of one place share the error of its pose."""
-        return self.visit, math.floor(self.pose.x / PLACE), math.floor(self.pose.y / PLACE)
+    def place(self) -> tuple[int, int]:
+        """The square that it was taken in."""
+        return math.floor(self.pose.x / PLACE), math.floor(self.pose.y / PLACE)
 
     @property
     def pairs(self) -> Correspondences:

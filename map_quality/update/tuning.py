@@ -24,7 +24,7 @@ LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
 HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
-PLACE = 0.5  # m; scans of one visit from the same square of this side count as one pose
+PLACE = 0.5  # m; scans from the same square of this side count as one pose
 HANGING = 0.1  # m; deviation without a wall above which a pose depends on that wall, and is no evidence for it
 
 # --- Decisions about a chunk ------------------------------------------------------------------------------------------
@@ -32,6 +32,7 @@ HANGING = 0.1  # m; deviation without a wall above which a pose depends on that 
 LEAST_BEAMS = 3  # of a visit
 FEW, MOST = 0.1, 0.7  # fractions of a visit's beams: those that contradict it, those that agree
 LEAST_VISITS, LEAST_POSES = 2, 3
+ENOUGH_VISITS = 3  # that agree, where they have seen it from fewer poses
 CONTRADICTING = 0.1  # fraction of all beams on a change, drawn
 
 # --- Changes ----------------------------------------------------------------------------------------------------------

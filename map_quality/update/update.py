@@ -41,7 +41,7 @@ def update(
     1. Localize: search each scan in the map. Usable and precise ones give evidence, except one in ten.
     2. Suggest: join lines of scans that the map does not show to walls that may be new.
     3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
-    4. Decide: at least two visits and three places agree, no visit contradicts.
+    4. Decide: two visits and three places agree, or three visits; no visit contradicts.
     5. Verify: search the scans that see a change in the new map. A change that lowers the score of its scans, or that
        scans see which are no longer usable, is dropped.
     6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.

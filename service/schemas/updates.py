@@ -85,7 +85,7 @@ class EvidenceAnswer(Answer):
 
     beams_through: Index = Field(description="number of beams through the old segments")
     beams_on: Index = Field(description="number of beams that end on the new segments")
-    poses: Index = Field(description="number of places of the scans, squares of 0.5 m, counted on each visit")
+    poses: Index = Field(description="number of places of the scans, squares of 0.5 m")
     visits: Index = Field(description="number of visits that show the change")
     from_: str = Field(alias="from", description="the first of them, in the order of the request")
     to: str = Field(description="the last of them")

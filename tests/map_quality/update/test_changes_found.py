@@ -8,9 +8,10 @@ import pytest
 import map_quality
 from association import MapIndex
 from map_quality import MapUpdate, VisitScan
+from map_quality.update.evidence import are_enough
 from registration import Segments
 
-from .hall import OUTLINE, PILLAR, PLACES, RACK, box, segments, visit
+from .hall import OUTLINE, PILLAR, RACK, box, segments, visit
 
 CART = box(6.0, 5.0, 7.2, 5.8)
 
@@ -121,11 +122,11 @@ def test_a_leaf_off_the_line_of_its_wall_stands_where_it_was_seen() -> None:
     assert np.abs(one.new[0, [1, 3]] - 7.93).max() < 0.01
 
 
-def test_a_place_counts_on_each_visit() -> None:
-    """A robot that stops at one place in a room has seen its walls at as many poses as visits."""
-    hall, today = segments(RACK, PILLAR), segments(PILLAR)
-    found = updated(hall, *[visit(today, name, 0) for name in "abc"])
-    assert found.changes[0].evidence.poses > len(PLACES)
+@pytest.mark.parametrize(
+    ("visits", "poses", "enough"), [(1, 9, False), (2, 2, False), (2, 3, True), (3, 1, True), (4, 2, True)]
+)
+def test_three_visits_are_enough_from_one_place(visits: int, poses: int, enough: bool) -> None:
+    assert bool(are_enough(visits, poses)) is enough
 
 
 def test_people_and_carts_do_not_become_walls() -> None:
