@@ -33,8 +33,11 @@ def main() -> int:
     if chromium is None:
         print("no chromium is installed; install one, or name it in LINEFIX_TEST_CHROMIUM", file=sys.stderr)
         return 1
-    with running_service() as (url, _), sync_playwright() as playwright:
+    with running_service(max_deadline_ms=PATIENCE) as (url, _), sync_playwright() as playwright:
         proposal = proposed(url)
+        if not proposal["changes"]:
+            print("the service proposed no changes; if it had too little time, try again", file=sys.stderr)
+            return 1
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport=SIZE, color_scheme="light")
         page.set_default_timeout(PATIENCE)
