@@ -92,7 +92,7 @@ class Fitted:
 def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
     """Return the probability of each answer among its alternatives, the lesser of as scored and by what is shown."""
     scored = np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
-    return np.minimum(scored, np.array([e.shown for e in examples]))
+    return np.asarray(np.minimum(scored, [e.shown for e in examples]))
 
 
 def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:

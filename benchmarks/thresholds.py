@@ -1,4 +1,4 @@
-"""The thresholds of the ``tuning.py`` of `association`, and how to move one of them in all modules that read it."""
+"""The thresholds of the ``tuning.py`` of a package, and how to move one of them in all modules that read it."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def _moved(value: Number, factor: float) -> Number:
     return moved if moved != value else value + (1 if factor > 1.0 else -1)
 
 
-def thresholds() -> list[Threshold]:
-    """Return all numbers of the ``tuning.py`` of `association` but derived ones, in the order of the files."""
+def thresholds(package: str = "association") -> list[Threshold]:
+    """Return all numbers of the ``tuning.py`` of a package but derived ones, in the order of the files."""
     found = []
-    for path in sorted((ROOT / "association").rglob("tuning.py")):
+    for path in sorted(ROOT.joinpath(*package.split(".")).rglob("tuning.py")):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         module = sys.modules.get(name) or __import__(name, fromlist=["*"])
         derived = _derived(path)

@@ -24,20 +24,26 @@ PLACES, DAYS = 40, ("monday", "tuesday", "wednesday")
 
 def main() -> None:
     """Draw a warehouse, change it, visit it on three days, and draw the changes that Linefix proposes."""
+    mapped, today, visits = warehouse()
+    update = linefix.update_map({"segments": mapped.endpoints, "sigma": 0.005}, visits)
+    before, after = (getattr(update.usable, name) + getattr(update.held_back, name) for name in ("before", "after"))
+    figure = Figure(figsize=(12.0, 6.0), layout="constrained")
+    ax = figure.subplots()
+    draw(ax, mapped, today, update)
+    scans = update.usable.scans + update.held_back.scans
+    ax.set_title(f"{len(update.changes)} changes; usable scans of {scans}: {before} before, {after} after", color=INK)
+    figure.savefig(PICTURE, dpi=90)
+    print(f"Picture: {PICTURE}")
+
+
+def warehouse() -> tuple[Segments, Segments, dict[str, list[linefix.LaserScan]]]:
+    """Return the walls of a warehouse on the day of its map and today, and the scans of each visit."""
     rng = np.random.default_rng(4)
     mapped = FAMILIES["warehouse"].draw(rng).build(rng)
     today = rearranged(mapped, rng, 0.2)
     places = [free_place(today.segments, rng) for _ in range(PLACES)]
     visits = {day: [take(today.segments, place, rng) for place in places] for day in DAYS}
-    update = linefix.update_map({"segments": mapped.segments.endpoints, "sigma": 0.005}, visits)
-    before, after = (getattr(update.usable, name) + getattr(update.held_back, name) for name in ("before", "after"))
-    figure = Figure(figsize=(12.0, 6.0), layout="constrained")
-    ax = figure.subplots()
-    draw(ax, mapped.segments, today.segments, update)
-    scans = update.usable.scans + update.held_back.scans
-    ax.set_title(f"{len(update.changes)} changes; usable scans of {scans}: {before} before, {after} after", color=INK)
-    figure.savefig(PICTURE, dpi=90)
-    print(f"Picture: {PICTURE}")
+    return mapped.segments, today.segments, visits
 
 
 def take(walls: Segments, place: RigidTransform, rng: np.random.Generator) -> linefix.LaserScan:

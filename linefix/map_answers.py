@@ -100,6 +100,7 @@ def update_json(update: MapUpdate, document: Mapping[str, Any]) -> Json:
         },
         "sharpened": {
             "segments": update.sharpened.segments.tolist(),
+            "ends": update.sharpened.ends.tolist(),
             "sigma": update.sharpened.sigma.tolist(),
         },
         "refused_visits": [asdict(one) for one in update.refused_visits],

@@ -12,12 +12,24 @@ from .check.judging import judge_samples
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
 from .check.thickness import conclude, find_thickness, fit_better_mirrored, thickness_finding
-from .update.result import Change, ChangeCode, Evidence, MapUpdate, RefusedVisit, Usable
+from .update.applying import apply_changes
+from .update.result import (
+    NOT_SHARPENED,
+    Change,
+    ChangeCode,
+    Evidence,
+    MapUpdate,
+    RefusedVisit,
+    Replacement,
+    Sharpened,
+    Usable,
+)
 from .update.scans import UpdateError, VisitScan
 from .update.update import update, updating
 from .views import AnalysisError, Robot
 
 __all__ = [
+    "NOT_SHARPENED",
     "Advice",
     "Analysis",
     "AnalysisError",
@@ -31,14 +43,17 @@ __all__ = [
     "Place",
     "PlaceVerdict",
     "RefusedVisit",
+    "Replacement",
     "Robot",
     "Sample",
     "SampleReport",
+    "Sharpened",
     "Size",
     "Standing",
     "UpdateError",
     "Usable",
     "VisitScan",
+    "apply_changes",
     "check_map",
     "conclude",
     "find_thickness",

@@ -20,13 +20,26 @@ STEP = 0.05  # m
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Changes of a building: all, those that scans show, and of these the ones found; false proposals, and all."""
+    """Changes of a building: all, those that scans show, and of these the ones found.
+
+    `right` and `false` have the confidence of each proposed change.
+    """
 
     all: int
     shown: int
     found: int
-    false: int
-    proposed: int
+    right: tuple[float, ...] = ()
+    false: tuple[float, ...] = ()
+
+    def and_also(self, other: Judged) -> Judged:
+        """Return the changes of two buildings."""
+        return Judged(
+            self.all + other.all,
+            self.shown + other.shown,
+            self.found + other.found,
+            self.right + other.right,
+            self.false + other.false,
+        )
 
 
 def outlines(building: Building) -> dict[tuple[float, ...], np.ndarray]:
@@ -55,8 +68,11 @@ def judge(scene: Scene, poses: Sequence[tuple[str, RigidTransform]], update: Map
         if _is_shown(_indices(scene.today.segments, outline), [(v, hit) for v, hit, _ in new_hits]):
             shown += 1
             found += any(_fraction_on(side, proposed) > 0.4 for side in outline)
-    false = [one for one in update.changes if is_false(one, scene)]
-    return Judged(len(gone) + len(new), shown, found, len(false), len(update.changes))
+    wrong = [is_false(one, scene) for one in update.changes]
+    by_truth = [
+        tuple(c.confidence for c, w in zip(update.changes, wrong, strict=True) if w == of) for of in (False, True)
+    ]
+    return Judged(len(gone) + len(new), shown, found, *by_truth)
 
 
 def is_false(change: Change, scene: Scene, old: Segments | None = None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from collections.abc import Callable, Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from .scenes import Scene, draw, drawn, flipped, off_scale, visits, with_poses
 
 VISITS, PLACES = 5, 60
 MAP_SIGMA = 0.005  # m
+CONFIDENCES = ((0.0, 0.9), (0.9, 0.98), (0.98, 0.995), (0.995, 1.1))
 
 
 def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = False, own: bool = True) -> list[Row]:
@@ -34,15 +36,28 @@ def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = Fa
         usable += counts
         seconds.append(took)
         progress(f"upkeep, {scene.family}", len(judged), len(families) * len(seeds))
-    total = Judged(*(sum(getattr(one, name) for one in judged) for name in Judged.__slots__))
+    total = reduce(Judged.and_also, judged, Judged(0, 0, 0))
+    proposed = len(total.right) + len(total.false)
     return [
         at_least(f"changes found, of {total.shown} that scans show", total.found / max(1, total.shown), 0.9),
         at_least(f"  changes found, of all {total.all}", total.found / max(1, total.all)),
-        at_most(f"false changes, of {total.proposed} proposed", total.false / max(1, total.proposed), 0.02),
+        at_most(f"false changes, of {proposed} proposed", len(total.false) / max(1, proposed), 0.02),
+        *_by_confidence(total),
         at_least("usable scans on the new map, of what the true map gives", usable[1] / usable[2], 0.98),
         at_least("  on the old map", usable[0] / usable[2]),
         at_most(f"  seconds for {VISITS * PLACES} scans, median", float(np.median(seconds)), form=".1f"),
     ]
+
+
+def _by_confidence(total: Judged) -> list[Row]:
+    """Return which fraction of the proposed changes is true, by their confidence."""
+    rows = []
+    for low, high in CONFIDENCES:
+        right, false = (sum(low <= one < high for one in of) for of in (total.right, total.false))
+        if right + false:
+            what = f"  true changes, of {right + false} with a confidence from {low:g} to {min(high, 1.0):g}"
+            rows.append(at_least(what, right / (right + false)))
+    return rows
 
 
 def _update(scene: Scene, *, listing: bool, own: bool) -> tuple[Judged, np.ndarray, float]:

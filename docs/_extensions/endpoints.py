@@ -24,7 +24,7 @@ PAGES = {
     "check": ("GET /v1/maps/{map_id}:check", "POST /v1/maps/{map_id}:check"),
     "import": ("POST /v1/maps:import", "POST /v1/scans:import"),
     "analyze": ("POST /v1/maps/{map_id}:analyze", "POST /v1/analyze"),
-    "update": ("POST /v1/maps/{map_id}:update",),
+    "update": ("POST /v1/maps/{map_id}:update", "POST /v1/maps:apply"),
     "operations": ("GET /v1/limits", "GET /version", "GET /livez", "GET /readyz", "GET /metrics"),
 }
 ANY = 1e9  # the limit of each number in the contract, which the conventions name once

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
+from .evidence import are_enough
 from .scans import Localized
 from .tuning import (
     BIN,
     FULLY_ON_MAP,
     LEAST_PIECE,
-    LEAST_POSES,
     LEAST_SEEN,
     LEAST_VISITS,
     ON_MAP,
@@ -125,7 +125,7 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
 
 
 def _is_seen_often(visits: Indices, places: Indices) -> bool:
-    return len(np.unique(visits)) >= LEAST_VISITS and len(np.unique(places, axis=0)) >= LEAST_POSES
+    return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
 
 def _along(seen: SeenLines) -> Bools:

@@ -7,14 +7,56 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import Segments
+from registration import InvalidArgumentError, Segments
 
-from .result import Change, Sharpened
+from .result import NOT_SHARPENED, Replacement, Sharpened
 
 Floats = NDArray[np.float64]
 
 
-def apply(known: Segments, changes: Sequence[Change]) -> Segments:
+def apply_changes(
+    known: Segments, sigma: float | None, changes: Sequence[Replacement], sharpened: Sharpened = NOT_SHARPENED
+) -> tuple[Segments, float | None]:
+    """Return a map with the changes that were accepted, and the standard deviation of its lines.
+
+    Parameters
+    ----------
+    known : Segments
+        The old map, metres.
+    sigma : float or None
+        Standard deviation of its lines, metres; None: not declared.
+    changes : sequence of Replacement
+        Those of a proposal that were accepted.
+    sharpened : Sharpened, optional
+        Of the same proposal.
+
+    Raises
+    ------
+    InvalidArgumentError
+        When a change or a sharpened wall names a segment that the old map does not have, two changes name the same
+        one, or no segment is left.
+    """
+    named: set[int] = set()
+    for number, one in enumerate(changes):
+        unknown = [k for k in one.segments if not 0 <= k < len(known)]
+        if unknown:
+            told = f"found segment {unknown[0]}, expected indices of the {len(known)} segments of the old map"
+            raise InvalidArgumentError(told, argument="changes", index=number)
+        if named & set(one.segments) or len(set(one.segments)) < len(one.segments):
+            told = "found a segment that was named before, expected each segment once; accept one of the changes"
+            raise InvalidArgumentError(told, argument="changes", index=number)
+        named.update(one.segments)
+    if len(sharpened.segments) and int(sharpened.segments.max()) >= len(known):
+        told = f"found segment {int(sharpened.segments.max())}, expected indices below {len(known)}"
+        raise InvalidArgumentError(told, argument="sharpened.segments")
+    new = apply(with_ends(known, sharpened), changes)
+    if not len(new):
+        told = "found no segment that is left, expected at least one; refuse a change"
+        raise InvalidArgumentError(told, argument="changes")
+    return new, sharper_sigma(known, sigma, sharpened)
+
+
+def apply(known: Segments, changes: Sequence[Replacement]) -> Segments:
     """Return the segments of a map with some changes.
 
     Segments that no change names keep their order. The first new segment of a change takes the place of its first old
@@ -33,7 +75,7 @@ def apply(known: Segments, changes: Sequence[Change]) -> Segments:
     return Segments.derived(np.array(ends).reshape(-1, 4))
 
 
-def kept_indices(count: int, changes: Sequence[Change]) -> NDArray[np.intp]:
+def kept_indices(count: int, changes: Sequence[Replacement]) -> NDArray[np.intp]:
     """Return which old segment each segment of the map with some changes is, -1 for those that changes made."""
     kept = list(range(count))
     made = 0

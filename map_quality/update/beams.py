@@ -126,6 +126,17 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
     return Followed(seen, *(np.bincount(where[one], minlength=len(seen)) for one in (passed, ended, hidden)))
 
 
+def sees(chunks: Chunks, one: Localized, sigma: float) -> bool:
+    """Return whether any beam of a scan ends on some walls, a little before them, or passes through.
+
+    True where the pose of the scan is not known: it may be anywhere.
+    """
+    if one.result.pose is None or one.result.covariance is None:
+        return True
+    seen = follow(chunks, one, np.zeros((0, 3)), sigma, oriented=False)
+    return bool((seen.through + seen.on + seen.before).any())
+
+
 def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
     """Return the beams that came back: their origins (m, 2), unit directions (m, 2), and ranges (m,); map frame.
 

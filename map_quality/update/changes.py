@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .evidence import WallEvidence
+from .evidence import WallEvidence, are_enough
 from .result import Change, ChangeCode, Evidence
 from .tuning import (
     CONTRADICTING,
+    DEVIATIONS,
     DOOR_VISITS,
     DOUBT_POSE,
     DOUBT_VISIT,
     JAMB,
     JOINED,
     LEAST_PIECE,
-    LEAST_POSES,
-    LEAST_VISITS,
+    LEAST_STEP,
     LONGEST_LEAF,
     MOST_CONFIDENCE,
     NEAR_MOVE,
@@ -99,7 +99,7 @@ def draft_changes(evidence: WallEvidence, known: Segments, sigmas: Floats, sigma
     cuts = find_cuts(evidence, len(known))
     removed = [_removal(cut) for cut in cuts if not len(cut.left)]
     shortened = [_shortening(cut, sigma) for cut in cuts if len(cut.left)]
-    extended, added = _new_walls(evidence, known, {cut.wall for cut in cuts}, sigmas)
+    extended, added = _new_walls(evidence, known, {cut.wall for cut in cuts}, sigmas, sigma)
     ends = [known.endpoints[list(one.segments)] for one in removed]
     removed = _joined(removed, ends, JOINED)
     added = _joined(added, [one.new for one in added], NEW_JOINED)
@@ -116,7 +116,7 @@ def _shortening(cut: Cut, sigma: float) -> Draft:
 
 
 def _new_walls(
-    evidence: WallEvidence, known: Segments, cut: set[int], sigmas: Floats
+    evidence: WallEvidence, known: Segments, cut: set[int], sigmas: Floats, map_sigma: float
 ) -> tuple[list[Draft], list[Draft]]:
     """Return extensions of walls of the map, one for each wall, and walls that continue none."""
     extended: dict[int, Draft] = {}
@@ -130,7 +130,7 @@ def _new_walls(
             chunks = own.start + begin + np.flatnonzero(there[own][begin:end])
             if np.hypot(*(piece[2:] - piece[:2])) < LEAST_PIECE:
                 continue
-            old = _continued(known, piece)
+            old = _continued(known, piece, max(LEAST_STEP, DEVIATIONS * float(np.hypot(sigma, map_sigma))))
             if old is None or old in cut:
                 door = _may_be_door(known, piece)
                 added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, door))
@@ -161,13 +161,13 @@ def _part(evidence: WallEvidence, wall: int, begin: int, end: int) -> Floats:
     return np.concatenate([place + begin * step * along, place + end * step * along])
 
 
-def _continued(known: Segments, piece: Floats) -> int | None:
-    """Return the wall of the map that a new piece continues; None if there is none."""
+def _continued(known: Segments, piece: Floats, step: float) -> int | None:
+    """Return the wall of the map that a new piece continues, off its line by a step at most; None if there is none."""
     along = piece[2:] - piece[:2]
     direction = along / np.hypot(*along)
     parallel = known.directions @ direction >= np.cos(SAME_ANGLE)
     middle = 0.5 * (piece[:2] + piece[2:])
-    beside = np.abs(known.normals @ middle - known.offsets) <= SAME_LINE
+    beside = np.abs(known.normals @ middle - known.offsets) <= min(step, SAME_LINE)
     begin = known.endpoints[:, :2] @ direction - piece[2:] @ direction
     end = piece[:2] @ direction - known.endpoints[:, 2:] @ direction
     gaps = np.maximum(begin, end)  # the wall lies ahead of the piece, or behind it
@@ -254,7 +254,7 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
             agreeing |= evidence.visits_of(chunks, on=is_on)
             poses.append(evidence.places_of(chunks, on=is_on))
     visits = np.flatnonzero(agreeing)
-    if len(visits) < (DOOR_VISITS if draft.door else LEAST_VISITS) or min(poses) < LEAST_POSES:
+    if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < DOOR_VISITS):
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
     told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])

@@ -14,7 +14,7 @@ from registration import Segments
 from .beams import Chunks, Followed, follow
 from .hanging import hanging_lines
 from .scans import Localized
-from .tuning import FEW, LEAST_BEAMS, LEAST_POSES, LEAST_VISITS, MOST
+from .tuning import ENOUGH_VISITS, FEW, LEAST_BEAMS, LEAST_POSES, LEAST_VISITS, MOST
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -73,7 +73,7 @@ class WallEvidence:
         clear = other.sum(axis=0) <= FEW * (near + other).sum(axis=0)
         visits, no_visits = shows(near, all_other).sum(axis=0), shows(all_other, near).any(axis=0)
         poses = self.poses(on=on)
-        return np.asarray(own & clear & ~no_visits & (visits >= LEAST_VISITS) & (poses >= LEAST_POSES))
+        return np.asarray(own & clear & ~no_visits & are_enough(visits, poses))
 
     def _near(self, counts: Indices) -> Indices:
         """Return the sums over each chunk and the chunks of its wall next to it, (v, c)."""
@@ -109,6 +109,17 @@ class WallEvidence:
         own, other = (self.on, self.through) if on else (self.through, self.on)
         mine, others = own[:, chunks].sum(axis=1), other[:, chunks].sum(axis=1)
         return shows(mine, others)
+
+
+def are_enough(visits: Indices | int, poses: Indices | int) -> Bools:
+    """Return where so many visits that agree, and so many places that they saw it from, are enough to be sure.
+
+    Of three visits each may have seen it from the same place.
+    """
+    return np.asarray(
+        (np.asarray(visits) >= LEAST_VISITS)
+        & ((np.asarray(poses) >= LEAST_POSES) | (np.asarray(visits) >= ENOUGH_VISITS))
+    )
 
 
 def shows(agree: Indices, against: Indices) -> Bools:

@@ -41,8 +41,8 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Change:
-    """A proposed change of a map.
+class Replacement:
+    """Segments of a map, and what takes their place.
 
     Attributes
     ----------
@@ -53,15 +53,25 @@ class Change:
         Segments in their place, metres in the map frame, free space on the left.
     sigma : (k,)
         Standard deviation of each normal to itself, metres.
-    evidence : Evidence
-    confidence : float
-        Above 0 and below 1.
     """
 
     code: ChangeCode
     segments: tuple[int, ...]
     new: Floats = field(repr=False)
     sigma: Floats = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change(Replacement):
+    """A proposed change of a map.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    confidence : float
+        Above 0 and below 1.
+    """
+
     evidence: Evidence
     confidence: float
 

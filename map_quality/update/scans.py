@@ -34,7 +34,7 @@ DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_
 
 
 # Reasons that changes of a building alone may give.
-OF_OLD_MAPS = frozenset(("map_mismatch", "insufficient_evidence", "not_on_map"))
+OF_OLD_MAPS = frozenset(("map_mismatch", "insufficient_evidence", "not_on_map", "single_wall"))
 
 
 class UpdateError(InputError):

@@ -32,6 +32,7 @@ HANGING = 0.1  # m; deviation without a wall above which a pose depends on that 
 LEAST_BEAMS = 3  # of a visit
 FEW, MOST = 0.1, 0.7  # fractions of a visit's beams: those that contradict it, those that agree
 LEAST_VISITS, LEAST_POSES = 2, 3
+ENOUGH_VISITS = 3  # that agree, where they have seen it from fewer poses
 CONTRADICTING = 0.1  # fraction of all beams on a change, drawn
 
 # --- Changes ----------------------------------------------------------------------------------------------------------
@@ -46,6 +47,7 @@ LEAST_PIECE = 0.2  # m; that remains of a wall, or is added
 LEAST_SEEN = 0.25  # m; shorter lines of a scan do not suggest a wall
 SAME_ANGLE = math.radians(4.0)  # between lines of scans that show one wall
 SAME_LINE = 0.08  # m, likewise
+LEAST_STEP = 0.02  # m; a wall that continues another is no farther off its line, where both are known well
 SAME_GAP = 0.3  # m; along the wall
 BIN = 0.05  # m; resolution of the ends of a new wall
 ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added

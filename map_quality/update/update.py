@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Collection, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,15 @@ from association import CancelledError, Deadline, MapIndex
 from registration import InvalidArgumentError, Segments
 
 from .additions import candidates, unexplained
-from .applying import apply, kept_indices, sharper_sigma, with_ends
+from .applying import apply, apply_changes, kept_indices, with_ends
+from .beams import Chunks, sees
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
 from .sharpening import sharpen
 from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
-from .verifying import Proposed, is_better, keeps_usable, total_score, usable_of
+from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 
 Floats = NDArray[np.float64]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
@@ -40,8 +41,9 @@ def update(
     1. Localize: search each scan in the map. Usable and precise ones give evidence, except one in ten.
     2. Suggest: join lines of scans that the map does not show to walls that may be new.
     3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
-    4. Decide: at least two visits and three places agree, no visit contradicts.
-    5. Verify: search all scans in the new map. A change that lowers the score of its scans is dropped.
+    4. Decide: two visits and three places agree, or three visits; no visit contradicts.
+    5. Verify: search the scans that see a change in the new map. A change that lowers the score of its scans, or that
+       scans see which are no longer usable, is dropped.
     6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.
 
     Parameters
@@ -125,6 +127,7 @@ class _Update:
     scans: tuple[VisitScan, ...]
     deadline: Deadline
     gatherer: Gatherer
+    latest: dict[int, Localized] = field(default_factory=dict)  # by the number of a scan: its last search
 
     @classmethod
     def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
@@ -142,6 +145,11 @@ class _Update:
     def sigma(self) -> float:
         """Of its walls, metres."""
         return self.gatherer.sigma
+
+    @property
+    def is_blurred(self) -> bool:
+        """Return whether the map declares that its walls are to be sharpened."""
+        return self.index.sigma is not None and self.index.sigma >= LEAST_BLUR
 
     def localize(self) -> Generator[None, None, list[Localized]]:
         """Search all scans that there is time for."""
@@ -183,22 +191,35 @@ class _Update:
         Proposed or None
             The changes that remain; None if none remain, or if there is no time to verify them.
         """
+        found, changed = list(first), self._changed(drafts)
         for _ in range(DROPS):
             new = self._index(drafts) if drafts else None
             if new is None:
                 return None
-            found = []
-            for one in first:
-                found.append((yield from self._search(new, one)))
-                if self.deadline.passed:
-                    return None
-            kept = [one for one in drafts if is_better(one[0], evidence, first, found)]
-            if len(kept) == len(drafts):
+            # To sharpen walls, all scans have to be searched on one map.
+            found = yield from self._search_all(new, found, None if self.is_blurred else changed)
+            if self.deadline.passed:
+                return None
+            dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
+            dropped = dropped or self._blamed(drafts, first, found)
+            if not dropped:
                 if not keeps_usable(first, found):
                     return None
                 return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
-            drafts = kept
+            changed = self._changed([drafts[k] for k in dropped])
+            drafts = [one for k, one in enumerate(drafts) if k not in dropped]
         return None
+
+    def _blamed(
+        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], found: Sequence[Localized]
+    ) -> list[int]:
+        """Return the changes that are seen by usable scans which fit the new map less; none if these are few."""
+        lost = lost_scans(first, found)
+        if len(lost) <= most_lost(len(first)):
+            return []
+        walls = [self._changed([one]) for one in drafts]
+        seen = np.array([[sees(one, scan, self.sigma) for scan in lost] for one in walls])
+        return blamed(seen, most_lost(len(first)))
 
     def sharpen(
         self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
@@ -212,24 +233,22 @@ class _Update:
         """
         found = proposed.found or tuple(first)
         chosen, _ = choose_evidence(names, found, self.sigma)
-        if self.index.sigma is None or self.index.sigma < LEAST_BLUR or not chosen or self.deadline.passed:
+        if not self.is_blurred or not chosen or self.deadline.passed:
             return None
         whole = apply(self.known, proposed.changes)
         if any(one.on is not chosen[0].on for one in chosen):
             return None  # scans that were searched on different maps
         index = self._indexed(whole)
-        better = sharpen(index, chosen, self.index.sigma)
+        better = sharpen(index, chosen, self.sigma)
         old = kept_indices(len(self.known), proposed.changes)[better.segments]
         mine = old >= 0
         sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
         if not mine.any():
             return None
         new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
-        again = []
-        for one in first:
-            again.append((yield from self._search(new, one)))
-            if self.deadline.passed:
-                return None
+        again = yield from self._search_all(new, first, None)
+        if self.deadline.passed:
+            return None
         if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
             return None
         return replace(proposed, found=tuple(again), sharpened=sharpened)
@@ -247,11 +266,32 @@ class _Update:
         new = self._index(drafts)
         if new is None:
             return list(latest)
-        found = []
+        changed, found = self._changed(drafts), []
         for one, now in zip(first, latest, strict=True):
-            again = not one.precise and not self.deadline.passed
+            again = not one.precise and not self.deadline.passed and sees(changed, one, self.sigma)
             found.append((yield from self._search(new, one)) if again else now)
         return found
+
+    def _search_all(
+        self, index: MapIndex, before: Sequence[Localized], changed: Chunks | None
+    ) -> Generator[None, None, list[Localized]]:
+        """Search the scans again that see changed walls, and all that are held back; None: all walls have changed.
+
+        The others keep their answer: at their poses, nothing has changed.
+        """
+        found: list[Localized] = []
+        for one in before:
+            if self.deadline.passed:
+                return found
+            again = changed is None or one.held_back or sees(changed, one, self.sigma)
+            found.append((yield from self._search(index, one)) if again else one)
+        return found
+
+    def _changed(self, drafts: Sequence[tuple[Draft, Change]]) -> Chunks:
+        """Return the walls that changes take away, and those that they bring."""
+        old = sorted({k for _, change in drafts for k in change.segments})
+        ends = [self.known.endpoints[old], *(change.new for _, change in drafts)]
+        return Chunks.of(Segments.derived(np.concatenate(ends)))
 
     def _index(self, drafts: Sequence[tuple[Draft, Change]]) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
@@ -259,13 +299,18 @@ class _Update:
         return self._indexed(segments) if len(segments) else None
 
     def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
-        """Search one scan in another map."""
+        """Search one scan in another map, unless that is the map of its last search."""
         if self.deadline.cancelled:
             raise CancelledError
+        before = self.latest.get(one.number)
+        if before is not None and np.array_equal(before.on.endpoints, index.segments.endpoints):
+            return replace(before, on=index.segments)
         sent = self.scans[one.number]
         result = search(index, sent, self.deadline)
         yield
-        return replace(one, result=result, on=index.segments, vouched=is_vouched(sent, result))
+        found = replace(one, result=result, on=index.segments, vouched=is_vouched(sent, result))
+        self.latest[one.number] = found
+        return found
 
     def proposal(
         self,
@@ -285,9 +330,10 @@ class _Update:
             (accept is None or one.confidence >= accept) and k not in refuse for k, one in enumerate(changes)
         )
         after, taken = proposed.found or first, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]
+        segments, sigma = apply_changes(self.known, self.index.sigma, taken, proposed.sharpened)
         return MapUpdate(
-            apply(with_ends(self.known, proposed.sharpened), taken),
-            sharper_sigma(self.known, self.index.sigma, proposed.sharpened),
+            segments,
+            sigma,
             tuple(changes),
             accepted,
             usable_of(first, after, held=False),

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .changes import Draft
 from .evidence import WallEvidence
 from .result import NOT_SHARPENED, Change, Sharpened, Usable
@@ -57,11 +60,43 @@ def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool
     A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
     its room looks like others.
     """
-    lost = sum(
-        before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+    return len(lost_scans(first, found)) <= most_lost(len(first))
+
+
+def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> list[Localized]:
+    """Return the usable scans, as they were located before, that fit the new map less and may not be used there."""
+    return [
+        before
         for before, after in zip(first, found, strict=True)
-    )
-    return lost <= max(1.0, FEWER_USABLE * len(first))
+        if before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+    ]
+
+
+def most_lost(count: int) -> float:
+    """Return how many of so many scans a proposal may lose."""
+    return max(1.0, FEWER_USABLE * count)
+
+
+def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:
+    """Return changes without which few of the lost scans are left; the one that most of them see comes first.
+
+    Parameters
+    ----------
+    seen : (k, n)
+        True where a lost scan sees a change: k changes, n scans.
+    most : float
+        Number of lost scans that may be left.
+    """
+    found: list[int] = []
+    left = np.ones(seen.shape[1], dtype=bool)
+    while left.sum() > most:
+        counts = seen[:, left].sum(axis=1)
+        worst = int(np.argmax(counts))
+        if counts[worst] == 0:
+            break
+        found.append(worst)
+        left &= ~seen[worst]
+    return found
 
 
 def usable_of(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:

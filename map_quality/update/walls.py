@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .evidence import WallEvidence, shows
+from .evidence import WallEvidence, are_enough, shows
 from .tuning import (
     FEW_ON_THING,
     LEAST_BEAMS,
@@ -17,8 +17,6 @@ from .tuning import (
     LEAST_GONE,
     LEAST_GONE_OF_THING,
     LEAST_PIECE,
-    LEAST_POSES,
-    LEAST_VISITS,
     LOOP_GAP,
     THING,
 )
@@ -107,7 +105,7 @@ def _is_gone_whole(evidence: WallEvidence, chunks: Indices) -> bool:
     visits = shows(through.sum(axis=1), on.sum(axis=1)).sum()
     passed = float((through.sum(axis=0) > 0).mean())
     poses = evidence.places_of(chunks, on=False)
-    return bool(visits >= LEAST_VISITS and poses >= LEAST_POSES and passed >= LEAST_GONE_OF_THING)
+    return bool(are_enough(visits, poses) and passed >= LEAST_GONE_OF_THING)
 
 
 def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:

@@ -90,6 +90,7 @@ ROUTES = (
     Access("POST", "/v1/analyze", Role.ASSOCIATE, searches=True),
     Access("POST", "/v1/maps/{map_id}:analyze", Role.ASSOCIATE, searches=True),
     Access("POST", "/v1/maps/{map_id}:update", Role.ASSOCIATE, searches=True),
+    Access("POST", "/v1/maps:apply", Role.ASSOCIATE, searches=True),
     Access("GET", "/v1/maps", Role.READ),
     Access("GET", "/v1/maps/{map_id}", Role.READ),
     Access("PUT DELETE", "/v1/maps/{map_id}", Role.WRITE),

@@ -35,6 +35,7 @@ _REQUESTS = (
     analysis.AnalyzeRequest,
     analysis.MapAnalyzeRequest,
     updates.UpdateRequest,
+    updates.ApplyRequest,
     parts.MapDocument,
 )
 

@@ -77,6 +77,14 @@ UPDATE: dict[str, Any] = {
     ],
     "accept": 0.99,
 }
+_BOX = [[2.0, 2.0, 2.0, 3.0], [2.0, 3.0, 3.0, 3.0], [3.0, 3.0, 3.0, 2.0], [3.0, 2.0, 2.0, 2.0]]
+APPLY: dict[str, Any] = {
+    "map": {"segments": WALLS + _BOX, "sigma": 0.01},
+    "changes": [
+        {"code": "removed", "segments": [len(WALLS) + k for k in range(4)], "new": [], "accepted": True},
+        {"code": "added", "segments": [], "new": [{"segment": [1.0, 1.0, 1.5, 1.0], "sigma": 0.01}], "accepted": False},
+    ],
+}
 VECTORIZE: dict[str, Any] = {
     "points": [[2.0, 0.1 * i] for i in range(20)] + [[2.0 - 0.1 * i, 2.0] for i in range(20)],
     "options": {"min_points": 5},

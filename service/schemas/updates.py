@@ -9,12 +9,12 @@ from pydantic_core import PydanticCustomError
 
 from map_quality import ChangeCode
 
-from .arrays import Covariance
+from .arrays import Covariance, MapSegmentRows
 from .errors import TooManyError
 from .limits import Limits
-from .parts import LaserScan
+from .parts import LaserScan, MapDocument, MapSigma
 from .replies import Index, MapReference, Row4, Share, TimingAnswer
-from .strict import Answer, FreeJson, Pose, Strict
+from .strict import Answer, Coordinate, FreeJson, Pose, Strict
 
 MOST_VISITS = 100
 
@@ -124,6 +124,7 @@ class SharpenedAnswer(Answer):
     """Walls that are in the new map at better positions; only of a map that declares a sigma of 8 mm or more."""
 
     segments: list[Index] = Field(description="indices of the old map's segments")
+    ends: list[Row4] = Field(description="`[x1, y1, x2, y2]` of each in the new map, metres")
     sigma: list[float] = Field(description="standard deviation of each normal to itself, metres")
 
 
@@ -147,6 +148,72 @@ class UpdateAnswer(Answer):
     sharpened: SharpenedAnswer
     refused_visits: list[RefusedVisitAnswer]
     complete: bool = Field(description="false if the deadline ended the update; changes are then left out")
+    client_ref: Any = Field(description="returned as it was sent")
+    request_id: str
+    timing_ms: TimingAnswer
+
+
+MOST_NEW = 10_000  # segments of one change
+_SegmentIndex = Annotated[int, Field(ge=0, le=10_000_000)]
+
+
+class NewSegment(Strict):
+    """A segment of the new map."""
+
+    segment: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] = Field(
+        description="`[x1, y1, x2, y2]`, metres, free space on the left"
+    )
+    sigma: MapSigma = Field(description="standard deviation normal to the segment, metres; not used")
+
+
+class ProposedChange(Strict):
+    """A change as an update proposed it."""
+
+    code: ChangeCode = Field(description="kind of change")
+    segments: Annotated[list[_SegmentIndex], Field(max_length=100_000)] = Field(
+        description="indices of the old map's segments that it replaces"
+    )
+    new: Annotated[list[NewSegment], Field(max_length=MOST_NEW)] = Field(description="segments in their place")
+    evidence: FreeJson = Field(None, description="not used; allowed, so that a change may be sent unchanged")
+    confidence: float | None = Field(None, description="not used, likewise")
+    accepted: bool = Field(True, description="whether it is in the new map")
+
+
+class SharpenedWalls(Strict):
+    """Walls at better positions, as an update returned them."""
+
+    segments: Annotated[list[_SegmentIndex], Field(max_length=1_000_000)] = Field(
+        description="indices of the old map's segments"
+    )
+    ends: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` of each, metres")
+    sigma: Annotated[list[MapSigma], Field(max_length=1_000_000)] = Field(
+        description="standard deviation of each normal to itself, metres"
+    )
+
+    @model_validator(mode="after")
+    def _as_many(self) -> SharpenedWalls:
+        if not len(self.segments) == len(self.ends) == len(self.sigma):
+            raise PydanticCustomError(
+                "sharpened", "expected as many segments as ends and sigma, found different numbers"
+            )
+        return self
+
+
+class ApplyRequest(Strict):
+    """A map, and changes of it that an update proposed."""
+
+    map: MapDocument = Field(description="the old map, as the update had it")
+    changes: Annotated[list[ProposedChange], Field(max_length=10_000)] = Field(
+        description="as the update returned them; `accepted` of each says whether it is in the new map"
+    )
+    sharpened: SharpenedWalls | None = Field(None, description="as the update returned it")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
+
+
+class ApplyAnswer(Answer):
+    """A map with the accepted changes; nothing is stored."""
+
+    map: NewMapAnswer = Field(description="the new map, with the accepted changes")
     client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer

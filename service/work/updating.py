@@ -7,14 +7,18 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from association import CancelledError, Deadline
 from linefix.answers import Json
 from linefix.map_answers import update_json
-from map_quality import MapUpdate, VisitScan, updating
+from map_quality import NOT_SHARPENED, MapUpdate, Replacement, Sharpened, VisitScan, apply_changes, updating
+from registration import InputError, Segments
 
 from ..admission.errors import DeadlinePassedError
-from ..maps.lookup import FoundMap, MapLookup
-from ..schemas.updates import UpdateRequest
+from ..maps.lookup import FoundMap, MapLookup, outline_of
+from ..schemas.errors import Fault, InvalidRequestError
+from ..schemas.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
 from .association import reference_to
 from .inputs import placed, scanned_of, transform_of
 from .job import Done, Job
@@ -107,3 +111,39 @@ def update_done(progress: Progress, asked: UpdateRequest, job: Job) -> Done:
     sealed = {"based_on": progress.reference, "client_ref": asked.client_ref}
     answer = update_json(progress.update, progress.document)
     return job.done({**answer, **sealed}, map=progress.reference, changes=len(progress.update.changes))
+
+
+def answer_apply(asked: ApplyRequest, job: Job) -> Done:
+    """Return a map with the changes that are accepted.
+
+    Raises
+    ------
+    InputError
+        When the map could not be put, or a change is not one of this map.
+    """
+    outline_of(asked.map)
+    old, known = asked.map, Segments.from_array(asked.map.segments, argument="map.segments")
+    accepted = {number: one for number, one in enumerate(asked.changes) if one.accepted}
+    changes = [_replacement_of(one, number) for number, one in accepted.items()]
+    job.watch.lap("decode")
+    try:
+        new, sigma = apply_changes(known, old.sigma, changes, _sharpened_of(asked.sharpened))
+    except InputError as error:
+        if error.index is None:
+            raise
+        raise InvalidRequestError([Fault(f"/changes/{list(accepted)[error.index]}", error.message)]) from error
+    document = {"segments": new.endpoints.tolist(), "sigma": sigma, "oriented": old.oriented}
+    document |= {"frame_id": old.frame_id, "meta": old.meta}
+    return job.done({"map": document, "client_ref": asked.client_ref}, changes=len(changes))
+
+
+def _replacement_of(one: ProposedChange, number: int) -> Replacement:
+    new = Segments.from_array([each.segment for each in one.new], argument=f"changes.{number}.new")
+    return Replacement(one.code, tuple(one.segments), new.endpoints, np.array([each.sigma for each in one.new]))
+
+
+def _sharpened_of(asked: SharpenedWalls | None) -> Sharpened:
+    if asked is None:
+        return NOT_SHARPENED
+    ends = Segments.from_array(asked.ends, argument="sharpened.ends").endpoints
+    return Sharpened(np.array(asked.segments, dtype=np.intp), ends, np.array(asked.sigma))

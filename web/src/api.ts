@@ -1,6 +1,6 @@
 // Requests to the service that this page comes from.
 
-import type { Analysis, Answer, Imported, ImportedScans, MapDocument, Scan, StoredMap } from "./types";
+import type { Analysis, Answer, Imported, ImportedScans, MapDocument, Proposal, Scan, StoredMap } from "./types";
 
 export class Problem extends Error {
   constructor(
@@ -18,8 +18,8 @@ export function setKey(value: string): void {
   key = value.trim();
 }
 
-async function call<T>(method: string, path: string, body?: BodyInit, type?: string, signal?: AbortSignal): Promise<T> {
-  const headers: Record<string, string> = {};
+async function call<T>(method: string, path: string, body?: BodyInit, type?: string, signal?: AbortSignal, more: Record<string, string> = {}): Promise<T> {
+  const headers: Record<string, string> = { ...more };
   if (key) headers.Authorization = `Bearer ${key}`;
   if (type) headers["Content-Type"] = type;
   let response: Response;
@@ -67,10 +67,18 @@ const pathOf = (id: string) => `/v1/maps/${encodeURIComponent(id)}`;
 export const listMaps = (cursor: string, limit = 50) =>
   call<{ maps: StoredMap[]; next: string | null }>("GET", `/v1/maps?limit=${limit}&cursor=${encodeURIComponent(cursor)}`);
 export const getMap = (id: string) => call<MapDocument>("GET", pathOf(id));
-export const putMap = (id: string, map: MapDocument) => call<StoredMap>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE);
+/** Store a map; with a revision, only in place of that one. */
+export const putMap = (id: string, map: MapDocument, revision?: number) =>
+  call<StoredMap>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE, undefined, revision === undefined ? {} : { "If-Match": `"${revision}"` });
 export const deleteMap = (id: string) => call<void>("DELETE", pathOf(id));
 export const checkMap = (id: string) =>
   call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
+
+/** Propose changes of a stored map that the scans of several visits show. */
+export const updateMap = (id: string, visits: { visit: string; scans: Scan[] }[]) => post<Proposal>(`${pathOf(id)}:update`, { visits });
+/** Return a map with those changes of a proposal that are accepted; the service stores nothing. */
+export const applyChanges = (map: MapDocument, { changes, sharpened }: Proposal) => post<{ map: MapDocument }>("/v1/maps:apply", { map, changes, sharpened });
+export const limits = () => call<{ max_batch: number }>("GET", "/v1/limits");
 
 /** Convert files of another tool to a map; the service stores nothing. */
 export const importMap = (files: File[], units: string) => importing<Imported>("/v1/maps:import", files, units ? { units } : {});

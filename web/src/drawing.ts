@@ -1,5 +1,6 @@
 // Everything on the canvas, from the state alone.
 
+import { CODES, colourOf, drawChanges } from "./changes";
 import { place, placed, pointsOf } from "./geometry";
 import { drawGrid, drawPicture } from "./ground";
 import { drawHeat, kindOf } from "./heat";
@@ -20,7 +21,7 @@ const SMALLEST = 14; // px; a smaller ellipse is drawn larger, which the legend 
 
 export function readColours(): void {
   const style = getComputedStyle(document.documentElement);
-  colours = Object.fromEntries([...NAMES, ...KINDS].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  colours = Object.fromEntries([...NAMES, ...KINDS, ...CODES.map(colourOf)].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
 export function resize(): void {
@@ -54,6 +55,7 @@ function draw(): void {
   drawWalls(context, colours.wall, redraw);
   for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.added, 3);
   for (const k of state.off) line(state.walls[k], colours.off, 4, [3, 5]);
+  drawChanges(context, colours, line);
   const { answer, sent, pointed } = state;
   if (state.analysis && pointed?.similar_pose) drawSimilar(pointed.pose, pointed.similar_pose);
   if (state.log.length) drawLog();

@@ -4,9 +4,10 @@ import { importMap, importScans } from "./api";
 import { askSoon } from "./asking";
 import { showImport, showScanImport } from "./imported";
 import { openLog, openScans } from "./log";
+import { isProposal, openProposal } from "./proposal";
 import { isLatest, showAll, supersede } from "./scene";
 import { changed, forget, forgetMap, setMap, state } from "./state";
-import type { MapDocument, Scan } from "./types";
+import type { MapDocument, Proposal, Scan } from "./types";
 
 const about = document.querySelector<HTMLElement>("#about")!;
 const status = document.querySelector<HTMLElement>("#reading")!;
@@ -18,16 +19,18 @@ let drawing: File[] = []; // the last one, for another unit
 export async function open(files: File[]): Promise<void> {
   const mine = supersede();
   const foreign: File[] = [];
+  const proposals: [string, Proposal][] = [];
   let message = "";
   try {
     for (const file of files) {
-      if (/\.(json|jsonl|ndjson)$/i.test(file.name)) take(file.name, await file.text());
+      if (/\.(json|jsonl|ndjson)$/i.test(file.name)) proposals.push(...take(file.name, await file.text()));
       else foreign.push(file);
     }
     if (foreign.length) {
       status.textContent = `Reading ${foreign[0].name} ...`;
       await (foreign.some((file) => LOGS.test(file.name)) ? readLog(foreign, mine) : readMap(foreign, mine));
     }
+    for (const [name, proposal] of proposals) await openProposal(name, proposal, mine); // its map may be among the files
   } catch (error) {
     message = error instanceof Error ? error.message : String(error);
   }
@@ -71,17 +74,19 @@ async function readLog(files: File[], mine: number): Promise<void> {
   }
 }
 
-function take(name: string, text: string): void {
-  if (openLog(text)) return;
+/** Take a file for what it is; proposals of changes are returned. */
+function take(name: string, text: string): [string, Proposal][] {
+  if (openLog(text)) return [];
   let content: unknown;
   try {
     content = JSON.parse(text);
   } catch {
     throw new Error(`${name} is not JSON. Open a map, a scan or a log in JSON.`);
   }
-  if (Array.isArray(content)) return takeMap({ segments: content } as MapDocument);
+  if (Array.isArray(content)) content = { segments: content };
   if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan. Expected a JSON object, or an array of segments.`);
   const fields = content as Record<string, unknown>;
+  if (isProposal(fields)) return [[name, fields as unknown as Proposal]];
   if ("maps" in fields && "scan" in fields) {
     if (!state.floors.length) throw new Error(`${name} refers to several maps. Search on them first, under "Stored maps".`);
     takeScan(fields.scan as Scan);
@@ -98,6 +103,7 @@ function take(name: string, text: string): void {
     if (/scan/i.test(name) || "viewpoint" in fields || "stamp" in fields || "points" in fields) takeScan(fields as Scan);
     else takeMap(fields as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);
+  return [];
 }
 
 function takeMap(map: MapDocument): void {

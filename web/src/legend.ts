@@ -1,5 +1,6 @@
 // The legend below the plan: only what is drawn there now.
 
+import { CODES, colourOf } from "./changes";
 import { enlarged, KINDS, otherPose } from "./drawing";
 import { kindOf, shownOf } from "./heat";
 import { answerHere, onChange, state } from "./state";
@@ -14,6 +15,8 @@ function entries(): [string, string][] {
   if (walls.length) parts.push(["wall", "wall"]);
   if (walls.length > own) parts.push(["added", "added wall"]);
   if (off.size) parts.push(["off", "removed wall"]);
+  for (const code of CODES) if (state.proposal?.changes.some((one) => one.code === code)) parts.push([colourOf(code), code]);
+  if (state.proposal?.changes.some((one) => !one.accepted)) parts.push(["refused", "refused change"]);
   if (state.virtual) parts.push(["robot", "true pose"]);
   else if (state.scan && !log.length) parts.push(["robot", "initial pose of the scan"]);
   if (other || (state.analysis && state.pointed?.similar_pose)) parts.push(["other", !other ? "similar place" : state.other < 0 ? "best pose on this map" : "alternative"]);

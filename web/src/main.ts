@@ -6,6 +6,7 @@ import "./imported";
 import "./legend";
 import "./log";
 import "./pointer";
+import "./proposal";
 import "./share";
 import "./stored";
 import "./trying";

@@ -1,5 +1,6 @@
 // The text for the object under the mouse.
 
+import { changeAt, evidenceOf, titleOf } from "./changes";
 import { otherPose, sentSegments } from "./drawing";
 import { distance, placed, wrap } from "./geometry";
 import { answerHere, state, wallOf } from "./state";
@@ -12,6 +13,11 @@ const degrees = (radians: number) => (180 / Math.PI) * radians;
 export function describe(px: number, py: number): string {
   const [x, y] = toMetres(px, py);
   const near = 8 / view.scale;
+  const change = changeAt(x, y, near);
+  if (change >= 0) {
+    const one = state.proposal!.changes[change];
+    return `change ${change}, ${one.accepted ? "accepted" : "refused"}: ${titleOf(one)}. ${evidenceOf(one)}`;
+  }
   const answer = answerHere();
   const pose = answer?.pose;
   if (answer && pose && !otherPose()) {

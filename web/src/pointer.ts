@@ -1,10 +1,12 @@
 // Mouse, touch and keyboard on the plan.
 
 import { ask, askSoon } from "./asking";
+import { changeAt, toggle } from "./changes";
 import { HANDLE, redraw } from "./drawing";
 import { wrap } from "./geometry";
 import { showLegend } from "./legend";
 import { describe, placeAt, wallAt } from "./pointed";
+import { lookAt } from "./proposal";
 import { addWalls, boundsOf, changed, state } from "./state";
 import { step } from "./verdict";
 import { fit, toMetres, toPixels, view, zoom } from "./view";
@@ -88,6 +90,7 @@ function point(px: number, py: number): void {
     state.pointed = pointed;
     looked();
   }
+  lookAt(changeAt(...toMetres(px, py), 8 / view.scale));
   hover.hidden = !text;
   hover.textContent = text;
   if (text) besides(px, py);
@@ -108,6 +111,7 @@ function pinch(id: number, px: number, py: number): void {
 canvas.addEventListener("pointerup", (event) => {
   fingers.delete(event.pointerId);
   if (drag && !drag.moved && erase.checked) toggleWall(event.offsetX, event.offsetY);
+  else if (drag && !drag.moved && !build.checked) toggleChange(event.offsetX, event.offsetY);
   if (drag && !drag.moved && build.checked) putBox(...toMetres(event.offsetX, event.offsetY));
   drag = null;
 });
@@ -115,7 +119,10 @@ canvas.addEventListener("pointercancel", (event) => {
   fingers.delete(event.pointerId);
   drag = null;
 });
-canvas.addEventListener("pointerleave", () => (hover.hidden = true));
+canvas.addEventListener("pointerleave", () => {
+  hover.hidden = true;
+  lookAt(-1);
+});
 
 canvas.addEventListener(
   "wheel",
@@ -126,6 +133,15 @@ canvas.addEventListener(
   },
   { passive: false },
 );
+
+/** Accept or refuse the change that is there. */
+function toggleChange(px: number, py: number): void {
+  const change = changeAt(...toMetres(px, py), 8 / view.scale);
+  if (change < 0) return;
+  toggle(change);
+  changed();
+  point(px, py);
+}
 
 function toggleWall(px: number, py: number): void {
   const wall = wallAt(...toMetres(px, py), 10 / view.scale);

@@ -1,6 +1,6 @@
 // The state of the page. Modules read it; `changed` draws the page again.
 
-import type { Alternative, Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Scan, Segment } from "./types";
+import type { Alternative, Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Proposal, Scan, Segment } from "./types";
 
 export interface State {
   map: MapDocument | null;
@@ -25,6 +25,8 @@ export interface State {
   analysis: Analysis | null;
   show: Shown; // of the analysis
   pointed: Place | null; // the place of the analysis under the mouse
+  proposal: Proposal | null; // of changes of the map
+  change: number; // index of the change that is looked at, -1 for none
   log: (LogLine | null)[]; // null: not searched yet
   scans: Scan[]; // of a log whose scans are searched here
   logAt: number;
@@ -62,6 +64,8 @@ export const state: State = {
   analysis: null,
   show: "now",
   pointed: null,
+  proposal: null,
+  change: -1,
   log: [],
   scans: [],
   logAt: 0,
@@ -95,7 +99,7 @@ export function showFloor(map: MapDocument, mapId: string): void {
 
 function take(map: MapDocument, mapId: string | null): void {
   Object.assign(state, { map, mapId, walls: map.segments, own: map.segments.length, off: new Set(), boxes: [] });
-  Object.assign(state, { picture: null, example: "", analysis: null, pointed: null });
+  Object.assign(state, { picture: null, example: "", analysis: null, pointed: null, proposal: null, change: -1 });
 }
 
 /** The answer, where its pose is on the map that is shown. */

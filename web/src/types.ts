@@ -161,6 +161,31 @@ export interface ImportedScans {
   report: Report;
 }
 
+export type ChangeCode = "removed" | "added" | "moved" | "extended" | "shortened";
+
+/** A proposed change of a map. */
+export interface Change {
+  code: ChangeCode;
+  segments: number[]; // of the old map
+  new: { segment: Segment; sigma: number }[];
+  evidence: { beams_through: number; beams_on: number; poses: number; visits: number; from: string; to: string };
+  confidence: number;
+  accepted: boolean;
+}
+
+/** The answer of an update of a map. */
+export interface Proposal {
+  map: MapDocument;
+  based_on: { map_id: string; revision: number } | null; // null: of a map in a file
+  changes: Change[];
+  scans: number;
+  usable_before: number;
+  usable_after: number;
+  sharpened: { segments: number[]; ends: Segment[]; sigma: number[] };
+  refused_visits: { visit: string; message: string }[];
+  complete: boolean;
+}
+
 export interface StoredMap {
   map_id: string;
   revision: number;

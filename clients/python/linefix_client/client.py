@@ -145,6 +145,10 @@ class Client:
         """Propose changes of a stored map that scans of several visits show; `put_map` accepts them."""
         return cast(schema.UpdateAnswer, self._ask(update_of(map_id, body)))
 
+    def apply_changes(self, body: schema.ApplyRequest) -> schema.ApplyAnswer:
+        """Return a map with those changes of an update that are accepted; `put_map` stores it."""
+        return cast(schema.ApplyAnswer, self._ask(Question("POST", "/v1/maps:apply", body)))
+
     def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""
         return cast(schema.Limits, self._ask(Question("GET", "/v1/limits")))
@@ -271,6 +275,10 @@ class AsyncClient:
     async def update_map(self, map_id: str, body: schema.UpdateRequest) -> schema.UpdateAnswer:
         """Propose changes of a stored map that scans of several visits show; `put_map` accepts them."""
         return cast(schema.UpdateAnswer, await self._ask(update_of(map_id, body)))
+
+    async def apply_changes(self, body: schema.ApplyRequest) -> schema.ApplyAnswer:
+        """Return a map with those changes of an update that are accepted; `put_map` stores it."""
+        return cast(schema.ApplyAnswer, await self._ask(Question("POST", "/v1/maps:apply", body)))
 
     async def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""

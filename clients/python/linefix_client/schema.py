@@ -418,6 +418,7 @@ class SharpenedAnswer(TypedDict):
     """
 
     segments: list[int]
+    ends: list[list[float]]
     sigma: list[float]
 
 
@@ -583,6 +584,15 @@ class NamedMap(TypedDict):
     map_id: str
 
 
+class NewSegment(TypedDict):
+    """
+    A segment of the new map.
+    """
+
+    segment: list[float]
+    sigma: float
+
+
 class PointScan(TypedDict):
     """
     A scan as points in scanning order.
@@ -603,6 +613,19 @@ class Pose(TypedDict):
     x: float
     y: float
     theta: float
+
+
+class ProposedChange(TypedDict):
+    """
+    A change as an update proposed it.
+    """
+
+    code: Literal["removed", "added", "moved", "extended", "shortened"]
+    segments: list[int]
+    new: list[NewSegment]
+    evidence: NotRequired[Any]
+    confidence: NotRequired[float | None]
+    accepted: NotRequired[bool]
 
 
 class ScannerFields(TypedDict):
@@ -659,6 +682,16 @@ class SensorPose(TypedDict):
     x: float
     y: float
     theta: float
+
+
+class SharpenedWalls(TypedDict):
+    """
+    Walls at better positions, as an update returned them.
+    """
+
+    segments: list[int]
+    ends: list[list[float]]
+    sigma: list[float]
 
 
 class SoftPriorFields(TypedDict):
@@ -778,6 +811,17 @@ class AnalyzedPlaceAnswer(TypedDict):
     ]
     resolved_after: float | None
     with_landmark: WithLandmarkAnswer | None
+
+
+class ApplyAnswer(TypedDict):
+    """
+    A map with the accepted changes; nothing is stored.
+    """
+
+    map: NewMapAnswer
+    client_ref: Any
+    request_id: str
+    timing_ms: TimingAnswer
 
 
 class ChangeAnswer(TypedDict):
@@ -923,6 +967,17 @@ class AnalyzeRequest(TypedDict):
     landmark: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
+    client_ref: NotRequired[Any]
+
+
+class ApplyRequest(TypedDict):
+    """
+    A map, and changes of it that an update proposed.
+    """
+
+    map: MapDocument
+    changes: list[ProposedChange]
+    sharpened: NotRequired[SharpenedWalls | None]
     client_ref: NotRequired[Any]
 
 

@@ -1,4 +1,4 @@
-"""/v1/maps/{map_id}:update: what has changed in the building of a stored map."""
+"""/v1/maps/{map_id}:update and /v1/maps:apply: what has changed in a building, and a map with accepted changes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ...maps.lookup import FoundMap
 from ...parsing.reading import read_model
 from ...schemas import examples
 from ...schemas.parts import StoredMap
-from ...schemas.updates import UpdateAnswer, UpdateRequest
+from ...schemas.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
 from ...work.job import Done, Job
-from ...work.updating import Progress, begin_update, take_steps, update_done
+from ...work.updating import Progress, answer_apply, begin_update, take_steps, update_done
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
 from ..receiving import read
@@ -41,6 +41,22 @@ async def post_update(request: Request, map_id: MapIdPath) -> Response:
     asked = await read(exchange, partial(read_model, UpdateRequest))
     job = exchange.job(asked.deadline_ms)
     return await answer(exchange, _work(exchange, map_id, asked, job), job.deadline)
+
+
+@router.post(
+    "/v1/maps:apply",
+    operation_id="apply_changes",
+    response_model=ApplyAnswer,
+    responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES),
+    openapi_extra=takes(ApplyRequest, {"a rack is gone": examples.APPLY}),
+    summary="Apply the accepted changes of an update",
+)
+async def post_apply(request: Request) -> Response:
+    """Return a map with those changes of an update that are accepted; nothing is searched or stored."""
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, ApplyRequest))
+    job = exchange.job()
+    return await answer(exchange, in_slot(exchange, partial(answer_apply, asked, job), job.deadline), job.deadline)
 
 
 async def _work(exchange: Exchange, map_id: str, asked: UpdateRequest, job: Job) -> Done:

@@ -8,6 +8,7 @@ import pytest
 import map_quality
 from association import MapIndex
 from map_quality import MapUpdate, VisitScan
+from map_quality.update.evidence import are_enough
 from registration import Segments
 
 from .hall import OUTLINE, PILLAR, RACK, box, segments, visit
@@ -110,6 +111,22 @@ def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> 
 def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:
     hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.98, 6.9, 8.02))
     assert [one.code for one in updated(hall, *visits(*[shut] * 5)).changes] == ["extended"]
+
+
+def test_a_leaf_off_the_line_of_its_wall_stands_where_it_was_seen() -> None:
+    """It is no extension of the wall, whose line the scans then would contradict."""
+    hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.93, 6.9, 7.97))
+    (one,) = updated(hall, *visits(*[shut] * 5)).changes
+    assert one.code == "added"
+    assert one.new[0] == pytest.approx([6.9, 7.93, 5.6, 7.93], abs=0.1)
+    assert np.abs(one.new[0, [1, 3]] - 7.93).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("visits", "poses", "enough"), [(1, 9, False), (2, 2, False), (2, 3, True), (3, 1, True), (4, 2, True)]
+)
+def test_three_visits_are_enough_from_one_place(visits: int, poses: int, enough: bool) -> None:
+    assert bool(are_enough(visits, poses)) is enough
 
 
 def test_people_and_carts_do_not_become_walls() -> None:

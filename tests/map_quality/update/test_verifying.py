@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 import pytest
 
 from association import Deadline, MapIndex
-from map_quality import Change, Evidence
+from association.result import Reason, ReasonCode
+from map_quality import Change, Evidence, VisitScan
 from map_quality.update.applying import apply, kept_indices
+from map_quality.update.beams import Chunks, sees
 from map_quality.update.changes import Draft
 from map_quality.update.evidence import Gatherer
-from map_quality.update.scans import Localized, search
-from map_quality.update.verifying import is_better, keeps_usable
+from map_quality.update.scans import Localized, is_vouched, search
+from map_quality.update.verifying import blamed, is_better, keeps_usable
 from registration import Segments
 
 from .hall import PILLAR, RACK, segments, visit
@@ -58,6 +62,42 @@ def test_a_map_on_which_many_scans_fit_less_is_withdrawn() -> None:
     assert sum(one.usable for one in worse) < sum(one.usable for one in first) - 2
     assert not keeps_usable(first, worse)
     assert keeps_usable(worse, first)
+
+
+def test_the_changes_that_lost_scans_see_are_blamed_and_no_others() -> None:
+    seen = np.array([[1, 1, 0, 0], [0, 0, 0, 0], [1, 1, 1, 0], [0, 0, 0, 1]], dtype=bool)
+    assert blamed(seen, 0.0) == [2, 3]
+    assert blamed(seen, 1.0) == [2]
+    assert blamed(seen, 4.0) == []
+    assert blamed(seen[1:2], 0.0) == []  # no change is to blame
+
+
+def test_a_scan_sees_a_wall_if_a_beam_meets_it() -> None:
+    (one, *_) = localized(HALL, HALL)
+    assert one.usable
+    rack, pillar, away = (Chunks.of(Segments.derived(HALL.endpoints[rows])) for rows in ([12], [17], [5]))
+    behind = Chunks.of(Segments.from_array(np.array([[13.5, 2.0, 13.5, 3.0]])))
+    assert sees(rack, one, 0.005)
+    assert sees(pillar, one, 0.005) or sees(away, one, 0.005)
+    assert not sees(behind, one, 0.005)
+    lost = replace(one, result=replace(one.result, covariance=None))
+    assert sees(behind, lost, 0.005)  # it may be anywhere
+
+
+@pytest.mark.parametrize(
+    ("codes", "vouched"),
+    [(("single_wall",), True), (("map_mismatch", "single_wall"), True), (("similar_place",), False)],
+)
+def test_a_pose_of_the_sender_confirms_one_that_an_old_map_makes_unusable(
+    codes: tuple[ReasonCode, ...], vouched: bool
+) -> None:
+    (one, *_) = localized(HALL, HALL)
+    result = replace(one.result, usable=False, reasons=tuple(Reason(code, "") for code in codes))
+    for away, confirmed in ((0.1, vouched), (2.0, False)):
+        pose = replace(one.pose, x=one.pose.x + away)
+        sent = VisitScan(one.scan, "day 0", pose, np.diag([0.04, 0.04, math.radians(6.0) ** 2]))
+        assert is_vouched(sent, result) is confirmed
+    assert not is_vouched(VisitScan(one.scan, "day 0"), result)
 
 
 def test_changes_replace_remove_and_append_segments_in_their_order() -> None:

@@ -50,6 +50,7 @@ def test_there_are_examples() -> None:
         "/v1/maps/hq-3:check",
         "/v1/maps/hq-3:analyze",
         "/v1/maps/hq-3:update",
+        "/v1/maps:apply",
     ]
 
 
@@ -68,6 +69,8 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
     elif path.endswith(":update"):
         assert (answer.json()["changes"], answer.json()["scans"]) == ([], 2)
         assert answer.json()["map"]["segments"] == json.loads(STORED[0][1])["segments"]
+    elif path.endswith(":apply"):
+        assert len(answer.json()["map"]["segments"]) == 4
     elif path.endswith(":check"):
         assert (answer.json()["findings"], answer.json()["samples"]["usable"]) == ([], 1)
     else:

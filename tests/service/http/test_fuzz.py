@@ -78,6 +78,7 @@ OPERATIONS = [
     ("POST", "/v1/analyze"),
     ("POST", "/v1/maps/{map_id}:analyze"),
     ("POST", "/v1/maps/{map_id}:update"),
+    ("POST", "/v1/maps:apply"),
     ("GET", "/v1/limits"),
     ("GET", "/version"),
     ("GET", "/livez"),

@@ -35,6 +35,7 @@ CALLS: dict[tuple[str, str], tuple[Role | None, Any]] = {
     ("POST", "/v1/maps/{map_id}:check"): (Role.ASSOCIATE, {"scans": [SCAN]}),
     ("POST", "/v1/maps/{map_id}:analyze"): (Role.ASSOCIATE, {"spacing": 4.0}),
     ("POST", "/v1/maps/{map_id}:update"): (Role.ASSOCIATE, examples.UPDATE),
+    ("POST", "/v1/maps:apply"): (Role.ASSOCIATE, examples.APPLY),
     ("POST", "/v1/analyze"): (Role.ASSOCIATE, {"map": {"map_id": "{map_id}"}, "spacing": 4.0}),
     ("POST", "/v1/maps:import"): (Role.ASSOCIATE, {}),
     ("POST", "/v1/scans:import"): (Role.ASSOCIATE, {}),

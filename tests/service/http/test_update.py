@@ -16,6 +16,7 @@ from simulation import scan
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
 
 URL = "/v1/maps/updated:update"
+APPLY = "/v1/maps:apply"
 HALL = segments(RACK, PILLAR)
 
 
@@ -55,7 +56,7 @@ def test_a_removed_rack_is_proposed_not_stored_and_accepted_by_put(client: httpx
     assert found["map"]["segments"] == today.endpoints.tolist()
     assert (found["map"]["frame_id"], found["map"]["meta"], found["map"]["sigma"]) == ("hall", {"floor": 3}, 0.005)
     assert (found["scans"], found["held_back"]["scans"], found["complete"], found["client_ref"]) == (16, 2, True, 7)
-    assert found["sharpened"] == {"segments": [], "sigma": []}
+    assert found["sharpened"] == {"segments": [], "ends": [], "sigma": []}
     assert found["usable_after"] >= found["usable_before"] > 8
 
     kept = client.get("/v1/maps/updated")
@@ -123,3 +124,43 @@ def test_a_deadline_ends_it_without_a_proposal(client: httpx.Client) -> None:
 
 def test_an_unknown_map_is_404(client: httpx.Client) -> None:
     assert client.post("/v1/maps/nowhere:update", json=examples.UPDATE).status_code == 404
+
+
+def test_the_accepted_changes_of_a_proposal_are_applied_without_its_scans(client: httpx.Client) -> None:
+    """As the update itself would have done, which was sent the same refusals."""
+    old = client.get("/v1/maps/updated").json()
+    today, taken = segments(), days(segments(), segments())
+    found = client.post(URL, json={"visits": taken}).json()
+    assert sorted(one["segments"] for one in found["changes"]) == [[12, 13, 14, 15], [16, 17, 18, 19]]
+    body = {"map": old, "changes": found["changes"], "sharpened": found["sharpened"], "client_ref": "page"}
+    whole = client.post(APPLY, json=body)
+    assert whole.status_code == 200, whole.text
+    assert whole.json()["map"] == found["map"]
+    assert (whole.json()["map"]["segments"], whole.json()["client_ref"]) == (today.endpoints.tolist(), "page")
+    body["changes"] = [{**one, "accepted": number != 1} for number, one in enumerate(found["changes"])]
+    again = client.post(URL, json={"visits": taken, "refuse": [1]}).json()
+    assert client.post(APPLY, json=body).json()["map"] == again["map"] != found["map"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "told"),
+    [
+        ([{"segments": [99]}], "/changes/0", "found segment 99"),
+        ([{"segments": [1], "accepted": False}, {"segments": [2]}, {"segments": [2]}], "/changes/2", "named before"),
+        ([{"segments": list(range(len(HALL)))}], "/changes", "no segment that is left"),
+        ([{"new": [{"segment": [1.0, 1.0, 1.0, 1.0], "sigma": 0.0}]}], "/changes/0/new/0", "shorter"),
+    ],
+)
+def test_a_change_of_another_map_is_named(client: httpx.Client, changes: Any, pointer: str, told: str) -> None:
+    sent = [{"code": "removed", "segments": [], "new": [], **one} for one in changes]
+    answer = client.post(APPLY, json={"map": {"segments": HALL.endpoints.tolist()}, "changes": sent})
+    assert answer.status_code == 422
+    (one,) = answer.json()["errors"]
+    assert (one["pointer"], told in one["message"]) == (pointer, True), one
+    walls = {"segments": [4], "ends": [[0.0, 0.0, 1.0, 0.0]], "sigma": [0.01]}
+    for wrong in ({**walls, "segments": [99]}, {**walls, "sigma": []}):
+        answer = client.post(
+            APPLY, json={"map": {"segments": HALL.endpoints.tolist()}, "changes": [], "sharpened": wrong}
+        )
+        assert answer.status_code == 422
+        assert answer.json()["errors"][0]["pointer"].startswith("/sharpened")

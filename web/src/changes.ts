@@ -1,0 +1,66 @@
+// Proposed changes on the plan: old walls dashed, new walls solid, each kind in its colour.
+
+import { distance } from "./geometry";
+import { state } from "./state";
+import type { Change, ChangeCode, Segment } from "./types";
+
+export const CODES: ChangeCode[] = ["removed", "added", "moved", "extended", "shortened"];
+/** The name of the colour of a kind of change, in the style sheet and in the legend. */
+export const colourOf = (code: ChangeCode) => `change-${code}`;
+const REFUSED = 0.3; // opacity
+const [WIDTH, HALO] = [4, 13]; // px
+const DASHES = [8, 6];
+
+type Line = (segment: Segment, colour: string, width: number, dashes?: number[]) => void;
+
+const oldWalls = (one: Change) => one.segments.map((k) => state.walls[k]);
+const newWalls = (one: Change) => one.new.map((each) => each.segment);
+
+export function drawChanges(context: CanvasRenderingContext2D, colours: Record<string, string>, line: Line): void {
+  state.proposal?.changes.forEach((one, k) => {
+    const colour = colours[colourOf(one.code)];
+    if (k === state.change) for (const wall of [...oldWalls(one), ...newWalls(one)]) line(wall, colours.critical, HALO);
+    context.globalAlpha = one.accepted ? 1 : REFUSED;
+    if (one.code !== "extended") for (const wall of oldWalls(one)) line(wall, colour, WIDTH, DASHES);
+    for (const wall of newWalls(one)) line(wall, colour, WIDTH);
+    context.globalAlpha = 1;
+  });
+}
+
+/** The index of the change that is nearest, within some metres; -1 for none. */
+export function changeAt(x: number, y: number, near: number): number {
+  let [found, least] = [-1, near];
+  state.proposal?.changes.forEach((one, k) => {
+    for (const wall of [...oldWalls(one), ...newWalls(one)]) {
+      const away = distance(x, y, wall);
+      if (away < least) [found, least] = [k, away];
+    }
+  });
+  return found;
+}
+
+const counted = (count: number, what: string) => `${count} ${what}${count === 1 ? "" : "s"}`;
+
+export function titleOf(one: Change): string {
+  const parts = [one.segments.length ? counted(one.segments.length, "old wall") : "", one.new.length ? `${one.new.length} new` : ""];
+  return `${one.code}, ${parts.filter(Boolean).join(", ")}`;
+}
+
+/** 4 digits above 99 %, as 99.99 % and 99.9 % are not the same. */
+export const confidenceOf = ({ confidence }: Change) => `${(100 * confidence).toFixed(confidence > 0.99 ? 2 : 0)} %`;
+
+/** The evidence for a change, in a sentence. */
+export function evidenceOf(one: Change): string {
+  const { beams_through, beams_on, poses, visits, from, to } = one.evidence;
+  const beams = [
+    beams_through ? `${counted(beams_through, "beam")} pass through the old walls` : "",
+    beams_on ? `${counted(beams_on, "beam")} end on the new walls` : "",
+  ];
+  return `${beams.filter(Boolean).join(", ")}; from ${counted(poses, "place")} on ${counted(visits, "visit")}, ${from} to ${to}. Confidence ${confidenceOf(one)}.`;
+}
+
+/** Accept a change that was refused, or refuse one that was accepted. */
+export function toggle(k: number): void {
+  const one = state.proposal!.changes[k];
+  one.accepted = !one.accepted;
+}
