@@ -23,6 +23,7 @@ from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.explain import explain_at
+from association.verdict.absences import absences
 from association.verdict.chance import symmetry_of
 from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
@@ -164,6 +165,10 @@ def warm_up_searching() -> None:
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
     for asked, prior, how in _asked():
         associate(index, asked, prior, how, Deadline())
+    context = SearchContext.of(index, _with_beams(), None, AssociationOptions(), Deadline())
+    answer = explain_at(context, RigidTransform(0, 0, 0)).answer
+    assert answer is not None
+    absences(context, answer.best, [answer.best])
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
@@ -179,6 +184,7 @@ def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
     return [
         (Scan(measured), None, AssociationOptions()),
         (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
+        (_among_people(), None, AssociationOptions()),
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
         (views, None, AssociationOptions()),
     ]
@@ -188,6 +194,12 @@ def _with_beams() -> Scan:
     """Return the room as a laser in its middle sees it."""
     beams = Beams(TURN, room_ranges(TURN), 30.0)
     return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
+
+
+def _among_people() -> Scan:
+    """Return the same where two of three beams end before the walls: poses are then searched by the points of beams."""
+    ranges = np.where(np.arange(len(TURN)) % 3 == 0, room_ranges(TURN), 0.6 * room_ranges(TURN))
+    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), Beams(TURN, ranges, 30.0))
 
 
 def _one_wall() -> Scan:
