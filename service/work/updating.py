@@ -132,6 +132,7 @@ def answer_apply(asked: ApplyRequest, job: Job) -> Done:
         if error.index is None:
             raise
         raise InvalidRequestError([Fault(f"/changes/{list(accepted)[error.index]}", error.message)]) from error
+    job.watch.lap("search")
     document = {"segments": new.endpoints.tolist(), "sigma": sigma, "oriented": old.oriented}
     document |= {"frame_id": old.frame_id, "meta": old.meta}
     return job.done({"map": document, "client_ref": asked.client_ref}, changes=len(changes))
