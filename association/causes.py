@@ -106,7 +106,7 @@ def find_causes(
     for mistake, factor, changed in _undone(again):
         if deadline.passed:
             break
-        cause = _tried(changed, mistake, factor, explanations)
+        cause = _tried(changed, mistake, factor, _known(explanations, changed.scan))
         if cause is None:
             continue
         cause = replace(cause, of_map=changed.index is not again.index)
@@ -152,12 +152,10 @@ def _with_smaller_map(context: SearchContext, factor: float) -> SearchContext:
     return SearchContext.of(smaller, context.scan, None, options, context.deadline)
 
 
-def _tried(changed: SearchContext, mistake: Mistake, factor: float, as_sent: Explanations) -> Cause | None:
+def _tried(changed: SearchContext, mistake: Mistake, factor: float, known: float) -> Cause | None:
     """Search without a mistake; None where that fits no better."""
-    options, known = changed.options, _known(as_sent, changed.scan)
-    # The search knows segments alone: beams may make most of the score.
-    by_segments = max((one.by_segments for one in as_sent.ranked), default=0.0)
-    effort = Effort(FEW_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), max(0.0, by_segments))
+    options = changed.options
+    effort = Effort(FEW_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), known)
     explanations = search_and_explain(changed, effort)
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None

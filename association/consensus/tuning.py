@@ -3,8 +3,6 @@
 The origins are explained in `association.tuning`.
 """
 
-from ..tuning import GAIN
-
 # --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
 
 # Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
@@ -75,11 +73,12 @@ BEAM_FINALISTS = 32  # tables
 LATE_CANDIDATES = 16
 LATE_FINALISTS = 2
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
-BEAMS_ON_WALL = BEAMS_READ  # nats, tables; for a pose at which all beams end on a wall
-BEAMS_PASSED = 0.5 * BEAMS_READ  # nats, tables; against one at which all beams passed through a wall
+BEAMS_ON_WALL = 100.0  # nats, tables; for a pose at which all beams end on a wall
+BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
 CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
-END_SQUARE = CERTAIN  # m, tables; ends of beams within one such square count as one
+END_GATE = 0.35  # m, tables; the end of a beam farther from all walls is on none
+END_SQUARE = 0.15  # m, tables; ends of beams within one such square count as one
 BEHIND = 2.0  # m, tables; how far behind a reading a wall is looked for
 LEAST_INCIDENCE = 0.15  # cosine, tables; nearer to grazing the pose decides too much
 LEAST_POINTS = 10  # tables; for the beams to move a pose
@@ -105,7 +104,7 @@ MAX_OTHERS = 8  # map segments named in addition to the one that a scan segment 
 MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
 MIN_EXTENT = 1e-9  # m, rounding; least length that a segment along a wall counts as
 
-CONTRADICTION = GAIN  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
+CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls
 
 # --- Similarity: a pose together with a factor ------------------------------------------------------------------------

@@ -69,7 +69,7 @@ CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
 # --- Likelihood field -------------------------------------------------------------------------------------------------
 
 FIELD_CELL = 0.2  # m, tables; half of it takes three times as long, and finds the same
-FIELD_DEVIATION = 0.75 * FIELD_CELL  # m, tables; of a point from its wall, at half a cell and half a heading off
-FIELD_REACH = 3.0 * FIELD_CELL  # m; four deviations, beyond which nothing is left of the likelihood
+FIELD_DEVIATION = 0.15  # m, tables; of a point from its wall, with half a cell and half a step of the heading
+FIELD_REACH = 0.6  # m; beyond four deviations nothing is left of the likelihood
 FIELD_LEVELS = 6  # geometry; the highest has blocks of 32 cells
-MOST_FIELD_CELLS = MAX_SWEEP_CELLS  # memory: 6 MB; a square of 200 m
+MOST_FIELD_CELLS = 1_000_000  # memory: 6 MB; a square of 200 m

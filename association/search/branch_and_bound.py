@@ -14,21 +14,23 @@ from registration.layout import Floats, Records
 from registration.values import value
 
 from ..consensus.beams import beam_evidence_at, rays_of, squares_of
-from ..consensus.tuning import END_SQUARE, LEAST_POINTS, MOST_BEAMS
+from ..consensus.tuning import LEAST_POINTS, MOST_BEAMS
 from ..context import SearchContext
 from ..deadline import CancelledError
 from ..index.likelihood_field import LikelihoodField
-from ..index.tuning import CELL_GROWTH
 from ..layout import ESTIMATE, FOUND, Integers
-from ..tuning import COMPARED_BEAMS, DISTINCT_ANGLE, DISTINCT_DISTANCE
 from .candidates import Candidates
 from .kernels.branch_and_bound import branch_and_bound, greatest_mean
 from .layout import CELL_POSE
 from .tuning import (
+    FAR_POINTS,
     FIELD_GAP,
+    FIELD_KEPT,
     FIELD_LEAST,
+    FIELD_LEAST_HEADINGS,
+    FIELD_MORE,
     FIELD_POINTS,
-    KEPT,
+    FIELD_SQUARES,
 )
 
 
@@ -66,13 +68,11 @@ def add_point_matches(context: SearchContext, candidates: Candidates) -> Candida
     if field is None:
         return candidates
     reached = greatest_mean(field.pyramid[0], field.shape, points, candidates.poses)
-    cell = float(field.shape["cell"][0])
-    turned = _at_all_headings(points, cell)
-    found = np.zeros(KEPT, CELL_POSE)
-    least, gap = (round(255.0 * len(points) * mean) for mean in (max(FIELD_LEAST, reached), FIELD_GAP))
-    apart = math.ceil(DISTINCT_DISTANCE / cell), math.ceil(DISTINCT_ANGLE / math.tau * len(turned.headings))
+    turned = _at_all_headings(points, float(field.shape["cell"][0]))
+    found = np.zeros(FIELD_KEPT, CELL_POSE)
+    least, gap = (round(255.0 * len(points) * mean) for mean in (max(FIELD_LEAST, reached + FIELD_MORE), FIELD_GAP))
     with context.deadline.watched() as stop:
-        count = branch_and_bound(field.pyramid, turned.cells, least, gap, *apart, found, stop)
+        count = branch_and_bound(field.pyramid, turned.cells, least, gap, found, stop)
         interrupted = bool(stop[0])
     if context.deadline.cancelled:
         raise CancelledError
@@ -92,21 +92,22 @@ def _points_of(context: SearchContext) -> Floats:
     usable = context.with_beams and context.window is None and len(context.lines.rows) > 0
     if not usable or not context.can_look or context.deadline.passed:
         return np.zeros((0, 2))
-    beams = rays_of(context, COMPARED_BEAMS).beams
+    beams = rays_of(context, FAR_POINTS).beams
     beams = beams[np.isfinite(beams["range"])]
     ends = np.stack([beams[at] + beams["range"] * beams["d" + at] for at in ("x", "y")], axis=1)
-    size, chosen = END_SQUARE, np.unique(squares_of(ends, END_SQUARE), return_index=True)[1]
-    while len(chosen) > FIELD_POINTS:
-        size *= CELL_GROWTH
+    chosen = np.arange(len(ends))
+    for size in FIELD_SQUARES:
         chosen = np.unique(squares_of(ends, size), return_index=True)[1]
-    mixed: Floats = ends[np.random.default_rng(0).permutation(chosen)]
+        if len(chosen) <= FIELD_POINTS:
+            break
+    mixed: Floats = ends[np.random.default_rng(0).permutation(chosen)[:FIELD_POINTS]]
     return mixed
 
 
 def _at_all_headings(points: Floats, cell: float) -> _TurnedPoints:
     """Turn points by steps at which those that are far move by about one cell."""
     far = float(np.quantile(np.hypot(*points.T), 0.9))
-    count = max(1, math.ceil(math.tau * far / cell))
+    count = max(FIELD_LEAST_HEADINGS, math.ceil(math.tau * far / cell))
     headings = np.arange(count) * (math.tau / count)
     c, s = np.cos(headings)[:, None], np.sin(headings)[:, None]
     x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]

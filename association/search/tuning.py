@@ -4,8 +4,6 @@ Origins: *geometry* follows from what the number means; *tables* was chosen by t
 floor plans and logs, and little changes near it; *measured* is a fit or a timing; *rounding* keeps arithmetic sound.
 """
 
-from ..tuning import DISTINCT_ANGLE
-
 # --- Bases ------------------------------------------------------------------------------------------------------------
 
 BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the longest segments; and, in scans of more,
@@ -19,15 +17,16 @@ CROSSING_MARGIN = 1e-3  # m, rounding; of the lists of crossings
 MOST_LISTS = 256  # for one base; it is swept where there are more. Measured: at most one base in a thousand
 WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 WINDOW_MARGIN = 0.5  # m, tables, and
-WINDOW_TURN = DISTINCT_ANGLE  # rad, tables; a pose farther outside a hard prior's window is not refined into it
+WINDOW_TURN = 0.1  # rad, tables; a pose farther outside a hard prior's window is not refined into it
 
 # --- Slides of parallel segments --------------------------------------------------------------------------------------
 
 SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
 SLIDE_SPACING = 2.0  # m, tables; the pose found stands for the family along the walls
-SLIDE_SPACING_FOR_BEAMS = 0.25 * SLIDE_SPACING  # m, tables; beams then fix the position along them
+SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; beams then fix the position along them
 SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are distinct
 PARALLEL_SINE = 0.1  # tables
+KEPT_SLIDES = 64  # poses, tables
 
 # --- Order of the bases -----------------------------------------------------------------------------------------------
 
@@ -58,7 +57,6 @@ SAMPLE_SEED = 20190901
 # --- Best poses -------------------------------------------------------------------------------------------------------
 
 KEPT = 64  # poses, tables
-KEPT_SLIDES = KEPT  # poses, tables
 KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternatives
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
@@ -69,5 +67,12 @@ KEPT_SHARE_FOR_BEAMS = 0.5
 # Fractions of beams, or of their points, that end on walls, 0 to 1.
 WELL_EXPLAINED = 0.7  # tables; no more is searched then
 FIELD_LEAST = 0.45  # tables; with less, poses in other buildings explain a scan as well
+FIELD_MORE = 0.02  # tables; by which a pose has to exceed the best candidate
 FIELD_GAP = 0.05  # tables; a pose farther behind the best one is not kept
+FIELD_KEPT = 16  # poses, tables
+FAR_POINTS = 720  # beams of which points are chosen, memory
 FIELD_POINTS = 80  # tables
+FIELD_SQUARES = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)  # m; the first of which there are so few with a point
+FIELD_LEAST_HEADINGS = 64  # geometry; of a scan whose points are all near
+SAME_CELLS = 2  # either way, tables; up to there, and
+SAME_HEADINGS = 0.02  # of a turn, tables; up to there poses are one

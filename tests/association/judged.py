@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from association import HardPrior, SoftPrior
-from association.consensus.tuning import BEAMS_ON_WALL
 from association.context import SearchContext
 from association.explanations import Explanations
 from association.options import Prior
@@ -150,7 +149,6 @@ class Drawn:
             misfit=n.misfit,
             read=n.read,
             passed=n.passed,
-            on_wall=n.read,
         )
         registered = registered_corridor() if self.degenerate else registered_room()
         leverages = leverages_of((0, n.moves, 0.01), (3, 0.001, 1.0 if self.thin else 0.02))
@@ -195,10 +193,7 @@ def drawn(rng: np.random.Generator, priors: tuple[Prior | None, ...] = (None, SO
     if rng.random() < 0.5:  # likely, or nearly
         numbers = numbers._replace(share=0.9, agreement=0.9, misfit=1.2, deviation=0.02, moves=0.05, passed=0.01)
     windowed, with_beams = isinstance(prior, HardPrior), bool(rng.random() < 0.4)
-    if with_beams:  # those that read a wall end on it
-        more = BEAMS_ON_WALL * numbers.read
-        numbers = numbers._replace(score=numbers.score + more, rival=numbers.rival + more)
-    else:
+    if not with_beams:
         numbers = numbers._replace(read=0.0, passed=0.0)
     beyond = [(float(rng.normal() * 5.0), not windowed or rng.random() < 0.5) for _ in range(rng.integers(0, 4))]
     said = float(rng.choice([0.0, -1.0, -8.0, -10.0])) if isinstance(prior, SoftPrior) else 0.0

@@ -43,7 +43,7 @@ def test_the_verdict_is_that_of_the_twin(seed: int) -> None:
 
 def test_the_verdict_changes_where_that_of_the_twin_does() -> None:
     """On both sides of every change of status between two answers; all kinds of changes come up."""
-    rng, kinds = np.random.default_rng(3), set()
+    rng, kinds = np.random.default_rng(1), set()
     for _ in range(200):
         one, other = drawn(rng, (None,)), drawn(rng, (None,))
         if one.expected.status is not one.towards(other, 1.0).expected.status:

@@ -8,11 +8,11 @@ from registration.layout import Record, Records
 
 from ...layout import Integers
 from ...tables import Place, Rays, Workspace
-from ...tuning import REACH
 from ..tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
+    END_GATE,
     FARTHER_BY,
     LEAST_INCIDENCE,
     LEAST_POINTS,
@@ -74,7 +74,7 @@ def wall_nearest_to(
 @kernel
 def end_on_wall(x: float, y: float, walls: Records, starts: Integers, items: Integers, shape: Record) -> float:
     """Return how far the end of a beam, metres in the index frame, lies on a wall, 0 to 1."""
-    off, nearest = wall_nearest_to(x, y, REACH, walls, starts, items, shape)
+    off, nearest = wall_nearest_to(x, y, END_GATE, walls, starts, items, shape)
     return math.exp(-0.5 * off * off / (NEAR * NEAR)) if nearest >= 0 else 0.0
 
 

@@ -14,6 +14,7 @@ from registration.layout import Floats, Record, Records
 from ...consensus.kernels.ordering import ascending
 from ...layout import Integers
 from ..layout import BLOCK
+from ..tuning import SAME_CELLS, SAME_HEADINGS
 
 
 @kernel
@@ -59,16 +60,7 @@ def bound_of(level: Integers, cells: Integers, row: int, column: int, size: int,
 
 
 @kernel
-def branch_and_bound(
-    pyramid: Integers,
-    turned: Integers,
-    least: int,
-    gap: int,
-    cells_apart: int,
-    headings_apart: int,
-    found: Records,
-    stop: Integers,
-) -> int:
+def branch_and_bound(pyramid: Integers, turned: Integers, least: int, gap: int, found: Records, stop: Integers) -> int:
     """Find the poses of the greatest values, depth first, the blocks of the highest level by their bounds.
 
     Parameters
@@ -80,8 +72,6 @@ def branch_and_bound(
         Value that a pose has to exceed.
     gap : int
         The greatest distance of a value from the greatest one.
-    cells_apart, headings_apart : int
-        Poses up to so many cells either way and so many headings apart are one.
     found : (k,) of `CELL_POSE`
         Written to, in no order.
     stop : (1,) uint8
@@ -109,7 +99,7 @@ def branch_and_bound(
             if stack[filled].bound <= floor:
                 continue
             if stack[filled].level == 0:
-                count = keep(found, count, stack[filled], cells_apart, headings_apart, len(turned))
+                count = keep(found, count, stack[filled], len(turned))
                 best = max(best, stack[filled].bound)
                 continue
             filled = divide(pyramid, turned, stack, filled, floor)
@@ -181,7 +171,7 @@ def put(block: Record, bound: int, level: int, heading: int, row: int, column: i
 
 
 @kernel
-def keep(found: Records, count: int, one: Record, cells_apart: int, headings_apart: int, headings: int) -> int:
+def keep(found: Records, count: int, one: Record, headings: int) -> int:
     """Store a pose, at most one of those that are near each other; return how many there are. Ties keep the earlier."""
     near = -1
     worst = 0
@@ -189,7 +179,7 @@ def keep(found: Records, count: int, one: Record, cells_apart: int, headings_apa
         turned = abs(found[k].heading - one.heading)
         turned = min(turned, headings - turned)
         beside = max(abs(found[k].row - one.row), abs(found[k].column - one.column))
-        if beside <= cells_apart and turned <= headings_apart:
+        if beside <= SAME_CELLS and turned <= SAME_HEADINGS * headings:
             near = k
         if found[k].value < found[worst].value:
             worst = k

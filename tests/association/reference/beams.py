@@ -11,6 +11,7 @@ from association.consensus.tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
+    END_GATE,
     END_SQUARE,
     FARTHER_BY,
     LEAST_INCIDENCE,
@@ -21,7 +22,6 @@ from association.consensus.tuning import (
     WALL_BEHIND,
 )
 from association.tables import Place, Rays
-from association.tuning import REACH
 from registration import RigidTransform
 from registration.layout import SEEN, Floats
 
@@ -73,7 +73,7 @@ def on_wall(rays: Rays, pose: RigidTransform, place: Place) -> float:
             continue
         end = begin + distance * np.array([math.cos(angle), math.sin(angle)])
         across = nearest_wall(pose.apply(end), place)[1]
-        near = math.exp(-0.5 * (across / NEAR) ** 2) if across < REACH else 0.0
+        near = math.exp(-0.5 * (across / NEAR) ** 2) if across < END_GATE else 0.0
         x, y = (math.floor(v / END_SQUARE) for v in end.tolist())
         squares.setdefault((x, y), []).append(near)
     return float(np.mean([np.mean(some) for some in squares.values()])) if squares else 0.0

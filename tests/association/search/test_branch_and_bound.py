@@ -13,7 +13,7 @@ from association.explain import search_and_explain
 from association.search import branch_and_bound
 from association.search.branch_and_bound import add_point_matches
 from association.search.candidates import Candidates, find_candidates
-from association.search.tuning import KEPT
+from association.search.tuning import FIELD_KEPT
 from registration import Beams
 
 from ..scenes import (
@@ -58,7 +58,7 @@ def test_a_pose_is_found_without_any_base() -> None:
     before = nothing(context)
     found = add_point_matches(context, before)
     assert near_the_truth(context, found)
-    assert 1 <= len(found.poses) <= KEPT
+    assert 1 <= len(found.poses) <= FIELD_KEPT
     assert found.report == before.report
 
 

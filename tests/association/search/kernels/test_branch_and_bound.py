@@ -8,10 +8,10 @@ import pytest
 from association.layout import FOUND, GRID_SHAPE, record
 from association.search.kernels.branch_and_bound import branch_and_bound, greatest_mean
 from association.search.layout import CELL_POSE
+from association.search.tuning import SAME_CELLS, SAME_HEADINGS
 from registration.layout import Records
 
 LEVELS = 4
-APART = 2, 0  # cells and headings
 GOES_ON = np.zeros(1, np.uint8)
 
 
@@ -50,7 +50,7 @@ def values_of(field: np.ndarray, turned: np.ndarray) -> np.ndarray:
 
 def found_in(field: np.ndarray, turned: np.ndarray, least: int, gap: int, most: int = 8) -> Records:
     found = np.zeros(most, CELL_POSE)
-    count = branch_and_bound(pyramid_of(field), turned, least, gap, *APART, found, GOES_ON)
+    count = branch_and_bound(pyramid_of(field), turned, least, gap, found, GOES_ON)
     return np.sort(found[:count], order=["value", "heading", "row", "column"])[::-1]
 
 
@@ -71,8 +71,8 @@ def test_no_pose_within_the_gap_is_missed(seed: int) -> None:
     values, gap = values_of(field, turned), 80
     found = found_in(field, turned, 0, gap, 400)
     for heading, row, column in np.argwhere(values > values.max() - gap).tolist():
-        near = (np.abs(found["row"] - row) <= APART[0]) & (np.abs(found["column"] - column) <= APART[0])
-        near &= np.abs(found["heading"] - heading) <= APART[1]
+        near = (np.abs(found["row"] - row) <= SAME_CELLS) & (np.abs(found["column"] - column) <= SAME_CELLS)
+        near &= np.abs(found["heading"] - heading) <= SAME_HEADINGS * len(turned)
         assert (found["value"][near] >= values[heading, row, column]).any()
 
 
@@ -91,7 +91,7 @@ def test_the_best_are_kept_where_there_are_too_many() -> None:
 def test_a_flag_ends_the_search() -> None:
     field, turned = drawn(1)
     found = np.zeros(8, CELL_POSE)
-    assert branch_and_bound(pyramid_of(field), turned, 0, 400, *APART, found, np.ones(1, np.uint8)) == 0
+    assert branch_and_bound(pyramid_of(field), turned, 0, 400, found, np.ones(1, np.uint8)) == 0
 
 
 def test_mean_of_the_best_of_some_poses() -> None:
