@@ -66,7 +66,7 @@ def associate(
 
     1. Search: propose poses from bases of two scan segments, verify them, grow and shrink their consensus sets.
     2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
-       If many beams end on no wall there, search by branch and bound for poses at which more of them do.
+       Where many beams end on no wall there, search by branch and bound for poses at which more of them do.
     3. Search again to scale, if scan and map differ by a factor near one according to the best explanation.
     4. Judge: how likely the best explanation is right, and whether a robot may use it.
     5. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.

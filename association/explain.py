@@ -28,7 +28,7 @@ NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 def search_and_explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
     """Search a scan and explain it by the poses found; by default with the effort that the context calls for.
 
-    If many beams end on no wall then, poses are searched by branch and bound as well.
+    Where beams are left unexplained then, poses are searched by the points of beams as well.
 
     Raises
     ------

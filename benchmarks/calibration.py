@@ -9,8 +9,7 @@ comes from a fit without its building, its log or its world; the coefficients co
 that ``python -m benchmarks worlds`` reports on are never fitted on.
 
 The tables are about the number that is answered: alternatives are compared again with walls off by more where an answer
-would be usable, and vetoes apply. The fit itself takes the lesser probability among the alternatives of two: as they
-were scored, and by what the scan shows.
+would be usable, and vetoes apply. The fit itself takes the alternatives as they were scored.
 
 ``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]]``
 """

@@ -28,9 +28,7 @@ LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
 # A scan of a real plan or log counts as that many of drawn buildings, of which there are as many as one cares to draw.
 REAL = 3.0
-FOR = (
-    "lead", "solitude", "inlier_fraction", "root_count", "agreement", "read", "null_gap", "walls", "root_score",
-)  # fmt: skip
+FOR = ("lead", "solitude", "inlier_fraction", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
 AGAINST = (
     "inverse_count", "longest_unmatched", "passed", "root_nearer", "log_significance", "null", "null_better", "blocked",
     "root_unmatched",
@@ -90,9 +88,7 @@ class Fitted:
 
 
 def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
-    """Return the probability of each answer among its alternatives, the lesser of as scored and by what is shown."""
-    scored = np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
-    return np.asarray(np.minimum(scored, [e.shown for e in examples]))
+    return np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
 
 
 def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:

@@ -44,15 +44,16 @@ def answered(
     ----------
     examples : sequence of Example
     likely, careful : (n,) float64
-        Probabilities for scans of the map, and with out-of-map scans included, among the alternatives as scored and by
-        what the scan shows.
+        Probabilities for scans of the map, and with out-of-map scans included, among the alternatives as scored.
     threshold : float
         Of `careful`.
     model : Model or None
         The cautious one, by which a scan without a match is recognized; None: none is.
     """
     settled = np.array([bool(SETTLING & set(e.vetoes)) for e in examples], bool)
-    shown = np.array([min(e.share, e.shown) for e in examples])
+    shares = np.array([e.share for e in examples])
+    shown = np.minimum(shares, np.array([e.shown for e in examples]))
+    likely, careful = likely * shown / shares, careful * shown / shares
     compared = (likely >= USABLE_PROBABILITY) & (careful >= threshold) & ~settled
     factor = np.where(compared, np.minimum(1.0, np.array([e.loose for e in examples]) / shown), 1.0)
     likely, careful = likely * factor, careful * factor

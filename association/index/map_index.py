@@ -176,7 +176,7 @@ class MapIndex:
 
     @cached_property
     def likelihood_field(self) -> LikelihoodField | None:
-        """The likelihood field of the walls; None if the map is too large for one."""
+        """How near each place is to a wall; None where the map is too large for it."""
         return likelihood_field(self.walls)
 
     @cached_property

@@ -1,7 +1,7 @@
 """Search for poses by the points of beams: branch and bound over the likelihood field of the map.
 
-Bases need two walls that are found in scan and map. If clutter hides walls, or if a map made by a robot has many short
-pieces, there may be none at the truth. The ends of the beams alone then give the pose that bases miss.
+Bases need two walls that are found in scan and map. Where clutter hides walls, or a map made by a robot has many short
+pieces, there may be none at the truth. The ends of the beams alone then tell a pose that bases miss.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class _TurnedPoints:
 def add_point_matches(context: SearchContext, candidates: Candidates) -> Candidates:
     """Add the poses at which more of the beams end on walls than at any candidate.
 
-    Returns the candidates as they are if there is none, without beams, with a hard prior, on a map that is too large
-    for a likelihood field, and after the deadline. If the deadline passes meanwhile, the report is that of an
+    Returns the candidates as they are where there is none, without beams, with a hard prior, on a map that is too large
+    for a likelihood field, and after the deadline. Where the deadline passes meanwhile, the report is that of an
     incomplete search.
 
     Raises

@@ -71,7 +71,7 @@ def branch_and_bound(pyramid: Integers, turned: Integers, least: int, gap: int, 
     least : int
         Value that a pose has to exceed.
     gap : int
-        The greatest distance of a value from the greatest one.
+        How far a value may be below the greatest one.
     found : (k,) of `CELL_POSE`
         Written to, in no order.
     stop : (1,) uint8
@@ -80,7 +80,7 @@ def branch_and_bound(pyramid: Integers, turned: Integers, least: int, gap: int, 
     Returns
     -------
     int
-        The number of poses that were found.
+        How many were found.
     """
     levels = len(pyramid)
     size = 1 << (levels - 1)

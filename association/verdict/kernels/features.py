@@ -56,6 +56,7 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.agreement = fact.agreement
     out.read = best.read
     out.passed = best.passed
+    out.on_wall = best.on_wall
     out.root_farther = math.sqrt(fact.farther)
     out.root_nearer = math.sqrt(fact.nearer)
     out.critical_displacement = min(fact.critical_displacement, MOST_DEVIATION)

@@ -25,7 +25,7 @@ def distances_to_walls(index: MapIndex, points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("index", [INDEX, INDEX.undirected])
 def test_lowest_level_is_the_likelihood_of_the_distance_to_the_nearest_wall(index: MapIndex) -> None:
-    """Up to the 3 cm by which segments may lie beside the walls that they are merged into."""
+    """Up to the 3 cm by which segments may lie beside the walls that they are merged to."""
     field = index.likelihood_field
     assert field is not None
     rows, columns = field.pyramid[0].shape

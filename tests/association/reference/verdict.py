@@ -103,6 +103,7 @@ def features(
         "agreement": answer.agreement,
         "read": best.read,
         "passed": best.passed,
+        "on_wall": best.on_wall,
         "root_farther": answer.beams.farther**0.5,
         "root_nearer": answer.beams.nearer**0.5,
         "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),

@@ -55,6 +55,7 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         agreement=0.85,
         read=0.5,
         passed=0.04,
+        on_wall=0.1,
         root_farther=0.3,
         root_nearer=0.4,
         critical_displacement=0.25,
