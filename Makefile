@@ -112,7 +112,6 @@ pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need
 	$(BIN)/python -m examples.several_maps
 	$(BIN)/python -m examples.changed_building
 	$(BIN)/python -m examples.changed_page
-	$(BIN)/python -m benchmarks.search_pictures
 	$(BIN)/python -m benchmarks.verdicts
 	$(BIN)/python -m examples.demo && cp out/demo.png docs/demo.png
 

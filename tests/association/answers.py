@@ -70,7 +70,6 @@ def ranked(
         "blocked": 0.0,
         "read": 0.0,
         "passed": 0.0,
-        "on_wall": 0.0,
         "count": matched,
     }
     named: dict[str, Any] = {**usual, **scores}

@@ -21,7 +21,6 @@ from association.consensus.ranking import rank_candidates
 from association.consensus.sight import missing_segments
 from association.consensus.tuning import (
     BEAM_FINALISTS,
-    BEAMS_ON_WALL,
     BEAMS_PASSED,
     BEAMS_READ,
     LATE_FINALISTS,
@@ -105,12 +104,11 @@ def test_the_best_comes_first_with_what_belongs_to_it() -> None:
     for one, (at, covariance, scored, matches) in zip(found, expected, strict=True):
         assert same_pose(one.pose, at, 1e-6, 1e-6)
         np.testing.assert_allclose(one.covariance, covariance, rtol=1e-4, atol=1e-9)
-        score, chi_square, one_step, length, fraction, reliability, misfit, _, *of_beams, count = scored[0].item()
+        score, chi_square, one_step, length, fraction, reliability, misfit, _, read, passed, count = scored[0].item()
         assert (one.score, one.posterior, one.length) == pytest.approx((score, score, length))
         assert (one.chi_square, one.one_step_chi_square) == pytest.approx((chi_square, one_step), rel=1e-5, abs=1e-6)
         assert (one.fraction, one.reliability, one.misfit) == pytest.approx((fraction, reliability, misfit), abs=1e-6)
-        assert [one.read, one.passed, one.on_wall] == of_beams == [0.0, 0.0, 0.0]
-        assert one.count == count == one.matched.sum()
+        assert (one.read, one.passed, one.count) == (read, passed, count) == (0.0, 0.0, one.matched.sum())
         np.testing.assert_array_equal(one.matches["wall"], matches["wall"])
         assert one.inside
     assert [round(one.fraction, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]
@@ -187,10 +185,10 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
     step = math.ceil(known.sum() / MOST_BEAMS)
     rays = rays_of(beams.angles[known][::step], beams.ranges[known][::step])
     place, here = index.tables.place, local(index, INSIDE)
-    moved, (reading, passed, on_wall), _ = beams_twin.weigh_beams(rays, here, place)
+    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, here, place)
     ((_, _, scored, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
-    expected = scored["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed + BEAMS_ON_WALL * on_wall
-    assert (found.read, found.passed, found.on_wall) == pytest.approx((reading, passed, on_wall), abs=1e-4)
+    expected = scored["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
+    assert (found.read, found.passed) == pytest.approx((reading, passed), abs=1e-4)
     assert found.score == pytest.approx(expected, abs=0.01)
 
 

@@ -11,8 +11,6 @@ from association.consensus.tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
-    END_GATE,
-    END_SQUARE,
     FARTHER_BY,
     LEAST_INCIDENCE,
     LEAST_POINTS,
@@ -29,7 +27,7 @@ from .consensus import Pairs, solve
 from .geometry import direction, listed, normal
 from .sight import first_hit
 
-Evidence = tuple[float, float, float]  # read, passed, on a wall
+Evidence = tuple[float, float]  # read, passed
 
 
 def angles_of(rays: Rays) -> Floats:
@@ -57,37 +55,12 @@ def offsets(rays: Rays, pose: RigidTransform, place: Place, behind: float) -> It
 
 
 def beam_evidence(rays: Rays, pose: RigidTransform, place: Place) -> Evidence:
-    """Compare every beam with the first wall on its way, and its end with all walls."""
+    """Compare every beam with the first wall on its way."""
     read = passed = 0.0
     for across, wall in offsets(rays, pose, place, BEHIND):
         read += math.exp(-0.5 * (across / NEAR) ** 2)
         passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
-    return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams)), on_wall(rays, pose, place)
-
-
-def on_wall(rays: Rays, pose: RigidTransform, place: Place) -> float:
-    """Return the fraction of the places with ends of beams that lie on a wall; each square is one place."""
-    squares: dict[tuple[int, int], list[float]] = {}
-    for angle, distance, begin in zip(angles_of(rays), rays.beams["range"], begins(rays), strict=True):
-        if distance == math.inf:
-            continue
-        end = begin + distance * np.array([math.cos(angle), math.sin(angle)])
-        across = nearest_wall(pose.apply(end), place)[1]
-        near = math.exp(-0.5 * (across / NEAR) ** 2) if across < END_GATE else 0.0
-        x, y = (math.floor(v / END_SQUARE) for v in end.tolist())
-        squares.setdefault((x, y), []).append(near)
-    return float(np.mean([np.mean(some) for some in squares.values()])) if squares else 0.0
-
-
-def nearest_wall(there: Floats, place: Place) -> tuple[int, float]:
-    """Return which of the walls that are listed at a point is nearest to it, and how far away; -1 of none."""
-    across = {}
-    for w in listed(place.grid, there):
-        wall = place.walls[w]
-        if wall["begin"] - NEAR <= direction(wall) @ there <= wall["end"] + NEAR:
-            across[w] = abs(normal(wall) @ there - wall["offset"])
-    nearest = min(across, key=lambda w: across[w], default=-1)
-    return nearest, float(across.get(nearest, math.inf))
+    return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams))
 
 
 def beam_fractions(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
@@ -104,8 +77,14 @@ def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float)
         if distance == math.inf:
             continue
         end = begin + distance * np.array([math.cos(angle), math.sin(angle)])
-        nearest, across = nearest_wall(pose.apply(end), place)
-        if across < gate:
+        there = pose.apply(end)
+        across = {}
+        for w in listed(place.grid, there):
+            wall = place.walls[w]
+            if wall["begin"] - NEAR <= direction(wall) @ there <= wall["end"] + NEAR:
+                across[w] = abs(normal(wall) @ there - wall["offset"])
+        nearest = min(across, key=lambda w: across[w], default=-1)
+        if nearest >= 0 and across[nearest] < gate:
             ends.append(end)
             lines.append(nearest)
     if len(lines) < LEAST_POINTS:

@@ -10,7 +10,7 @@ import numpy as np
 
 from association import HardPrior, Status
 from association.consensus.consensus_set import ConsensusSet
-from association.consensus.tuning import BEAMS_ON_WALL, BEAMS_PASSED, BEAMS_READ, CONTRADICTION, USUAL_WALLS
+from association.consensus.tuning import BEAMS_PASSED, BEAMS_READ, CONTRADICTION, USUAL_WALLS
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.tuning import RIVAL_SHARE
@@ -81,7 +81,7 @@ def features(
     nearest = max((worth(rival) for rival in rivals), default=-math.inf)
     crowd = evidence(answer, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
     misfit = math.log(sorted((tuning.LEAST_MISFIT, best.misfit, tuning.MOST_MISFIT))[1])
-    by_segments = best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed - BEAMS_ON_WALL * best.on_wall
+    by_segments = best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed
     share, counts = 0.0, 1.0
     if null is not None:
         share = min(tuning.MOST_NULL, null.score / best.score)
@@ -103,7 +103,6 @@ def features(
         "agreement": answer.agreement,
         "read": best.read,
         "passed": best.passed,
-        "on_wall": best.on_wall,
         "root_farther": answer.beams.farther**0.5,
         "root_nearer": answer.beams.nearer**0.5,
         "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),

@@ -38,7 +38,7 @@ def hinging(leverages: Records | None = None, weakest: float = 0.01, score: floa
 
 
 def test_features_of_an_answer_beside_two_rivals() -> None:
-    best = ranked(80.0, -2.0, matched=5, length=25.0, misfit=2.0, read=0.5, passed=0.04, on_wall=0.1, blocked=4.0)
+    best = ranked(80.0, -2.0, matched=5, length=25.0, misfit=2.0, read=0.5, passed=0.04, blocked=4.0)
     rivals = [ranked(74.0, matched=5), ranked(70.0, -4.0, matched=5)]
     crowd = math.exp(-4.0 / 4.0) + math.exp(-12.0 / 4.0) + math.exp(-12.0)
     expected = Features(
@@ -55,7 +55,6 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         agreement=0.85,
         read=0.5,
         passed=0.04,
-        on_wall=0.1,
         root_farther=0.3,
         root_nearer=0.4,
         critical_displacement=0.25,
@@ -64,7 +63,7 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         null=0.7,
         null_gap=math.sqrt(0.3 * 80.0),
         null_better=0.0,
-        root_score=math.sqrt(80.0 - 50.0 + 2.0 - 10.0),
+        root_score=math.sqrt(80.0 - 50.0 + 2.0),
         blocked=2.0,
         walls=math.sqrt(3.0),
         misfit_of_many=math.log(2.0) * 5.0 / 8.0,
