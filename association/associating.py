@@ -9,7 +9,7 @@ from registration.values import value
 from .causes import find_causes
 from .context import SearchContext
 from .deadline import Deadline
-from .explain import search_and_explain
+from .explain import explain
 from .explanations import Explanations
 from .index.map_index import MapIndex
 from .last_view import LastView, search_last_view
@@ -17,6 +17,7 @@ from .options import AssociationOptions, Prior
 from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan
+from .search.candidates import find_candidates
 from .to_scale import ScaledSearch, put_to_scale
 from .verdict.verdict import Verdict, judge
 
@@ -66,7 +67,6 @@ def associate(
 
     1. Search: propose poses from bases of two scan segments, verify them, grow and shrink their consensus sets.
     2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
-       Where many beams end on no wall there, search by branch and bound for poses at which more of them do.
     3. Search again to scale, if scan and map differ by a factor near one according to the best explanation.
     4. Judge: how likely the best explanation is right, and whether a robot may use it.
     5. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.
@@ -104,7 +104,8 @@ def run_stages(context: SearchContext, began: float) -> Stages:
     CancelledError
         When the deadline was cancelled.
     """
-    explanations = search_and_explain(context)
+    candidates = find_candidates(context)
+    explanations = explain(context, candidates)
     found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     last = search_last_view(found.context, verdict)

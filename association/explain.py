@@ -17,9 +17,7 @@ from .explanations import Answer, Explanations
 from .layout import FOUND, record
 from .result import SearchReport
 from .scan.views import corrected
-from .search.branch_and_bound import add_point_matches
 from .search.candidates import Candidates, Effort, find_candidates
-from .search.tuning import WELL_EXPLAINED
 from .verdict.chance import significance
 
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
@@ -28,20 +26,12 @@ NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 def search_and_explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
     """Search a scan and explain it by the poses found; by default with the effort that the context calls for.
 
-    Where beams are left unexplained then, poses are searched by the points of beams as well.
-
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    candidates = find_candidates(context, effort)
-    explanations = explain(context, candidates)
-    explained = 0.0 if explanations.answer is None else explanations.answer.best.on_wall
-    if effort is not None or explained >= WELL_EXPLAINED:
-        return explanations
-    more = add_point_matches(context, candidates)
-    return explanations if more is candidates else explain(context, more)
+    return explain(context, find_candidates(context, effort))
 
 
 def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:

@@ -75,12 +75,9 @@ SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
 # matched segments; its fraction of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
 # scan's sigmas alone expect; the penalty of lines of sight, nats; the fractions of the beams that read the wall they
-# should, that passed through one, and that end on a wall, 0 without beams; how many rows are matched.
+# should, and that passed through one, 0 without beams; how many rows are matched.
 SET_SCORE = fields(
-    (
-        _F,
-        "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed on_wall count",
-    ),
+    (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),
 )
 
 # The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its
@@ -159,18 +156,16 @@ VARIANCES = fields((_F, "map common least_offset least_angle"))
 # A ray from a place in the index frame: unit direction; how far it is followed.
 RAY = fields((_F, "x y dx dy limit"))
 
-# A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return; how
-# far its end counts among all ends, which makes 1 together: those of one place count as one.
-BEAM = fields((_F, "x y dx dy range weight"))
+# A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
+BEAM = fields((_F, "x y dx dy range"))
 
 # The rays through a wall: their number to segments of the consensus set, and to other segments. While they are
 # counted: the scan line that the last one goes to, from 1 up; the view it comes from; how many go from there to that
 # line, and how many at most from any view.
 BLOCKER = fields((_I, "to_matched to_clutter row sensor here most"))
 
-# Evidence of single beams at a pose: the fractions that read the wall they should, that passed through one, and that
-# end on a wall, whether it is the first on their way or not.
-BEAM_EVIDENCE = fields((_F, "read passed on_wall"))
+# Evidence of single beams at a pose: the fractions that read the wall they should, and that passed through one.
+BEAM_EVIDENCE = fields((_F, "read passed"))
 
 # An explanation as it is compared with others: score and prior together, nats; the chi-square in the score; how many
 # rows are matched. And of an alternative: by how much its evidence is greater than that of the best, nats, with walls

@@ -10,13 +10,11 @@ from numpy.typing import ArrayLike
 from registration.layout import Floats, Records
 
 from ..context import SearchContext
-from ..layout import BEAM, BEAM_EVIDENCE, Integers
+from ..layout import BEAM, BEAM_EVIDENCE
 from ..tables import Rays
 from ..tuning import MOST_LOOKED_AT
 from .kernels.beams import weigh_beams
-from .tuning import BEAMS_ON_WALL, BEAMS_PASSED, BEAMS_READ, END_SQUARE
-
-SQUARES_ACROSS = 1 << 32  # more than there are
+from .tuning import BEAMS_PASSED, BEAMS_READ
 
 
 def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
@@ -50,29 +48,9 @@ def beam_rows(begins: ArrayLike, angles: Floats, ranges: Floats) -> Records:
     rows = np.empty(len(angles), BEAM)
     rows["x"], rows["y"] = np.asarray(begins)
     rows["dx"], rows["dy"], rows["range"] = np.cos(angles), np.sin(angles), ranges
-    rows["weight"] = _weights_of_ends(rows)
     return rows
 
 
-def _weights_of_ends(beams: Records) -> Floats:
-    """Return how far the end of each beam counts among all, (n,): near surfaces, which many beams meet, no more.
-
-    Ends within one square of `END_SQUARE` count as one; a beam without a return counts nothing.
-    """
-    weights, seen = np.zeros(len(beams)), np.flatnonzero(np.isfinite(beams["range"]))
-    ends = np.stack([beams[at][seen] + beams["range"][seen] * beams["d" + at][seen] for at in ("x", "y")], axis=1)
-    _, square, counts = np.unique(squares_of(ends, END_SQUARE), return_inverse=True, return_counts=True)
-    weights[seen] = 1.0 / (counts[square] * max(1, len(counts)))
-    return weights
-
-
-def squares_of(points: Floats, size: float) -> Integers:
-    """Return the number of the square of `size` metres that each point (n, 2) lies in, (n,)."""
-    columns, rows = np.floor(points / size).astype(np.int64).T
-    return np.asarray(columns * SQUARES_ACROSS + rows)
-
-
 def beam_score(evidence: Records) -> Floats:
-    """Return the term of beams in the score of each pose, nats, over one where none meets a wall."""
-    read, passed = BEAMS_READ * evidence["read"], BEAMS_PASSED * evidence["passed"]
-    return np.asarray(read - passed + BEAMS_ON_WALL * evidence["on_wall"])
+    """Return the term of beams in the score of each pose, nats, over one where none reads what it should."""
+    return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])

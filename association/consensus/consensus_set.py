@@ -14,7 +14,7 @@ from registration.values import value
 
 from ..layout import ESTIMATE, MATCH
 from ..options import Estimator
-from .tuning import BEAMS_ON_WALL, BEAMS_PASSED, BEAMS_READ
+from .tuning import BEAMS_PASSED, BEAMS_READ
 
 
 @value(frozen=True, slots=True)
@@ -45,9 +45,8 @@ class ConsensusSet:
         Mean squared offset over what the sigmas alone expect.
     blocked : float
         Penalty in the score for lines of sight through walls, nats.
-    read, passed, on_wall : float
-        Fractions of the beams that read the wall they should, that passed through one, and that end on a wall; 0
-        without beams.
+    read, passed : float
+        Fractions of the beams that read the wall they should, and that passed through one; 0 without beams.
     count : float
         Rows of the scan that are matched; those that hardly are count in part.
     matches : (n,) of `MATCH`
@@ -67,7 +66,6 @@ class ConsensusSet:
     blocked: float
     read: float
     passed: float
-    on_wall: float
     count: float
     matches: Records
 
@@ -76,10 +74,9 @@ class ConsensusSet:
         cls, estimate: Records, scores: tuple[float, ...], matches: Records, *, posterior: float, inside: bool
     ) -> ConsensusSet:
         """Return the set of a record of `SET_SCORE`, given as a tuple, and of the other arguments by name."""
-        score, chi_square, one_step, length, fraction, reliability, misfit, blocked, *of_beams, count = scores
+        score, chi_square, one_step, length, fraction, reliability, misfit, blocked, read, passed, count = scores
         sums, seen = (chi_square, one_step), (length, fraction, reliability, misfit, blocked)
-        read, passed, on_wall = of_beams
-        return cls(estimate, score, posterior, inside, *sums, *seen, read, passed, on_wall, count, matches)
+        return cls(estimate, score, posterior, inside, *sums, *seen, read, passed, count, matches)
 
     @property
     def pose(self) -> RigidTransform:
@@ -92,12 +89,12 @@ class ConsensusSet:
         """The same numbers in the order of `SET_SCORE`."""
         sums = self.score, self.chi_square, self.one_step_chi_square
         seen = self.length, self.fraction, self.reliability, self.misfit, self.blocked
-        return *sums, *seen, self.read, self.passed, self.on_wall, self.count
+        return *sums, *seen, self.read, self.passed, self.count
 
     @property
     def by_segments(self) -> float:
         """The score without the beams' part."""
-        return self.score - BEAMS_READ * self.read + BEAMS_PASSED * self.passed - BEAMS_ON_WALL * self.on_wall
+        return self.score - BEAMS_READ * self.read + BEAMS_PASSED * self.passed
 
     def score_by(self, estimator: Estimator) -> float:
         """Return the score by the sums at an estimator's pose; that of the joint one orders and judges."""

@@ -202,7 +202,7 @@ def _add_beams(context: SearchContext, scored: _Scored) -> _Scored:
     poses = scored.estimates[best]
     evidence = beam_evidence_at(context, poses, MOST_BEAMS, len(poses))
     final = _score(context, poses)
-    for name in ("read", "passed", "on_wall"):
+    for name in ("read", "passed"):
         final.scores[name] = evidence[name]
     final.scores["score"] = np.where(final.scores["score"] > 0.0, final.scores["score"] + beam_score(evidence), 0.0)
     return final

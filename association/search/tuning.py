@@ -61,18 +61,3 @@ KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternativ
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5
-
-# --- Branch and bound by points ---------------------------------------------------------------------------------------
-
-# Fractions of beams, or of their points, that end on walls, 0 to 1.
-WELL_EXPLAINED = 0.7  # tables; no more is searched then
-FIELD_LEAST = 0.45  # tables; with less, poses in other buildings explain a scan as well
-FIELD_MORE = 0.02  # tables; by which a pose has to exceed the best candidate
-FIELD_GAP = 0.05  # tables; a pose farther behind the best one is not kept
-FIELD_KEPT = 16  # poses, tables
-FAR_POINTS = 720  # beams of which points are chosen, memory
-FIELD_POINTS = 80  # tables
-FIELD_SQUARES = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)  # m; the first of which there are so few with a point
-FIELD_LEAST_HEADINGS = 64  # geometry; of a scan whose points are all near
-SAME_CELLS = 2  # either way, tables; up to there, and
-SAME_HEADINGS = 0.02  # of a turn, tables; up to there poses are one

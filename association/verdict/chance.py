@@ -15,7 +15,7 @@ from registration.values import value
 
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import rank_candidates
-from ..consensus.tuning import BEAMS_ON_WALL, BEAMS_READ
+from ..consensus.tuning import BEAMS_READ
 from ..context import SearchContext
 from ..scan.scan import mirrored
 from ..scan.scan_lines import ScanLines
@@ -110,7 +110,7 @@ def _efforts(context: SearchContext, best: ConsensusSet, wanted: float) -> tuple
     # Beams may add to any pose, so that without them nothing is enough.
     enough = math.inf if context.with_beams else NULL_ENOUGH * known
     whole = Effort(FEW_KEPT, NULL_FRACTION, NULL_FRACTION, max(allowed, NULL_ALLOWED), known, enough, NULL_SAMPLES)
-    by_segments = NULL_MARGIN * (wanted - BEAMS_READ - BEAMS_ON_WALL if context.with_beams else wanted)
+    by_segments = NULL_MARGIN * (wanted - BEAMS_READ if context.with_beams else wanted)
     if not by_segments > NULL_FRACTION * known > 0.0:
         return None, whole
     least = by_segments / known

@@ -42,7 +42,6 @@ class Features(NamedTuple):
         the mean over its views
     agreement : fraction of directions in which the scan shows what the map does
     read, passed : fractions of the beams that read the wall they should, and that passed through one; 0 without beams
-    on_wall : fraction of the beams that end on a wall, whether it is the first on their way or not; 0 without beams
     root_farther, root_nearer : roots of the fractions of the beams that read farther, and nearer, than the map shows
     critical_displacement : how far the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
     critical_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
@@ -74,7 +73,6 @@ class Features(NamedTuple):
     agreement: float
     read: float
     passed: float
-    on_wall: float
     root_farther: float
     root_nearer: float
     critical_displacement: float

@@ -155,9 +155,7 @@ def as_document(model: Model) -> dict[str, list[float]]:
 def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     document = json.loads(files(__package__).joinpath(FILE).read_bytes())
     models = {name: as_model(curves) for name, curves in document["models"].items()}
-    # A feature that was added since has no median yet.
-    usual = Features(*(document["usual"].get(name, 0.0) for name in Features._fields))
-    return models, document["manifest"], usual
+    return models, document["manifest"], Features(**document["usual"])
 
 
 # "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are

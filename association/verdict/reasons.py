@@ -66,7 +66,7 @@ FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
     "single_wall": ("critical_displacement", "critical_deviation", "deviation"),
     "map_mismatch": (
         "inlier_fraction", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
-        "on_wall", "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
+        "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
     ),
     "insufficient_evidence": ("root_count", "inverse_count", "root_length", "log_significance", "root_score", "walls"),
     "not_on_map": ("null", "null_gap", "null_better"),

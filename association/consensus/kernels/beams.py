@@ -12,7 +12,6 @@ from ..tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
-    END_GATE,
     FARTHER_BY,
     LEAST_INCIDENCE,
     LEAST_POINTS,
@@ -48,37 +47,6 @@ def evidence_of_beam(across: float, wall: Record) -> tuple[float, float]:
 
 
 @kernel
-def wall_nearest_to(
-    x: float, y: float, gate: float, walls: Records, starts: Integers, items: Integers, shape: Record
-) -> tuple[float, int]:
-    """Return how far a point is off the line of the wall nearest to it, metres, and the wall; `gate` and -1 for none.
-
-    The point lies between the ends of the wall, up to `NEAR` beyond them.
-    """
-    least = gate
-    nearest = -1
-    fx = (x - shape.x0) / shape.cell
-    fy = (y - shape.y0) / shape.cell
-    if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
-        here = int(fy) * shape.columns + int(fx)
-        for k in range(starts[here], starts[here + 1]):
-            w = items[k]
-            along = walls[w].dx * x + walls[w].dy * y
-            off = abs(walls[w].dx * y - walls[w].dy * x - walls[w].offset)
-            if off < least and along >= walls[w].begin - NEAR and along <= walls[w].end + NEAR:
-                least = off
-                nearest = w
-    return least, nearest
-
-
-@kernel
-def end_on_wall(x: float, y: float, walls: Records, starts: Integers, items: Integers, shape: Record) -> float:
-    """Return how far the end of a beam, metres in the index frame, lies on a wall, 0 to 1."""
-    off, nearest = wall_nearest_to(x, y, END_GATE, walls, starts, items, shape)
-    return math.exp(-0.5 * off * off / (NEAR * NEAR)) if nearest >= 0 else 0.0
-
-
-@kernel
 def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> None:
     """Let a ray go where a beam did; `c` and `s` are cosine and sine of the pose's heading."""
     ray.x = c * beam.x - s * beam.y + pose.x
@@ -89,9 +57,8 @@ def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> Non
 
 @kernel
 def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
-    """Write the fractions of the beams that read the wall they should, passed through one, and end on one.
+    """Write the fractions of the beams that read the wall they should, and that passed through one, to `evidence`.
 
-    A beam may end on a wall that is not the first on its way: people and a map's loose pieces hide no such agreement.
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
     proves little, black or mirror walls give none.
     """
@@ -104,14 +71,10 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     s = math.sin(pose.theta)
     read = 0.0
     passed = 0.0
-    on_wall = 0.0
     for i in range(len(beams)):
         if math.isinf(beams[i].range):
             continue
         put_beam(ray, beams[i], c, s, pose)
-        x = ray.x + beams[i].range * ray.dx
-        y = ray.y + beams[i].range * ray.dy
-        on_wall += beams[i].weight * end_on_wall(x, y, walls, starts, items, shape)
         ray.limit = min(rays.reach, beams[i].range + BEHIND)
         across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
         if w < 0:
@@ -122,7 +85,6 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     n = max(1, len(beams))
     evidence.read = read / n
     evidence.passed = passed / n
-    evidence.on_wall = on_wall
 
 
 @kernel
@@ -182,7 +144,20 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
         py = beams[i].y + beams[i].range * beams[i].dy
         x = c * px - s * py + pose.x
         y = s * px + c * py + pose.y
-        _, nearest = wall_nearest_to(x, y, gate, walls, starts, items, shape)
+        fx = (x - shape.x0) / shape.cell
+        fy = (y - shape.y0) / shape.cell
+        if not (fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows):
+            continue
+        here = int(fy) * shape.columns + int(fx)
+        nearest = -1
+        least = gate
+        for k in range(starts[here], starts[here + 1]):
+            w = items[k]
+            along = walls[w].dx * x + walls[w].dy * y
+            off = abs(walls[w].dx * y - walls[w].dy * x - walls[w].offset)
+            if off < least and along >= walls[w].begin - NEAR and along <= walls[w].end + NEAR:
+                least = off
+                nearest = w
         if nearest >= 0:
             point.centroid_x = px
             point.centroid_y = py
@@ -216,7 +191,6 @@ def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Wo
             if evidence.read > out[k].read and evidence.passed <= out[k].passed + PASSED_SLACK:
                 out[k].read = evidence.read
                 out[k].passed = evidence.passed
-                out[k].on_wall = evidence.on_wall
                 poses[k].theta = moved.theta
                 poses[k].x = moved.x
                 poses[k].y = moved.y

@@ -7,8 +7,8 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Floats, Records
 
-from ...consensus.kernels.beams import across_wall, end_on_wall, evidence_of_beam, put_beam
-from ...consensus.tuning import BEAMS_ON_WALL, BEAMS_PASSED, BEAMS_READ, BEHIND, CERTAIN, LEAST_INCIDENCE
+from ...consensus.kernels.beams import across_wall, evidence_of_beam, put_beam
+from ...consensus.tuning import BEAMS_PASSED, BEAMS_READ, BEHIND, CERTAIN, LEAST_INCIDENCE
 from ...tables import Place, Rays, Workspace
 from ..tuning import LEAST_OF_BEAM
 
@@ -21,9 +21,6 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
     """
     beams = rays.beams
     walls = place.walls
-    starts = place.grid.starts
-    items = place.grid.items
-    shape = place.grid.shape[0]
     pose = poses[0]
     ray = work.scratch[0].ray
     c = math.cos(pose.theta)
@@ -35,14 +32,11 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
             continue
         put_beam(ray, beams[i], c, s, pose)
         ray.limit = min(rays.reach, beams[i].range + BEHIND)
-        x = ray.x + beams[i].range * ray.dx
-        y = ray.y + beams[i].range * ray.dy
-        readings[i, 0] = BEAMS_ON_WALL * beams[i].weight * end_on_wall(x, y, walls, starts, items, shape)
-        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
+        across, w = across_wall(ray, beams[i].range, walls, place.grid.starts, place.grid.items, place.grid.shape[0])
         if w < 0:
             continue
         read, passed = evidence_of_beam(across, walls[w])
-        readings[i, 0] += (BEAMS_READ * read - BEAMS_PASSED * passed) / len(beams)
+        readings[i, 0] = (BEAMS_READ * read - BEAMS_PASSED * passed) / len(beams)
         if across > CERTAIN:
             incidence = max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx))
             readings[i, 1] = beams[i].range - across / incidence

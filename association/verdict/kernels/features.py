@@ -7,7 +7,7 @@ from registration.kernels import MAX_DEVIATION
 from registration.layout import Record, Records
 
 from ...consensus.kernels.matching import part_of_match
-from ...consensus.tuning import BEAMS_ON_WALL, BEAMS_PASSED, BEAMS_READ
+from ...consensus.tuning import BEAMS_PASSED, BEAMS_READ
 from ..tuning import (
     CROWD_TEMPERATURE,
     FEW_WALLS,
@@ -56,7 +56,6 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.agreement = fact.agreement
     out.read = best.read
     out.passed = best.passed
-    out.on_wall = best.on_wall
     out.root_farther = math.sqrt(fact.farther)
     out.root_nearer = math.sqrt(fact.nearer)
     out.critical_displacement = min(fact.critical_displacement, MOST_DEVIATION)
@@ -77,7 +76,7 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
 @kernel
 def by_segments(best: Record) -> float:
     """Return a score without the beams' part, nats."""
-    return best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed - BEAMS_ON_WALL * best.on_wall
+    return best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed
 
 
 @kernel
