@@ -184,7 +184,6 @@ def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
     return [
         (Scan(measured), None, AssociationOptions()),
         (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
-        (_among_people(), None, AssociationOptions()),
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
         (views, None, AssociationOptions()),
     ]
@@ -194,12 +193,6 @@ def _with_beams() -> Scan:
     """Return the room as a laser in its middle sees it."""
     beams = Beams(TURN, room_ranges(TURN), 30.0)
     return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
-
-
-def _among_people() -> Scan:
-    """Return the same where two of three beams end before the walls: poses are then searched by the points of beams."""
-    ranges = np.where(np.arange(len(TURN)) % 3 == 0, room_ranges(TURN), 0.6 * room_ranges(TURN))
-    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), Beams(TURN, ranges, 30.0))
 
 
 def _one_wall() -> Scan:
