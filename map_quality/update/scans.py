@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,6 +169,16 @@ def held_back(visits: Sequence[int]) -> list[bool]:
         counts[visit] = counts.get(visit, -1) + 1
         held.append(counts[visit] % HELD_BACK == HELD_BACK // 2)
     return held
+
+
+def on_map(one: Localized, segments: Segments) -> Localized:
+    """Return a scan with its correspondences on another map; without those on walls that this does not have."""
+    if one.on is segments:
+        return one
+    places = {ends.tobytes(): k for k, ends in enumerate(segments.endpoints)}
+    there = [(pair, places.get(one.on.endpoints[pair.map].tobytes())) for pair in one.result.correspondences]
+    kept = tuple(replace(pair, map=place) for pair, place in there if place is not None)
+    return replace(one, result=replace(one.result, correspondences=kept), on=segments)
 
 
 def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
