@@ -108,6 +108,12 @@ def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> 
     assert updated(hall, *visits(shut, shut)).changes == ()
 
 
+def test_the_tip_of_an_open_leaf_is_no_wall_before_four_visits() -> None:
+    hall, tip = segments(RACK, PILLAR), segments(RACK, PILLAR, box(6.98, 6.7, 7.02, 7.2))  # hinged at (7, 8)
+    assert updated(hall, *visits(tip, tip, tip)).changes == ()
+    assert {one.code for one in updated(hall, *visits(*[tip] * 5)).changes} == {"added"}
+
+
 def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:
     hall, shut = segments(RACK, PILLAR), segments(RACK, PILLAR, box(5.6, 7.98, 6.9, 8.02))
     assert [one.code for one in updated(hall, *visits(*[shut] * 5)).changes] == ["extended"]
