@@ -164,7 +164,9 @@ def _pieces(group: SeenLines, known: Segments, new: Segments) -> list[tuple[Floa
     for visit, begin, end in zip(group.visits, begins, ends, strict=True):
         covered[visit] |= (middles >= begin) & (middles <= end)
     points = place + middles[:, None] * direction
-    seen = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, points, direction) & ~_doubled(new, points, direction)
+    seen = (
+        (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, points, direction) & ~_doubled(new, points, direction)
+    )
     return [
         (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
         for a, b in runs(seen)

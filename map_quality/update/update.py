@@ -19,7 +19,17 @@ from .beams import Chunks, sees
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
-from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, on_map, search, visit_numbers
+from .scans import (
+    Localized,
+    UpdateError,
+    VisitScan,
+    choose_evidence,
+    held_back,
+    is_vouched,
+    on_map,
+    search,
+    visit_numbers,
+)
 from .sharpening import sharpen
 from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
