@@ -176,7 +176,7 @@ def _continued(known: Segments, piece: Floats, step: float) -> int | None:
 
 
 def _may_be_door(known: Segments, piece: Floats) -> bool:
-    """Return whether a new wall may be a part of the leaf of a door: the end of another wall is on its line, near enough.
+    """Return whether a new wall may be a part of the leaf of a door: the end of another wall is near on its line.
 
     An open leaf may be seen at its tip only.
     """
