@@ -197,7 +197,7 @@ def speed(families: Sequence[str], scans: int, least: int) -> list[Row]:
         update = map_quality.update(index, some)
         what = f"seconds of a core for {len(some)} scans in a map of {len(index.segments)} segments, {how}"
         rows.append(at_most(what, time.process_time() - begun, 20.0, form=".1f"))
-        rows.append(at_least("  changes proposed", float(len(update.changes)), form=".0f"))
+        rows.append(at_least(f"  changes proposed, {how}", float(len(update.changes)), form=".0f"))
     return [
         *rows,
         at_most("memory of the process at most, MB", _memory(), 500.0, form=".0f"),
@@ -216,20 +216,29 @@ def _memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
-def upkeep(quick: int) -> list[Row]:
-    """Return the rows of all tables; buildings of which none is fitted on."""
-    families = [name for name, one in FAMILIES.items() if one.held_out]
-    seeds = range(max(1, 4 // quick))
-    parts: dict[str, Callable[[], list[Row]]] = {
-        "changes": lambda: changes(families, seeds),
-        "walls of grids": lambda: sharper(families, seeds[: max(1, len(seeds) // 2)]),
-        "rounds": lambda: rounds(families, seeds[:1]),
-        "foreign logs": lambda: foreign(families, max(6, 1000 // quick)),
-        "speed": lambda: speed(families, max(100, 1000 // quick), max(500, 2000 // quick)),
-    }
-    rows: list[Row] = []
-    for name, part in parts.items():
-        found = part()
-        print_rows(f"Map updates: {name}", found)
-        rows += found
-    return rows
+def _families() -> list[str]:
+    """Return the kinds of buildings that nothing is fitted on."""
+    return [name for name, one in FAMILIES.items() if one.held_out]
+
+
+PARTS: dict[str, Callable[[int], list[Row]]] = {
+    "upkeep-changes": lambda quick: changes(_families(), range(max(1, 4 // quick))),
+    "upkeep-grids": lambda quick: sharper(_families(), range(max(1, 2 // quick))),
+    "upkeep-rounds": lambda quick: rounds(_families()[:: min(quick, 4)], range(1)),
+    "upkeep-foreign": lambda quick: foreign(_families(), max(6, 1000 // quick)),
+    "upkeep-speed": lambda quick: speed(_families(), max(100, 1000 // quick), max(500, 2000 // quick)),
+}
+
+
+def printed(name: str) -> Callable[[int], list[Row]]:
+    """Return a part that prints its rows."""
+
+    def part(quick: int) -> list[Row]:
+        rows = PARTS[name](quick)
+        print_rows(f"Map updates: {name}", rows)
+        return rows
+
+    return part
+
+
+UPKEEP = {name: printed(name) for name in PARTS}
