@@ -21,6 +21,14 @@ from .running import Linefix
 HALL, TODAY = segments(RACK, PILLAR), segments(PILLAR)
 
 
+REMOVED = (0xD5, 0x5E, 0x00)
+
+
+def colours_of(path: Path) -> set[tuple[int, ...]]:
+    with Image.open(path) as picture:
+        return {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
+
+
 def write_visit(path: Path, walls: Segments, seed: int) -> None:
     """Write a log of a visit, as CARMEN does."""
     rng, lines = np.random.default_rng(seed), ["# a log"]
@@ -53,9 +61,7 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
     new = json.loads((folder / "new.json").read_text())
     assert new["segments"] == TODAY.endpoints.tolist()
     assert (new["sigma"], new["meta"]) == (0.005, "A 3")
-    with Image.open(folder / "changes.png") as picture:
-        colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
-    assert (0xD5, 0x5E, 0x00) in colours  # what is removed
+    assert REMOVED in colours_of(folder / "changes.png")
 
 
 def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: RunningService) -> None:
@@ -111,8 +117,9 @@ def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) ->
     lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
     (folder / "drive.log").write_text("".join(lines))
     plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
-    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json")
+    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
     assert told.code == 0, told.err
+    assert REMOVED in colours_of(folder / "changes.png")
     answer = json.loads(told.out)
     assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
     assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
