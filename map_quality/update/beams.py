@@ -133,7 +133,8 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
     left = np.stack([-rays[:, 1], rays[:, 0]], axis=1)
     own = np.einsum("ij,ij->i", left, origins)[:, None]
     begins, ends = left @ walls.endpoints[:, :2].T >= own, left @ walls.endpoints[:, 2:].T >= own
-    return np.nonzero(begins != ends)
+    beams, crossed = np.nonzero(begins != ends)
+    return beams, crossed
 
 
 def sees(chunks: Chunks, one: Localized, sigma: float) -> bool:
