@@ -3,8 +3,8 @@
 The first half of the log makes the grid, at its refined poses. The second half is cut into visits. The logs have no
 poses. In addition, the whole log is written, for ``linefix map import --log``.
 
-``--judge`` compares ``FOLDER/LOG/answer.json``, the output of ``linefix map update --json``, with the second half at its
-refined poses: which part of each wall has returns, and how many beams pass through.
+``--judge`` compares ``FOLDER/LOG/answer.json``, written by ``linefix map update --json``, with the second half of
+the log at its refined poses: which part of each wall has returns, and how many beams pass through.
 
 ``python -m benchmarks.upkeep.public_logs intel fhw --visits 2 --out FOLDER [--judge]``
 """
