@@ -223,6 +223,7 @@ def _families() -> list[str]:
 
 PARTS: dict[str, Callable[[int], list[Row]]] = {
     "upkeep-changes": lambda quick: changes(_families(), range(max(1, 4 // quick))),
+    "upkeep-without-poses": lambda quick: changes(_families(), range(max(1, 2 // quick)), own=False),
     "upkeep-grids": lambda quick: sharper(_families(), range(max(1, 2 // quick))),
     "upkeep-rounds": lambda quick: rounds(_families()[:: min(quick, 4)], range(1)),
     "upkeep-foreign": lambda quick: foreign(_families(), max(6, 1000 // quick)),
