@@ -22,6 +22,7 @@ BLENDED_WALLS = 16  # on either side, measured
 LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over the gap between them
 TIE_FREE = 30.0  # minus the log of a correlation that is none
 TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
+SAME_LENGTH = 1e-6  # m, rounding; walls are sorted by lengths that are rounded to it
 
 # --- Wall chains: lines through walls that nearly continue one another, also across doorways --------------------------
 
