@@ -18,7 +18,7 @@ from ..layout import ENDS, Integers, as_records
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from ..tuning import WHOLE_GAP
 from .grids import crossing_chains, directions_near, near_walls, swept_chains
-from .tuning import BLENDED_SIGMAS, BLENDED_STEP, LEAST_ONE_LINE, MAX_EXTENT, MAX_MAP_SIGMA, ONE_LINE, ONE_LINE_SHARE
+from .tuning import BLENDED_SIGMAS, BLENDED_STEP, LEAST_DIFFERENCE, MAX_EXTENT, MAX_MAP_SIGMA, ONE_LINE, ONE_LINE_SHARE
 from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]
@@ -255,7 +255,7 @@ def tables_of(
     IndexingEndedError
         When the deadline passes, or is cancelled, first.
     """
-    one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
+    one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_DIFFERENCE, ONE_LINE_SHARE * sigma))
     walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
     blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
     if blends > one_line:

@@ -12,7 +12,7 @@ MAX_EXTENT = 1e5  # m; the contract
 MAX_MAP_SIGMA = 10.0  # m; the contract
 # Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
 ONE_LINE = 1e-4  # m, rounding
-LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is declared exact
+LEAST_DIFFERENCE = 1e-6  # m, rounding; walls whose offsets or lengths differ by less are equal in them
 ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
 # Walls that continue one another with a small step are put on a common line: the larger the step, the less, and from
 # here on not at all.
@@ -22,7 +22,6 @@ BLENDED_WALLS = 16  # on either side, measured
 LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over the gap between them
 TIE_FREE = 30.0  # minus the log of a correlation that is none
 TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
-SAME_LENGTH = 1e-6  # m, rounding; walls are sorted by lengths that are rounded to it
 
 # --- Wall chains: lines through walls that nearly continue one another, also across doorways --------------------------
 

@@ -14,12 +14,12 @@ import pytest
 from association import InvalidMapError, MapIndex
 from association.index.tuning import (
     CELL,
+    LEAST_DIFFERENCE,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
     NEIGHBOURHOOD,
-    SAME_LENGTH,
     SWEEP_CELL,
 )
 from association.index.walls import ends_of
@@ -124,7 +124,7 @@ def test_directions_are_sorted_longest_first() -> None:
         bins = np.minimum(np.floor((walls.rows["angle"] + math.pi) / math.tau * count), count - 1)  # pi is in the last
         for b in range(count):
             inside = slice(walls.bin_starts[b], walls.bin_starts[b + 1])
-            assert (np.diff(np.rint(walls.longest[inside] / SAME_LENGTH)) <= 0.0).all()
+            assert (np.diff(np.rint(walls.longest[inside] / LEAST_DIFFERENCE)) <= 0.0).all()
             assert (bins[inside] == b).all()
         assert walls.bin_starts[-1] == len(walls.rows)
         np.testing.assert_allclose(walls.longest, lengths(walls))
