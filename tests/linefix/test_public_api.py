@@ -26,7 +26,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "importlib",
         "locating",
         "map_answers",
-        "mounted",
+        "ranges",
         "updating",
         "Any",
         "TYPE_CHECKING",
