@@ -1,4 +1,4 @@
-"""The outermost layer of the application, an ASGI middleware: a request's state, its key, the log, the counts, and the last catch."""
+"""The outermost layer of the application, as ASGI: a request's state, key, log and counts, and the last catch."""
 
 from __future__ import annotations
 

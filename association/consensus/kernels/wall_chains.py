@@ -9,8 +9,8 @@ from ..tuning import FLAT_GATE, FLAT_STEP, LONG_BRIDGE, SHORT_BRIDGE
 
 # A scan line on the map: x and y of its midpoint, its direction, its length, and how far it may be off a wall, m.
 Line = tuple[float, float, float, float, float, float]
-# The part of a scan line that a wall and its neighbours on the chain cover: the metres that count as covered; the length
-# that is covered, m; sums over that length of the walls' steps from the wall, and of their squares.
+# The part of a scan line that a wall and its neighbours on the chain cover: the metres that count as covered; the
+# length that is covered, m; sums over that length of the walls' steps from the wall, and of their squares.
 Cover = tuple[float, float, float, float]
 
 

@@ -1,4 +1,4 @@
-"""What a line, or a set of lines, fixes of a pose that was free, in nats."""
+"""The freedom that a line, or a set of lines, takes from a pose, in nats."""
 
 import math
 

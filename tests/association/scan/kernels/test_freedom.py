@@ -1,4 +1,4 @@
-"""What information fixes of a pose is that of the reference, from nothing to a whole pose."""
+"""The freedom that information takes from a pose is that of the reference, from nothing to a whole pose."""
 
 from __future__ import annotations
 
