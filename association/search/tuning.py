@@ -61,3 +61,12 @@ KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternativ
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5
+
+# --- Branch and bound over the ends of beams --------------------------------------------------------------------------
+
+# Fractions of the places where beams end, by the likelihood of the map's field there, 0 to 1.
+WELL_EXPLAINED = 0.6  # tables; with more at one of the poses, no more is searched
+FIELD_LEAST = 0.45  # tables; with less, poses in other buildings explain a scan as well
+FIELD_GAP = 0.05  # tables; a pose farther behind the best one is not kept
+FIELD_POINTS = 80  # tables; of a scan
+END_SQUARE = 0.15  # m, tables; ends of beams within one such square count as one
