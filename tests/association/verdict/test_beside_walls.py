@@ -45,7 +45,7 @@ def fraction(scan: Scan) -> float:
         (0.2, 0.0, OF_THE_MOVED),
         (0.3, 0.0, OF_THE_MOVED),
         (0.2, 0.15, 0.0),
-        (0.4, 0.0, 0.0),
+        (0.6, 0.0, 0.0),
     ],
 )
 def test_what_is_parallel_to_a_wall_one_to_three_decimetres_beside_it(
