@@ -89,6 +89,10 @@ class ScaledSearch:
         """Of its answer, nats; 0 where there is none."""
         return 0.0 if self.explanations.answer is None else self.explanations.answer.best.score
 
+    def cut_short(self) -> ScaledSearch:
+        """Return the same, where the deadline ended a search."""
+        return replace(self, explanations=replace(self.explanations, search=self.explanations.search.cut_short()))
+
 
 def search_to_scale(context: SearchContext) -> ScaledSearch:
     """Search a scan, and again to scale where that fits much better.
