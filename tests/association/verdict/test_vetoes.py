@@ -11,7 +11,7 @@ import pytest
 from association import Status
 from association.consensus.tuning import CONTRADICTION
 from association.verdict.reasons import ORDER, SENTENCES
-from association.verdict.tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BESIDE, MOST_BEYOND
+from association.verdict.tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND, MOST_DISPLACED
 from association.verdict.verdict import judge
 from association.verdict.vetoes import VETOES, Findings, Origin, applied, contradict_prior, counted
 
@@ -42,9 +42,9 @@ LIMITS: dict[str, tuple[Findings, Findings]] = {
         replace(NOTHING, in_step=math.nextafter(LEAST_IN_STEP, 0.0)),
     ),
     "off_scale": (NOTHING, replace(NOTHING, off_scale=True)),
-    "beside_walls": (
-        replace(NOTHING, beside_walls=MOST_BESIDE),
-        replace(NOTHING, beside_walls=math.nextafter(MOST_BESIDE, 1.0)),
+    "displaced_walls": (
+        replace(NOTHING, displaced_walls=MOST_DISPLACED),
+        replace(NOTHING, displaced_walls=math.nextafter(MOST_DISPLACED, 1.0)),
     ),
     "mirrored": (
         replace(NOTHING, mirrored_better=math.nextafter(MIRRORED_BETTER, 0.0)),
@@ -84,7 +84,7 @@ def test_with_another_status_the_status_is_the_reason() -> None:
         (Status.DEGENERATE, {"outside_window", "unobservable_direction"}),
         (
             Status.AMBIGUOUS,
-            {"outside_window", "few_walls", "imprecise", "out_of_step", "off_scale", "beside_walls", "mirrored"},
+            {"outside_window", "few_walls", "imprecise", "out_of_step", "off_scale", "displaced_walls", "mirrored"},
         ),
         (Status.OK, {"outside_window"}),
     ):

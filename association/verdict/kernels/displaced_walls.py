@@ -1,4 +1,4 @@
-"""Measure how much of a scan lies beside the walls of the map."""
+"""Measure how much of a scan is decimetres away from walls of the map."""
 
 import math
 
@@ -12,10 +12,10 @@ from ...tuning import REACH
 
 
 @kernel
-def length_beside_walls(scan: Records, matches: Records, poses: Records, place: Place) -> float:
-    """Return the length of the scan lines without a match that are parallel to a wall beside them, metres.
+def displaced_length(scan: Records, matches: Records, poses: Records, place: Place) -> float:
+    """Return the length of the scan lines without a match that are parallel to a wall near them, metres.
 
-    The middle of a line is beside a wall if it is between the ends of the wall, and `NEAR` to `REACH` from its line.
+    The middle of such a line is between the ends of the wall, and at `NEAR` to `REACH` from its line.
     `scan` (n,), `matches` (n,) of `MATCH`, `poses` (1,) in the index frame.
     """
     walls = place.walls

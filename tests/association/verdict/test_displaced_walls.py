@@ -1,4 +1,4 @@
-"""How much of a scan lies beside walls of the map that are parallel to it."""
+"""The fraction of a scan that is parallel to walls of the map, at decimetres from them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from association import Scan
 from association.explain import explain_at
-from association.verdict.beside_walls import beside_walls
+from association.verdict.displaced_walls import displaced_walls
 from registration import RigidTransform
 
 from ..scenes import INSIDE, ROOM, answer_of, context_of, index_of, scan_of, seen
@@ -34,7 +34,7 @@ def fraction(scan: Scan) -> float:
     context = context_of(index_of(ROOM), scan)
     answer = explain_at(context, INSIDE).answer
     assert answer is not None
-    return beside_walls(context, answer.best)
+    return displaced_walls(context, answer.best)
 
 
 @pytest.mark.parametrize(
@@ -48,9 +48,7 @@ def fraction(scan: Scan) -> float:
         (0.6, 0.0, 0.0),
     ],
 )
-def test_what_is_parallel_to_a_wall_one_to_three_decimetres_beside_it(
-    by: float, turned: float, expected: float
-) -> None:
+def test_lines_parallel_to_a_wall_one_to_three_decimetres_from_it(by: float, turned: float, expected: float) -> None:
     assert fraction(with_walls_off(by, turned)) == pytest.approx(expected, abs=1e-9)
 
 
@@ -60,4 +58,4 @@ def test_such_an_answer_is_not_usable_and_says_why() -> None:
     answer = answer_of(index, with_walls_off(0.25))
     assert not answer.usable
     (reason,) = (one for one in answer.reasons if one.code == "map_mismatch")
-    assert "beside walls" in reason.message
+    assert "parallel to walls" in reason.message
