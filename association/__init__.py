@@ -17,6 +17,7 @@ from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.joint import MapPart
 from .index.map_index import MapIndex
+from .messages import AS_WELL, message_of
 from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
     Alternative,
@@ -35,7 +36,6 @@ from .result import (
 from .scan.scan import Scan, Views, mirrored
 from .scan.views import MAX_VIEWS, View, assemble
 from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
-from .words import AS_WELL, message_of
 
 __all__ = [
     "AS_WELL",

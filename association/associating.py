@@ -17,7 +17,8 @@ from .options import AssociationOptions, Prior
 from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan
-from .search.candidates import find_candidates
+from .search.branch_and_bound import add_point_matches
+from .search.candidates import Candidates, find_candidates
 from .to_scale import ScaledSearch, put_to_scale
 from .verdict.verdict import Verdict, judge
 
@@ -69,8 +70,9 @@ def associate(
     2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
     3. Search again to scale, if scan and map differ by a factor near one according to the best explanation.
     4. Judge: how likely the best explanation is right, and whether a robot may use it.
-    5. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.
-    6. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
+    5. If it may not: search by the ends of beams, too. What explains the scan better is put to scale and judged.
+    6. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.
+    7. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
 
     Parameters
     ----------
@@ -108,6 +110,8 @@ def run_stages(context: SearchContext, began: float) -> Stages:
     explanations = explain(context, candidates)
     found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
+    if not verdict.usable:
+        found, verdict = _search_by_points(context, candidates, found, verdict)
     last = search_last_view(found.context, verdict)
     if last.result is not None:
         return Stages(found, verdict, last, last.result)
@@ -115,3 +119,22 @@ def run_stages(context: SearchContext, began: float) -> Stages:
     result = report(found.context, found.explanations, verdict, found.factor)
     result = with_causes(result, find_causes(context, found.explanations, verdict, began))
     return Stages(found, verdict, last, result)
+
+
+def _search_by_points(
+    context: SearchContext, candidates: Candidates, found: ScaledSearch, verdict: Verdict
+) -> tuple[ScaledSearch, Verdict]:
+    """Search by the ends of beams in addition to bases; return what was found, if that explains the scan no better.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    more = add_point_matches(context, candidates)
+    if more is candidates:
+        return found, verdict
+    by_points = found if context.deadline.passed else put_to_scale(context, explain(context, more))
+    if by_points.score > found.score:
+        return by_points, judge(by_points.context, by_points.explanations, off_scale=by_points.off_scale)
+    return (found.cut_short(), verdict.cut_short()) if context.deadline.passed else (found, verdict)

@@ -54,7 +54,7 @@ def explain(context: SearchContext, candidates: Candidates) -> Explanations:
     CancelledError
         When the deadline was cancelled.
     """
-    ranked, search = tuple(rank_candidates(context, candidates)), _as_far_as(context, candidates)
+    ranked, search = tuple(rank_candidates(context, candidates.poses)), _as_far_as(context, candidates)
     best = next((one for one in ranked if one.inside), None)
     return Explanations(ranked, None if best is None else _answer(context, best), search)
 

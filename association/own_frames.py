@@ -16,6 +16,7 @@ from .consensus.estimation import estimate_poses
 from .consensus.ranking import with_lines_of_sight
 from .context import SearchContext
 from .index.joint import JointIndex
+from .messages import AS_WELL
 from .options import MapsPrior
 from .report import probabilities_of_others
 from .result import (
@@ -27,7 +28,6 @@ from .result import (
     Reason,
     Status,
 )
-from .words import AS_WELL
 
 
 def in_own_frames(found: Stages, ids: Sequence[str]) -> AssociationResult:

@@ -22,7 +22,7 @@ from .explain import search_and_explain
 from .explanations import Explanations, add_alternatives
 from .options import AssociationOptions
 from .scan.scan import Scan, scaled
-from .search.candidates import Candidates, Effort, allowed_by, find_candidates
+from .search.candidates import Effort, allowed_by, find_candidates
 from .tuning import (
     ALTERNATIVE_FACTOR,
     ALTERNATIVE_SCALES,
@@ -88,6 +88,10 @@ class ScaledSearch:
     def score(self) -> float:
         """Of its answer, nats; 0 where there is none."""
         return 0.0 if self.explanations.answer is None else self.explanations.answer.best.score
+
+    def cut_short(self) -> ScaledSearch:
+        """Return the same, where the deadline ended a search."""
+        return replace(self, explanations=replace(self.explanations, search=self.explanations.search.cut_short()))
 
 
 def search_to_scale(context: SearchContext) -> ScaledSearch:
@@ -224,7 +228,7 @@ def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> l
         if len(context.lines.rows) == len(found.context.lines.rows):
             ranked = first.explanations.ranked
             if scale != 1.0:
-                ranked = tuple(rank_candidates(context, find_candidates(context, _effort_beyond(context, found))))
+                ranked = tuple(rank_candidates(context, find_candidates(context, _effort_beyond(context, found)).poses))
             near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
             alternatives += [_at_best_scale(first, context, scale, one) for one in near[:LOOSE_ALTERNATIVES]]
     return alternatives
@@ -238,7 +242,7 @@ def _at_best_scale(first: ScaledSearch, context: SearchContext, scale: float, on
     again = at_scale(first.context, scale * similarity.factor)
     if len(again.lines.rows) != len(one.matches):
         return one
-    found = rank_candidates(again, Candidates(one.estimate, first.explanations.search))
+    found = rank_candidates(again, one.estimate)
     return found[0] if found else one
 
 
@@ -272,7 +276,7 @@ def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:
     lax = SearchContext.of(context.index, Scan(scan.measured, None, None), None, options, context.deadline)
     effort = Effort(SCALE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options))
     best: tuple[float, float] | None = None
-    for one in rank_candidates(lax, find_candidates(lax, effort))[:SCALE_KEPT]:
+    for one in rank_candidates(lax, find_candidates(lax, effort).poses)[:SCALE_KEPT]:
         fitted = fit_trimmed_similarity(lax, one) if one.fraction >= SCALE_LENGTH else None
         if fitted is None:
             continue

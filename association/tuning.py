@@ -87,7 +87,7 @@ LEAST_OFF_WALLS = 0.01  # m, tables; walls that are off by less, as estimated, l
 LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables; a factor is tried that is so far from one,
 FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations
 FACTOR_ROUNDS = 3  # tables
-FACTOR_GAP = 6.0  # nats, tables; it is taken where the answer scores so much more,
+FACTOR_GAP = GAIN  # nats, tables; it is taken where the answer scores so much more,
 FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
 # A greater factor puts the answer in doubt, if so many walls agree beyond those that it takes, or it is beyond noise.
 DOUBTING_WALLS = 1.0  # tables

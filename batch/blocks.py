@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 import linefix
 from association import Scan
-from linefix.mounted import RangeScan
+from linefix.ranges import RangeScan
 from registration import MeasuredSegments, Segments
 from vectorization import LaserScan, Motion
 

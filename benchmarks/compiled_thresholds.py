@@ -19,7 +19,7 @@ from typing import Any
 
 from compiled import cache_directory
 
-from .sensitivity import MOVED, Effect, Told, effect_of, print_effects, sample, sample_of, timed
+from .threshold_effects import MOVED, Effect, Told, effect_of, print_effects, sample, sample_of, timed
 from .thresholds import Threshold, moved, thresholds
 
 

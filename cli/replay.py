@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.progress import track
 
-from linefix.mounted import SPEED, TURN
+from linefix.ranges import SPEED, TURN
 from registration import RigidTransform
 
 from .contract import Json

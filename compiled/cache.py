@@ -21,10 +21,10 @@ import uuid
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-import llvmlite
 import numba
 import numpy as np
 
@@ -34,6 +34,8 @@ logger = logging.getLogger("linefix")
 
 PACKAGES = ("registration", "vectorization", "association", "simulation")  # those that have kernels
 SOURCES = ("**/kernels/**/*.py", "**/layout.py", "**/*tables.py", "**/tuning.py")  # files that a kernel can reach
+CPU_NAME = ("vendor_id", "cpu family", "model", "CPU implementer", "CPU variant", "CPU part")  # of x86-64; of arm64
+CPU_FEATURES = ("flags", "Features")
 DIRECTORY = "LINEFIX_KERNELS"  # the environment variable that names the cache directory
 COMPLETE = "complete"  # a file that is written when every kernel that a request needs is cached
 UNUSED_SECONDS = 86_400.0  # so long ago a directory was last used that may be removed
@@ -99,7 +101,7 @@ def compiled_fraction() -> float:
 @cache
 def digest() -> str:
     """Return a digest of everything that the machine code depends on."""
-    versions = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
+    versions = (platform.python_implementation(), platform.python_version(), numba.__version__, version("llvmlite"))
     # Numba caches by the path of a function's file, so that another checkout cannot use what this one has compiled.
     text = hashlib.sha256(repr((__file__, versions, np.__version__, *_processor())).encode())
     for path in sources():
@@ -122,10 +124,23 @@ def _sources_of(package: str) -> Iterator[Path]:
 
 
 def _processor() -> tuple[str, str]:
-    """Return the name and the features of the processor that is compiled for."""
-    name = os.environ.get("NUMBA_CPU_NAME") or llvmlite.binding.get_host_cpu_name()
-    features = os.environ.get("NUMBA_CPU_FEATURES")
-    return name, llvmlite.binding.get_host_cpu_features().flatten() if features is None else features
+    """Return the name and the features of the processor that is compiled for.
+
+    Numba stores which processor its code is for, and compiles again on another. The directory of another is another one
+    all the same, because `is_complete` holds for one processor.
+    """
+    name, features = _described_by(CPU_NAME), _described_by(CPU_FEATURES)
+    return os.environ.get("NUMBA_CPU_NAME") or name, os.environ.get("NUMBA_CPU_FEATURES", features)
+
+
+def _described_by(keys: tuple[str, ...]) -> str:
+    """Return what Linux states of the first processor by some keys; of another system, the architecture."""
+    try:
+        first, _, _ = Path("/proc/cpuinfo").read_text().partition("\n\n")
+    except OSError:
+        return platform.machine()
+    lines = (line.partition(":") for line in first.splitlines())
+    return ", ".join(value.strip() for key, _, value in lines if key.strip() in keys)
 
 
 def _candidates() -> Iterator[Path]:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from .drawings.csv_and_json import read_csv, read_json
 from .drawings.drawing import Drawing
 from .drawings.dxf import read_dxf
 from .drawings.geojson import read_geojson
 from .drawings.svg import read_svg
-from .drawings.tables import read_csv, read_json
-from .drawings.walls import to_map
+from .drawings.walls.to_map import to_map
 from .errors import MalformedFileError, UnsupportedFormatError
 from .files import name_of
 from .grids.cells import Grid, picture_of

@@ -13,10 +13,10 @@ import orjson
 from ezdxf import units
 from ezdxf.filemanagement import new
 
+from .drawings.csv_and_json import COLUMNS
 from .drawings.dxf import FREE_LEFT
 from .drawings.geojson import OWN
 from .drawings.svg import METRES, NAMESPACE, ORIENTED
-from .drawings.tables import COLUMNS
 from .errors import UnsupportedFormatError
 from .files import name_of
 from .line_map import LineMap

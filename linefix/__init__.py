@@ -47,7 +47,7 @@ from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions
 from .checking import CheckedMap, check
 from .explaining import explain
 from .locating import index_map, index_maps, locate, scan_of
-from .mounted import MountedScan, view_of
+from .ranges import MountedScan, view_of
 from .updating import update_map
 
 if TYPE_CHECKING:

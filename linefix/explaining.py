@@ -14,7 +14,7 @@ from vectorization import LaserScan
 
 from .answers import Json, pose_json
 from .locating import prepared, scan_of
-from .mounted import MountedScan
+from .ranges import MountedScan
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap

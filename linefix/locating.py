@@ -27,7 +27,7 @@ from association import (
 from registration import InvalidArgumentError, MeasuredSegments, Segments
 from vectorization import LaserScan
 
-from .mounted import MountedScan, ranges_scan, view_of
+from .ranges import MountedScan, ranges_scan, view_of
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap

@@ -12,7 +12,7 @@ from registration import InvalidArgumentError, Segments
 from vectorization import LaserScan
 
 from .locating import index_map, scan_of
-from .mounted import MountedScan, RangeScan
+from .ranges import MountedScan, RangeScan
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -12,7 +12,7 @@ import linefix
 from formats.logs.lasers import laser_of
 from formats.logs.sensors import time_increment_of
 from formats.report import Notes
-from linefix.mounted import motion_warning
+from linefix.ranges import motion_warning
 from registration import RigidTransform
 
 from .messages import LaserScan, Time

@@ -23,9 +23,9 @@ from .admission.keys import Keyring
 from .admission.origins import Origins
 from .admission.readiness import Readiness
 from .http.bodies import BodyReceiver
+from .http.middleware import RequestMiddleware
 from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
-from .http.reception import Reception
 from .http.refusing import handle_errors
 from .http.routes import (
     analyze,
@@ -116,7 +116,7 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started | None =
             ),
             expose_headers=("ETag", "Retry-After", "X-Request-Id"),
         )
-    app.add_middleware(Reception, services=services)
+    app.add_middleware(RequestMiddleware, services=services)
     return app
 
 

@@ -15,7 +15,6 @@ from ..context import SearchContext
 from ..deadline import CancelledError
 from ..layout import ESTIMATE, MATCH, SET_SCORE, Integers
 from ..options import MapsPrior
-from ..search.candidates import Candidates
 from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, FEW_KEPT, INSIDE, MOST_LOOKED_AT
 from .beams import beam_evidence_at, beam_score
 from .consensus_set import ConsensusSet, poses_of
@@ -50,8 +49,8 @@ class _Scored:
         return _Scored(self.estimates[places], self.scores[places], self.matches[places])
 
 
-def rank_candidates(context: SearchContext, candidates: Candidates) -> list[ConsensusSet]:
-    """Rank the poses of a search as scored consensus sets.
+def rank_candidates(context: SearchContext, poses: Records) -> list[ConsensusSet]:
+    """Rank the poses of a search, (k,) with the fields of `POSE`, as scored consensus sets.
 
     1. Match the scan at each pose, refine pose and set, and score the set with the lines of sight.
     2. With raw beams: add their evidence, and move the best poses to where the beams fit.
@@ -68,9 +67,9 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Cons
     CancelledError
         When the deadline was cancelled.
     """
-    if not len(candidates.poses):
+    if not len(poses):
         return []
-    scored = _score(context, _estimates_of(candidates))
+    scored = _score(context, _estimates_of(poses))
     if context.with_beams:
         scored = _add_beams(context, scored)
     bonuses = NO_PRIOR if context.prior is None else _prior_values(context, scored.estimates)
@@ -79,11 +78,11 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Cons
     return [_consensus_set(context, scored, bonuses, k) for k in order.tolist()]
 
 
-def _estimates_of(candidates: Candidates) -> Records:
-    """Return the poses of a search, (k,) of `ESTIMATE`, without a covariance."""
-    estimates = np.zeros(len(candidates.poses), ESTIMATE)
+def _estimates_of(poses: Records) -> Records:
+    """Return poses as (k,) of `ESTIMATE`, without a covariance."""
+    estimates = np.zeros(len(poses), ESTIMATE)
     for name in ("theta", "x", "y"):
-        estimates[name] = candidates.poses[name]
+        estimates[name] = poses[name]
     return estimates
 
 

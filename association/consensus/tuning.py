@@ -3,6 +3,8 @@
 The origins are explained in `association.tuning`.
 """
 
+from ..tuning import GAIN
+
 # --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
 
 # Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
@@ -73,7 +75,7 @@ BEAM_FINALISTS = 32  # tables
 LATE_CANDIDATES = 16
 LATE_FINALISTS = 2
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
-BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
+BEAMS_PASSED = 0.5 * BEAMS_READ  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
 CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
 BEHIND = 2.0  # m, tables; how far behind a reading a wall is looked for
@@ -101,7 +103,7 @@ MAX_OTHERS = 8  # map segments named in addition to the one that a scan segment 
 MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
 MIN_EXTENT = 1e-9  # m, rounding; least length that a segment along a wall counts as
 
-CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
+CONTRADICTION = GAIN  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls
 
 # --- Similarity: a pose together with a factor ------------------------------------------------------------------------

@@ -17,9 +17,19 @@ from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from ..tuning import WHOLE_GAP
-from .grids import crossing_chains, directions_near, near_walls, swept_chains
-from .tuning import BLENDED_SIGMAS, BLENDED_STEP, LEAST_ONE_LINE, MAX_EXTENT, MAX_MAP_SIGMA, ONE_LINE, ONE_LINE_SHARE
-from .walls import blended, both_ways, chains_of, merge, tie
+from .grids import crossing_chains, directions_near, field_shape, near_walls, swept_chains
+from .likelihood_field import LikelihoodField, likelihood_field
+from .tuning import (
+    BLENDED_SIGMAS,
+    BLENDED_STEP,
+    FIELD_LEVELS,
+    LEAST_DIFFERENCE,
+    MAX_EXTENT,
+    MAX_MAP_SIGMA,
+    ONE_LINE,
+    ONE_LINE_SHARE,
+)
+from .walls import blended, both_ways, chains_of, ends_of, merge, tie
 
 Floats = NDArray[np.float64]
 
@@ -165,6 +175,11 @@ class MapIndex:
         return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed, deadline)
 
     @cached_property
+    def likelihood_field(self) -> LikelihoodField | None:
+        """The likelihood field of the walls; None if the map is too large for one."""
+        return likelihood_field(self.walls)
+
+    @cached_property
     def wall_lengths(self) -> WallLengths:
         """The lengths of its walls."""
         lengths = np.sort(self.walls.longest)
@@ -228,7 +243,7 @@ class MapIndex:
 
     @property
     def nbytes(self) -> int:
-        """Memory held, bytes."""
+        """Memory held, bytes; with that of the likelihood field, which the first scan that needs it computes."""
         tables: list[Any] = [
             self.pieces,
             self.walls,
@@ -240,9 +255,10 @@ class MapIndex:
         ]
         tables.append((self.sweep.chains, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
-        return sum(
-            array.nbytes for array in [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
-        )
+        shape = field_shape(ends_of(self.walls))
+        of_field = 0 if shape is None else FIELD_LEVELS * int(shape["rows"][0] * shape["columns"][0])
+        arrays = [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
+        return of_field + sum(int(array.nbytes) for array in arrays)
 
 
 def tables_of(
@@ -255,7 +271,7 @@ def tables_of(
     IndexingEndedError
         When the deadline passes, or is cancelled, first.
     """
-    one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
+    one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_DIFFERENCE, ONE_LINE_SHARE * sigma))
     walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
     blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
     if blends > one_line:

@@ -12,7 +12,7 @@ MAX_EXTENT = 1e5  # m; the contract
 MAX_MAP_SIGMA = 10.0  # m; the contract
 # Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
 ONE_LINE = 1e-4  # m, rounding
-LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is declared exact
+LEAST_DIFFERENCE = 1e-6  # m, rounding; walls whose offsets or lengths differ by less are equal in them
 ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
 # Walls that continue one another with a small step are put on a common line: the larger the step, the less, and from
 # here on not at all.
@@ -65,3 +65,11 @@ MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
 FEW_CHAINS = 500  # at least so many chains count; tables: in a room all pairs are listed
 CROSSING_SAMPLE = 128  # chains by which these numbers are estimated; measured: to a fifth, by 32 to a third;
 CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
+
+# --- Likelihood field -------------------------------------------------------------------------------------------------
+
+FIELD_CELL = 0.2  # m, tables; half of it takes three times as long, and finds the same
+FIELD_DEVIATION = 0.75 * FIELD_CELL  # m, tables; of a point from its wall, at half a cell and half a heading off
+FIELD_REACH = 3.0 * FIELD_CELL  # m; four deviations, beyond which nothing is left of the likelihood
+FIELD_LEVELS = 6  # geometry; the highest has blocks of 32 cells
+MOST_FIELD_CELLS = MAX_SWEEP_CELLS  # memory: 6 MB; a square of 200 m

@@ -20,7 +20,16 @@ from ..layout import ENDS, POINT, WALL, Integers, as_records
 from ..tables import JoinGates, Walls
 from ..tuning import APART_STEP, BASE_SLACK, BASE_SLACK_SHARE, DIRECTION_BINS
 from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
-from .tuning import BEGIN_CELL, CHAIN_GAP, LINK_GAP, MERGE_ANGLE, MERGE_GAP, MERGE_LATERAL, PIECES_A_LOOK
+from .tuning import (
+    BEGIN_CELL,
+    CHAIN_GAP,
+    LEAST_DIFFERENCE,
+    LINK_GAP,
+    MERGE_ANGLE,
+    MERGE_GAP,
+    MERGE_LATERAL,
+    PIECES_A_LOOK,
+)
 
 Floats = NDArray[np.float64]
 
@@ -115,14 +124,18 @@ def _lines(local: Segments, labels: Integers) -> tuple[NDArray[np.intp], _Lines]
 
 
 def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Walls, Integers]:
-    """Order the lines by direction bin, the longest of a bin first, as far as their pieces reach."""
+    """Order the lines by direction bin, the longest of a bin first, as far as their pieces reach.
+
+    Lines whose lengths are equal to `LEAST_DIFFERENCE` keep their order. The last bits of a length differ between
+    processors, and must not decide it.
+    """
     m, d = len(lines), lines.directions
     begins, ends = np.full(m, np.inf), np.full(m, -np.inf)
     np.minimum.at(begins, wall, np.einsum("ij,ij->i", d[wall], local.endpoints[:, :2]))
     np.maximum.at(ends, wall, np.einsum("ij,ij->i", d[wall], local.endpoints[:, 2:]))
     angles = np.arctan2(d[:, 1], d[:, 0])
     bins = direction_bin(angles)
-    order = np.lexsort((np.arange(m), begins - ends, bins))
+    order = np.lexsort((np.arange(m), -np.rint((ends - begins) / LEAST_DIFFERENCE), bins))
     rows = np.zeros(m, WALL)
     columns = (d[:, 0], d[:, 1], lines.offsets, begins, ends, angles)
     for name, values in zip(("dx", "dy", "offset", "begin", "end", "angle"), columns, strict=True):

@@ -4,6 +4,9 @@ Origins: *geometry* follows from what the number means; *tables* was chosen by t
 floor plans and logs, and little changes near it; *measured* is a fit or a timing; *rounding* keeps arithmetic sound.
 """
 
+from ..consensus.tuning import CERTAIN
+from ..tuning import DISTINCT_ANGLE, RIVAL_SHARE
+
 # --- Bases ------------------------------------------------------------------------------------------------------------
 
 BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the longest segments; and, in scans of more,
@@ -17,16 +20,15 @@ CROSSING_MARGIN = 1e-3  # m, rounding; of the lists of crossings
 MOST_LISTS = 256  # for one base; it is swept where there are more. Measured: at most one base in a thousand
 WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 WINDOW_MARGIN = 0.5  # m, tables, and
-WINDOW_TURN = 0.1  # rad, tables; a pose farther outside a hard prior's window is not refined into it
+WINDOW_TURN = DISTINCT_ANGLE  # rad, tables; a pose farther outside a hard prior's window is not refined into it
 
 # --- Slides of parallel segments --------------------------------------------------------------------------------------
 
 SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
 SLIDE_SPACING = 2.0  # m, tables; the pose found stands for the family along the walls
-SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; beams then fix the position along them
+SLIDE_SPACING_FOR_BEAMS = 0.25 * SLIDE_SPACING  # m, tables; beams then fix the position along them
 SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are distinct
 PARALLEL_SINE = 0.1  # tables
-KEPT_SLIDES = 64  # poses, tables
 
 # --- Order of the bases -----------------------------------------------------------------------------------------------
 
@@ -57,7 +59,17 @@ SAMPLE_SEED = 20190901
 # --- Best poses -------------------------------------------------------------------------------------------------------
 
 KEPT = 64  # poses, tables
+KEPT_SLIDES = KEPT  # poses, tables
 KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternatives
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5
+
+# --- Branch and bound over the ends of beams --------------------------------------------------------------------------
+
+# Fractions of the places where beams end, by the likelihood of the map's field there, 0 to 1.
+WELL_EXPLAINED = 0.6  # tables; with more at one of the poses, no more is searched
+FIELD_LEAST = RIVAL_SHARE * WELL_EXPLAINED  # tables; with less, poses in other buildings explain a scan as well
+FIELD_GAP = 0.05  # tables; a pose farther behind the best one is not kept
+FIELD_POINTS = 80  # tables; of a scan
+END_SQUARE = CERTAIN  # m, tables; ends of beams within one such square count as one

@@ -88,10 +88,10 @@ def find_null_score(context: SearchContext, best: ConsensusSet, least: float = 0
     other, wanted = _mirrored(context), least * best.score
     near, whole = _efforts(context, best, wanted)
     if near is not None:
-        found = rank_candidates(other, find_candidates(other, near))
+        found = rank_candidates(other, find_candidates(other, near).poses)
         if not found or found[0].score < wanted:
             return NO_NULL_SCORE
-    found = rank_candidates(other, find_candidates(other, whole))
+    found = rank_candidates(other, find_candidates(other, whole).poses)
     return NullScore(found[0].score, symmetry_of(context, best, found[0])) if found else NO_NULL_SCORE
 
 

@@ -12,6 +12,7 @@ from ..consensus.ranking import with_lines_of_sight
 from ..context import SearchContext
 from ..explanations import Answer, Explanations
 from ..result import Reason, Status
+from .displaced_walls import displaced_walls
 from .features import Description, describe_answer
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import SENTENCES, Doubts, reasons_of
@@ -158,6 +159,7 @@ def findings_of(
         in_step=answer.beams.in_step,
         off_scale=off_scale,
         beyond_tolerance=beyond_tolerance(context, answer),
+        displaced_walls=displaced_walls(context, answer.best),
     )
 
 

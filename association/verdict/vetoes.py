@@ -14,7 +14,7 @@ from registration.values import value
 
 from ..consensus.tuning import CONTRADICTION
 from ..result import ReasonCode, Status
-from .tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND
+from .tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND, MOST_DISPLACED
 
 
 @value(frozen=True, slots=True)
@@ -43,6 +43,8 @@ class Findings:
         True if scan and map differ by a factor that is too great to be corrected.
     beyond_tolerance : float
         Probability by the covariance that the pose is off by more than `TOLERANCE`, 0 to 1.
+    displaced_walls : float
+        Fraction of the scan's length that is parallel to walls of the map, at 0.1 to 0.35 m from them; 0 to 1.
     mirrored_better : float
         Score of the mirrored scan over the answer's, less 1; 0 where it is less, or was not searched.
     """
@@ -57,6 +59,7 @@ class Findings:
     in_step: float = 1.0
     off_scale: bool = False
     beyond_tolerance: float = 0.0
+    displaced_walls: float = 0.0
     mirrored_better: float = 0.0
 
 
@@ -113,6 +116,10 @@ OFF_SCALE = (
 IMPRECISE = (
     "The walls in view determine the pose too roughly: it may be off by more than 0.3 m or 3 degrees. Scan from "
     "another place."
+)
+DISPLACED = (
+    "Much of the scan is parallel to walls of the map, at one to three decimetres from them. Check the map: it may be "
+    "distorted, or show the middle of the walls."
 )
 BETTER_ELSEWHERE = Veto(
     "better_elsewhere",
@@ -178,6 +185,16 @@ OFF_ITS_SCALE = Veto(
     counts_with=frozenset({Status.AMBIGUOUS}),
     message=OFF_SCALE,
 )
+DISPLACED_WALLS = Veto(
+    "displaced_walls",
+    lambda found: found.displaced_walls > MOST_DISPLACED,
+    ("map_mismatch",),
+    Origin.MEASURED,
+    caps=Status.AMBIGUOUS,
+    counts_with=frozenset({Status.AMBIGUOUS}),
+    settles=True,
+    message=DISPLACED,
+)
 MIRRORED_FITS_BETTER = Veto(
     "mirrored",
     lambda found: found.mirrored_better >= MIRRORED_BETTER,
@@ -198,6 +215,7 @@ VETOES: tuple[Veto, ...] = (
     TOO_ROUGH,
     OUT_OF_STEP,
     OFF_ITS_SCALE,
+    DISPLACED_WALLS,
     MIRRORED_FITS_BETTER,
 )
 

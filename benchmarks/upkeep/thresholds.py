@@ -23,8 +23,8 @@ from registration import RigidTransform
 from simulation import FAMILIES
 
 from ..outcomes import progress
-from ..sensitivity import MOVED
 from ..table import print_table
+from ..threshold_effects import MOVED
 from ..thresholds import Threshold, moved, thresholds
 from .grids import grid_map
 from .judging import Judged, judge

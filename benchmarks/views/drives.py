@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import Scan, View, assemble
-from linefix.mounted import ranges_scan
+from linefix.ranges import ranges_scan
 from registration import RigidTransform, Segments
 from simulation import CONDITIONS, Case, Scanner, scan
 from simulation.conditions import Stranger

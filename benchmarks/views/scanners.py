@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from association import MapIndex, Scan, View, assemble
-from linefix.mounted import ranges_scan
+from linefix.ranges import ranges_scan
 from registration import RigidTransform, Segments
 from simulation import Scanner, free_place, scan
 from simulation.changes import clutter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +18,7 @@ from ..contract import Json
 from ..errors import WrongUseError
 from ..inputs import line_map_of, needing_formats, read_map_or_id
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
-from ..options import AsJson, MapArgument, Picture, Server
+from ..options import AsJson, MapArgument, Picture, Server, grouped
 from ..printing import print_json, print_rows
 from .drawing import write_document
 
@@ -28,37 +28,49 @@ if TYPE_CHECKING:
 SCANS = 200  # of a log; more cost time, and say the same again
 
 
-def update(
-    on: MapArgument,
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="A log of each visit; changes need two visits.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the new map to this file: json, dxf, svg, geojson or csv."),
-    ] = None,
-    picture: Picture = None,
+@dataclass(frozen=True, slots=True)
+class ChangeOptions:
+    """Which changes to accept."""
+
     accept: Annotated[
         float | None,
         typer.Option(
             metavar="CONFIDENCE", min=0.0, max=1.0, help="Leave changes of less confidence out. Default: accept all."
         ),
-    ] = None,
+    ] = None
     refuse: Annotated[
         list[int] | None, typer.Option(metavar="INDEX", help="Leave this change out; repeat for more changes.")
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class LogOptions:
+    """Which scans to read of each log."""
+
+    scans: Annotated[int, typer.Option(metavar="N", min=3, help="Use so many scans of each log at most.")] = SCANS
+    topic: Topic = None
+    tf_namespace: TfNamespace = None
+
+
+@grouped
+def update(
+    on: MapArgument,
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="A log of each visit; changes need two visits.")],
+    *,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the new map to this file: json, dxf, svg, geojson or csv."),
     ] = None,
-    scans: Annotated[int, typer.Option(metavar="N", min=3, help="Use so many scans of each log at most.")] = SCANS,
-    topic: Topic = None,
-    tf_namespace: TfNamespace = None,
+    picture: Picture = None,
+    changes: ChangeOptions,
+    source: LogOptions,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Propose changes of a map that the scans of several visits show, and write the new map."""
     target = read_map_or_id(on)
-    visits = dict(zip(visit_names(logs), (_scans(log, topic, tf_namespace, scans) for log in logs), strict=True))
-    if server is None:
-        answer = here.update(target, visits, accept, tuple(refuse or ()))
-    else:
-        with closing(server_at(server)) as remote:
-            answer = remote.update(target, _request_of(visits, accept, refuse or []))
+    visits = dict(zip(visit_names(logs), (_scans(log, source) for log in logs), strict=True))
+    answer = _proposed(target, visits, changes, server)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
@@ -69,11 +81,21 @@ def update(
         print_rows(list(update_rows(answer)))
 
 
-def _request_of(visits: Mapping[str, Sequence[LoggedScan]], accept: float | None, refuse: Sequence[int]) -> Json:
+def _proposed(
+    target: Json, visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions, server: str | None
+) -> Json:
+    """Return the proposal, computed here or by a server."""
+    if server is None:
+        return here.update(target, visits, changes.accept, tuple(changes.refuse or ()))
+    with closing(server_at(server)) as remote:
+        return remote.update(target, _request_of(visits, changes))
+
+
+def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
     """Return a request for an update; poses are those of the sensor, so that mounts make no difference."""
     sent_visits = [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]
-    request: Json = {"visits": sent_visits, "refuse": list(refuse)}
-    return request if accept is None else {**request, "accept": accept}
+    request: Json = {"visits": sent_visits, "refuse": changes.refuse or []}
+    return request if changes.accept is None else {**request, "accept": changes.accept}
 
 
 def _sent(one: LoggedScan) -> Json:
@@ -106,11 +128,11 @@ def visit_names(logs: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(log) for log in logs]
 
 
-def _scans(log: Path, topic: str | None, tf_namespace: str | None, most: int) -> list[LoggedScan]:
+def _scans(log: Path, source: LogOptions) -> list[LoggedScan]:
     """Return some scans of a log, evenly over all of it; print on stderr what was made of the log."""
-    source = opened(log, options_of(topic, tf_namespace))
-    taken = thinned(scans_of(source), most)
-    print_notes(source, sys.stderr)
+    read = opened(log, options_of(source.topic, source.tf_namespace))
+    taken = thinned(scans_of(read), source.scans)
+    print_notes(read, sys.stderr)
     return taken
 
 
@@ -135,7 +157,7 @@ def update_by_drive(document: Json, log: Path) -> Json:
     RefusedError
         When the log, or a scan, is not taken.
     """
-    scans = _scans(log, None, None, 2 * SCANS)
+    scans = _scans(log, LogOptions(scans=2 * SCANS))
     half = len(scans) // 2
     halves = {"first half": scans[:half], "second half": scans[half:]}
     return here.update(document, halves, None, ())

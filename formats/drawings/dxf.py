@@ -27,8 +27,8 @@ from ..files import name_of, read_bounded
 from ..limits import MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
 from ..options import ImportOptions
 from ..report import Notes, listed, shown
-from .blocks import Expansion
 from .drawing import Drawing
+from .dxf_blocks import Expansion
 
 if TYPE_CHECKING:
     from ezdxf.audit import Auditor

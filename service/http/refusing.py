@@ -16,7 +16,7 @@ from ..schemas.faults import faults_of
 from .errors import BodyBrokenError, MethodNotAllowedError, NotFoundError, RefusedError
 from .exchange import state_of
 from .problems import INTERNAL, RAISED, problem_of
-from .searching import HangUpError
+from .search_stage import HangUpError
 
 logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
@@ -59,9 +59,7 @@ def _own(request: Request, error: Exception) -> Exception:
 
 def _methods_of(request: Request) -> list[str]:
     """Return the methods of the path; the framework names the methods of one route only."""
-    every = [getattr(included, "original_router", None) or included for included in request.app.routes]
-    routes = [route for one in every for route in getattr(one, "routes", [one])]
-    matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
+    matching = (route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE)
     methods = {method for route in matching for method in getattr(route, "methods", ())}
     return sorted(methods | {"HEAD"} if "GET" in methods else methods)
 

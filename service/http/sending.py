@@ -17,7 +17,7 @@ from association import Deadline
 
 from ..work.job import Done
 from .exchange import Exchange, state_of
-from .searching import unless_hung_up
+from .search_stage import unless_hung_up
 from .services import services_of
 
 PIECE = 32_768  # bytes; the server holds a few

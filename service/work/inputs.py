@@ -35,7 +35,7 @@ from ..schemas.parts import (
 from ..schemas.requests import CheckRequest, RegisterRequest
 from ..schemas.strict import Pose
 from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
-from .scanning import Scanned, range_scan, scan_points, view_laser, viewpoint_of
+from .scans import Scanned, range_scan, scan_points, view_laser, viewpoint_of
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from linefix.answers import Json, vectorization_json
-from linefix.mounted import motion_warning
+from linefix.ranges import motion_warning
 from vectorization import VectorizationOptions
 
 from ..schemas.requests import VectorizeRequest
 from .job import Done, Job
-from .scanning import range_scan, vectorize_laser, vectorize_points, viewpoint_of
+from .scans import range_scan, vectorize_laser, vectorize_points, viewpoint_of
 
 _PLACES = ("", "/options")  # where scan and options stand in the request
 

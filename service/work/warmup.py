@@ -22,7 +22,10 @@ from association import (
 from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
-from association.explain import explain_at
+from association.explain import NOT_SEARCHED, explain_at
+from association.layout import FOUND
+from association.search.branch_and_bound import add_point_matches
+from association.search.candidates import Candidates
 from association.verdict.absences import absences
 from association.verdict.chance import symmetry_of
 from association.verdict.verdict import judge
@@ -169,6 +172,7 @@ def warm_up_searching() -> None:
     answer = explain_at(context, RigidTransform(0, 0, 0)).answer
     assert answer is not None
     absences(context, answer.best, [answer.best])
+    add_point_matches(context, Candidates(np.zeros(0, FOUND), NOT_SEARCHED))
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())

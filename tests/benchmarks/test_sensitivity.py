@@ -15,10 +15,11 @@ from association import AssociationOptions, MapIndex, Scan
 from association.scan import tuning as scan_tuning
 from association.scan.scan_lines import gates
 from association.verdict import probabilities, tuning
-from benchmarks import sensitivity
+from benchmarks import threshold_effects
 from benchmarks.compiled_thresholds import dependent_kernels
 from benchmarks.examples import Case
-from benchmarks.sensitivity import Effect, Sampled, Told, effect_of, effects
+from benchmarks.sensitivity import effects
+from benchmarks.threshold_effects import Effect, Sampled, Told, effect_of
 from benchmarks.thresholds import Threshold, moved, readers, thresholds
 from registration import MeasuredSegments, RigidTransform, Segments
 
@@ -69,11 +70,11 @@ def test_every_reader_sees_the_moved_value_and_the_former_one_afterwards() -> No
 
 
 def test_the_sample_has_scans_with_and_without_ranges() -> None:
-    drawn = list(islice(sensitivity.draw(), 12))
+    drawn = list(islice(threshold_effects.draw(), 12))
     assert {one.with_beams for one in drawn} == {False, True}
     assert [one.number for one in drawn] == list(range(12))
     assert any(one.prior is not None for one in drawn)
-    again = sensitivity.sample_of([3, 7])
+    again = threshold_effects.sample_of([3, 7])
     assert [one.number for one in again] == [3, 7]
     assert again[0].case.group == drawn[3].case.group
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import linefix
-from linefix import checking, explaining, locating, mounted
+from linefix import checking, explaining, locating, ranges
 
 ROOT = Path(linefix.__file__).parent.parent
 
@@ -26,7 +26,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "importlib",
         "locating",
         "map_answers",
-        "mounted",
+        "ranges",
         "updating",
         "Any",
         "TYPE_CHECKING",
@@ -46,7 +46,7 @@ def test_every_name_says_what_it_is(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", [linefix, checking, explaining, locating, mounted], ids=lambda module: module.__name__
+    "module", [linefix, checking, explaining, locating, ranges], ids=lambda module: module.__name__
 )
 def test_examples_give_what_they_show(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]

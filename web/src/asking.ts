@@ -7,7 +7,7 @@ import type { Alternative, Answer } from "./types";
 import { showProblem, showWaiting } from "./verdict";
 
 const NEAR = { radius: 1, angle: Math.PI / 6 };
-const AS_WELL = 5; // nats, as in association/words.py: within them another pose fits about as well
+const AS_WELL = 5; // nats, as in association/messages.py: within them another pose fits about as well
 const AGAIN = 1000; // ms until the next request to a service that is not ready yet
 let running: AbortController | null = null;
 let due = 0;

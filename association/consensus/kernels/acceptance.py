@@ -8,9 +8,9 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import BLOCKER, PAIR, Indices
+from ...scan.kernels.ordering import ascending
 from ...tables import Blockers, Lines, Pieces, PiecesAlong, Place, Sights, Workspace
 from ..tuning import BLOCKING_RAYS, MAX_OTHERS, MIN_EXTENT, MOST_UNDER
-from .ordering import ascending
 from .sight import count_blockers
 
 

@@ -9,7 +9,7 @@ from ...index.kernels.walls import fade
 from ...tables import Place
 from ..tuning import FLAT_GATE, MOST_BRIDGED, OVERLAP_TAPER, WHOLE_SCORE
 from .geometry import angle_gate, bins_about, cell_about, offset_gate, rotated
-from .wall_chains import Line, follow_both_ways
+from .wall_chains import Cover, Line, follow_both_ways
 
 SUM_SLACK = 1e-9  # nats, rounding
 
@@ -20,13 +20,13 @@ def match_scan(
 ) -> float:
     """Match every scan line to the wall that it lies on best, the lines of the greatest gain first.
 
-    1. List the walls near the midpoint of the line, by the grid.
-    2. Take those of its direction, within the gates of offset and angle.
-    3. Measure how much of the line they cover, with their neighbours on the chain.
-    4. Keep the one that is least in offset over gate plus missing overlap.
+    1. List the walls near the midpoint of the line, by the grid (`cell_of`).
+    2. Take those of its direction (`bins_about`), within the gates of offset and angle (`lay_on_wall`).
+    3. Measure how much of the line they cover, with their neighbours on the chain (`follow_both_ways`).
+    4. Keep the one that is least in offset over gate plus missing overlap (`misfit_of`, `write_match`).
 
-    Handing on arrays costs more than the work, because Numba counts references to each: what is called here for each
-    wall takes records and numbers.
+    The loops stay together, and the steps take records and numbers: a step that takes arrays costs more than its work,
+    because Numba counts references to each.
 
     Parameters
     ----------
@@ -52,62 +52,81 @@ def match_scan(
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
-    c = math.cos(estimate.theta)
-    s = math.sin(estimate.theta)
+    rotation = (math.cos(estimate.theta), math.sin(estimate.theta))
     total = 0.0
-    left = SUM_SLACK
-    for i in range(len(scan)):
-        left += max(0.0, possible[i])
+    left = greatest_total(possible)
     for i in range(len(scan)):
         match = matches[i]
         clear_match(match)
         if possible[i] < 0.0:
             continue
         left -= possible[i]
-        seen = scan[i]
-        gx, gy = rotated(seen.x, seen.y, c, s)
-        dx, dy = rotated(seen.dx, seen.dy, c, s)
-        here = cell_about(shape, gx + estimate.x, gy + estimate.y)
-        if here >= 0 and starts[here] < starts[here + 1]:
-            across = offset_gate(seen, estimate, gates, dx * gx + dy * gy, dx, dy)
-            turned = angle_gate(seen, estimate.tt, gates)
-            line = (gx + estimate.x, gy + estimate.y, dx, dy, seen.length, across)
-            cos_gate = 1.0 - 0.5 * turned * turned
-            # Walls are numbered by direction: those of its direction are some in a row, from `first` on.
-            lowest, highest = bins_about(estimate.theta + seen.angle, turned)
+        cell = cell_of(scan[i], estimate, rotation, shape)
+        if cell >= 0 and starts[cell] < starts[cell + 1]:
+            line, angle = on_map(scan[i], estimate, rotation, gates)
+            lowest, highest = bins_about(estimate.theta + scan[i].angle, angle)
             first = bin_starts[lowest]
-            span = bin_starts[highest + 1] - first + (len(walls) if highest < lowest else 0)
+            end = bin_starts[highest + 1] + (len(walls) if highest < lowest else 0)
             least = 1e300
-            left_to_follow = MOST_BRIDGED
-            for k in range(starts[here], starts[here + 1]):
+            to_follow = MOST_BRIDGED
+            for k in range(starts[cell], starts[cell + 1]):
                 w = items[k]
-                if w - first + (len(walls) if w < first else 0) >= span:
+                if number_from(first, w, len(walls)) >= end:
                     continue
-                offset, low, high = lay_on_wall(walls[w], line, cos_gate)
+                offset, low, high = lay_on_wall(walls[w], line, 1.0 - 0.5 * angle * angle)
                 if high <= low:
                     continue
+                cover = (high - low, high - low, 0.0, 0.0)
                 if continues(walls[w], low, high, line):
-                    counted, covered, aside, squared, left_to_follow = follow_both_ways(
-                        walls, w, line, low, high, left_to_follow
-                    )
-                else:
-                    counted, covered, aside, squared = high - low, high - low, 0.0, 0.0
-                overlap = min(1.0, counted / line[4])
-                shift = aside / covered
-                misfit = abs(offset - shift) / across + 1.0 - overlap
-                if overlap >= gates.least_overlap and misfit < least:
+                    cover, to_follow = follow_both_ways(walls, w, line, low, high, to_follow)
+                misfit = misfit_of(line, offset, cover)
+                if overlap_of(line, cover) >= gates.least_overlap and misfit < least:
                     least = misfit
                     match.wall = w
-                    match.overlap = overlap
-                    match.offset = offset - shift
-                    match.shift = shift
-                    match.uneven = max(0.0, squared / covered - shift * shift)
-                    match.sine = dx * walls[w].dy - dy * walls[w].dx
-                    match.gain = gain_of(seen, match, gates, offset, across, turned)
+                    write_match(match, scan[i], line, walls[w], offset, cover, gates, angle)
         total += match.gain
         if total + left < threshold:
             break
     return -1.0 if total < threshold else total
+
+
+@kernel
+def greatest_total(possible: Floats) -> float:
+    """Return the greatest possible sum of the gains of all lines (n,), nats."""
+    total = SUM_SLACK
+    for i in range(len(possible)):
+        total += max(0.0, possible[i])
+    return total
+
+
+@kernel
+def cell_of(seen: Record, estimate: Record, rotation: tuple[float, float], shape: Record) -> int:
+    """Return the number of the grid cell that contains the midpoint of a scan line at a pose, -1 outside of the grid.
+
+    `rotation` is the cosine and the sine of the pose's heading.
+    """
+    x, y = rotated(seen.x, seen.y, rotation[0], rotation[1])
+    return cell_about(shape, x + estimate.x, y + estimate.y)
+
+
+@kernel
+def on_map(seen: Record, estimate: Record, rotation: tuple[float, float], gates: Record) -> tuple[Line, float]:
+    """Return a scan line at a pose, with its gate of the offset from a wall; and that of the angle to a wall, rad."""
+    c, s = rotation
+    x, y = rotated(seen.x, seen.y, c, s)
+    dx, dy = rotated(seen.dx, seen.dy, c, s)
+    across = offset_gate(seen, estimate, gates, dx * x + dy * y, dx, dy)
+    line = (x + estimate.x, y + estimate.y, dx, dy, seen.length, across)
+    return line, angle_gate(seen, estimate.tt, gates)
+
+
+@kernel
+def number_from(first: int, w: int, count: int) -> int:
+    """Return the number of wall `w` where numbers go on from `first`, after the last of `count` with those from 0 on.
+
+    Walls are numbered by direction: those of about a direction follow one another.
+    """
+    return w + (count if w < first else 0)
 
 
 @kernel
@@ -122,7 +141,7 @@ def clear_match(match: Record) -> None:
 def lay_on_wall(wall: Record, line: Line, cos_gate: float) -> tuple[float, float, float]:
     """Return the offset of a line from a wall, and between which abscissae from its midpoint it lies on that, metres.
 
-    `line` as of `follow_chain`. Beyond its gate, or where the cosine of the angle between both is less than `cos_gate`,
+    Beyond its gate, or where the cosine of the angle between both is less than `cos_gate`,
     it lies on nothing of the wall: then these are all 0.
     """
     x, y, dx, dy, length, gate = line
@@ -142,16 +161,51 @@ def continues(wall: Record, low: float, high: float, line: Line) -> bool:
 
 
 @kernel
-def gain_of(line: Record, match: Record, gates: Record, offset: float, across: float, turned: float) -> float:
+def overlap_of(line: Line, cover: Cover) -> float:
+    """Return which fraction of a line counts as covered, at most 1."""
+    return min(1.0, cover[0] / line[4])
+
+
+@kernel
+def misfit_of(line: Line, offset: float, cover: Cover) -> float:
+    """Return the misfit of a line on a wall: its offset from what covers it, over the gate, and the missing overlap."""
+    return abs(offset - cover[2] / cover[1]) / line[5] + 1.0 - overlap_of(line, cover)
+
+
+@kernel
+def write_match(
+    match: Record,
+    seen: Record,
+    line: Line,
+    wall: Record,
+    offset: float,
+    cover: Cover,
+    gates: Record,
+    angle: float,
+) -> None:
+    """Write how a scan line lies on a wall: at an offset from it, m, where `angle` is the gate of the angle, rad."""
+    _, _, dx, dy, _, across = line
+    _, covered, aside, squared = cover
+    shift = aside / covered
+    match.overlap = overlap_of(line, cover)
+    match.offset = offset - shift
+    match.shift = shift
+    match.uneven = max(0.0, squared / covered - shift * shift)
+    match.sine = dx * wall.dy - dy * wall.dx
+    match.gain = gain_of(seen, match, gates, offset, across, angle)
+
+
+@kernel
+def gain_of(line: Record, match: Record, gates: Record, offset: float, across: float, angle: float) -> float:
     """Return the gain of a match, nats: by the overlap, and nothing at a gate, so that no gate decides.
 
-    `offset` is that from the wall itself; `across` and `turned` are the gates, m and rad.
+    `offset` is that from the wall itself; `across` and `angle` are the gates, m and rad.
     """
     taper = min(OVERLAP_TAPER, 1.0 - gates.least_overlap)
     gain = line.gain * match.overlap
     gain *= min(1.0, (match.overlap - gates.least_overlap) / taper)
     gain *= fade(abs(offset), FLAT_GATE * across, across)
-    gain *= fade(abs(match.sine), FLAT_GATE * turned, turned)
+    gain *= fade(abs(match.sine), FLAT_GATE * angle, angle)
     return gain
 
 

@@ -9,11 +9,11 @@ from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Record, Records
 
 from ...layout import BLOCKER, Integers
+from ...scan.kernels.ordering import ascending
 from ...tables import Blockers, Place, Question, Sights, Workspace
 from ..tuning import FAR_BEHIND, LEAST_COUNT, START_ANGLE_VARIANCE, START_VARIANCE
 from .geometry import wrap
 from .matching import allow_all, match_scan, part_of_match
-from .ordering import ascending
 from .refinement import refine
 from .scoring import one_step_chi_square
 from .sight import count_blockers, sight_penalty

@@ -5,11 +5,12 @@ import math
 from compiled import kernel
 from registration.layout import Record, Records
 
+from ...scan.kernels.freedom import log_determinant
 from ...tables import Place, Workspace
 from ..tuning import ROUNDS
 from .matching import allow_all, match_scan
 from .pair_sums import clear_sums, empty_sums, update_pairs
-from .scoring import discount_steps, log_determinant, score_pairs, solve_pose
+from .scoring import discount_steps, score_pairs, solve_pose
 from .wall_errors import eliminate_wall_errors
 
 

@@ -7,7 +7,11 @@ from ...index.kernels.walls import fade
 from ...tuning import APART_GAP, APART_STEP, WHOLE_GAP
 from ..tuning import FLAT_GATE, FLAT_STEP, LONG_BRIDGE, SHORT_BRIDGE
 
+# A scan line on the map: x and y of its midpoint, its direction, its length, and how far it may be off a wall, m.
 Line = tuple[float, float, float, float, float, float]
+# The part of a scan line that a wall and its neighbours on the chain cover: the metres that count as covered; the
+# length that is covered, m; sums over that length of the walls' steps from the wall, and of their squares.
+Cover = tuple[float, float, float, float]
 
 
 @kernel
@@ -43,11 +47,10 @@ def follow_chain(
 ) -> tuple[float, float, float, float, int]:
     """Add up what a scan line covers of the walls that follow wall `w` on its chain, as far as that is to the good.
 
-    `line` is the scan line on the map: midpoint, direction, length, and how far it may be off a wall. `way` is 1 along
-    the walls, -1 against them; that way the line is covered up to `reach` metres from its midpoint. A part on a wall
-    with a lateral step from `w` counts less. Returns by how many metres more the line counts as covered; the length
-    that it covers; sums over that length of the walls' steps from `w`, and of their squares; and how many walls are
-    left to look at, of `most`.
+    `way` is 1 along the walls, -1 against them; that way the line is covered up to `reach` metres from its midpoint. A
+    part on a wall with a lateral step from `w` counts less. Returns by how many metres more the line counts as covered;
+    the length that it covers; sums over that length of the walls' steps from `w`, and of their squares; and how many
+    walls are left to look at, of `most`.
     """
     middle_x, middle_y, _, _, length, _ = line
     base = walls[w]
@@ -89,13 +92,10 @@ def follow_chain(
 
 
 @kernel
-def follow_both_ways(
-    walls: Records, w: int, line: Line, low: float, high: float, most: int
-) -> tuple[float, float, float, float, int]:
+def follow_both_ways(walls: Records, w: int, line: Line, low: float, high: float, most: int) -> tuple[Cover, int]:
     """Add up what a scan line covers of wall `w`, on it between `low` and `high`, and of its neighbours on the chain.
 
-    Returns how many metres of the line count as covered; the length that it covers; sums over that length of the
-    walls' steps from `w`, and of their squares; and how many walls are left to look at, of `most`.
+    Also returns how many walls are left to look at, of `most`.
     """
     half = 0.5 * line[4]
     counted = high - low
@@ -114,4 +114,4 @@ def follow_both_ways(
         covered += there
         first += beside
         second += squares
-    return counted, covered, first, second, most
+    return (counted, covered, first, second), most

@@ -14,9 +14,9 @@ from compiled import kernel
 from registration.layout import Floats, Record
 
 from ...layout import Integers
+from ...scan.kernels.ordering import ascending
 from ...tables import Workspace
 from ..tuning import SORTED_BY_INSERTION
-from .ordering import ascending
 from .pair_sums import clear_wall, copy_sums
 
 

@@ -6,28 +6,14 @@ import numpy as np
 
 from compiled import kernel
 from registration.kernels import keep_alive
-from registration.layout import INFORMATION, Record, Records
+from registration.layout import INFORMATION, Records
 
-from ...consensus.kernels.scoring import log_determinant
 from ...layout import SCAN_LINE, SIGHTING, Indices, Integers
 from ...tables import Measured
 from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, LOOSE_WALLS, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
 from ..tuning import LEAST_SPREAD, LEAST_VARIANCE
+from .freedom import freedom_alone
 from .joining import lines_of_a_view, longest_first
-
-
-@kernel
-def freedom_alone(line: Record, model: Record, information: Record) -> float:
-    """Return the freedom that a line alone takes from a pose, nats: no set with it takes less."""
-    weight = line.weight / (1.0 + line.weight * model.wall_variance)
-    lever = line.dx * line.centroid_x + line.dy * line.centroid_y
-    information.xx = weight  # across the line
-    information.xy = 0.0
-    information.xt = weight * lever
-    information.yy = 0.0
-    information.yt = 0.0
-    information.tt = weight * lever * lever + line.weight * line.spread
-    return log_determinant(information, model)
 
 
 @kernel

@@ -7,10 +7,10 @@ import numpy as np
 from compiled import kernel
 from registration.layout import LEAST_POINTS, Floats, Record, Records
 
-from ...consensus.kernels.ordering import ascending
 from ...layout import LINE_PARTS, Indices, Integers
 from ...tables import Measured
 from ..tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
+from .ordering import ascending
 
 
 @kernel

@@ -7,8 +7,8 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Floats, Record, Records
 
-from ...consensus.kernels.ordering import ascending
 from ...layout import FIGURE, Integers
+from ...scan.kernels.ordering import ascending
 from ...tables import Crossings, MapTables, Question, Walls
 from ..layout import BASE, LINE_COST, LISTED
 from ..tables import Costs, Plan, Samples, Sampling

@@ -7,9 +7,9 @@ from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
 from ...consensus.kernels.geometry import wrap
-from ...consensus.kernels.ordering import ascending
 from ...consensus.kernels.priors import prior_value
 from ...layout import FOUND, HARD_PRIOR
+from ...scan.kernels.ordering import ascending
 from ...tuning import INSIDE
 from ..tables import SearchState
 

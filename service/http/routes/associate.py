@@ -11,10 +11,10 @@ from ...schemas import examples
 from ...schemas.replies import AssociateAnswer
 from ...schemas.requests import AssociateRequest
 from ...work.job import Done, Job
+from ..body_stage import read
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up_any
-from ..receiving import read
-from ..searching import in_slot
+from ..search_stage import in_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 

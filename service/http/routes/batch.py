@@ -19,11 +19,11 @@ from ...schemas.replies import BatchAnswer
 from ...schemas.requests import BatchItem, BatchRequest
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
+from ..body_stage import read
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up_any
 from ..problems import INTERNAL, problem_of
-from ..receiving import read
-from ..searching import in_slot
+from ..search_stage import in_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 

@@ -20,10 +20,10 @@ from ...schemas.parts import StoredMap
 from ...schemas.requests import CheckRequest
 from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
+from ..body_stage import read
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
-from ..receiving import read
-from ..searching import in_slot
+from ..search_stage import in_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath

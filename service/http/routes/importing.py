@@ -16,9 +16,9 @@ from ...schemas.parts import InlineMap
 from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM
+from ..body_stage import parse, receive
 from ..exchange import Exchange, begin_search
-from ..receiving import parse, receive
-from ..searching import in_slot, in_slot_of
+from ..search_stage import in_slot, in_slot_of
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
 

@@ -13,10 +13,10 @@ from ...schemas import examples
 from ...schemas.encoding import encode
 from ...schemas.parts import MapDocument
 from ...schemas.replies import MapList, MapSummaryAnswer
+from ..body_stage import read
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import begin
 from ..map_stage import ask_store
-from ..receiving import read
 from ..sending import json_response
 from .declaring import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 

@@ -11,9 +11,9 @@ from ...schemas import examples
 from ...schemas.replies import RegisterAnswer
 from ...schemas.requests import RegisterRequest
 from ...work.registration import answer_registration
+from ..body_stage import read
 from ..exchange import begin_search
-from ..receiving import read
-from ..searching import in_slot
+from ..search_stage import in_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 

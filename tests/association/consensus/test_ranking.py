@@ -29,13 +29,13 @@ from association.consensus.tuning import (
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.layout import ESTIMATE, FOUND, record
-from association.search.candidates import Candidates, find_candidates
+from association.search.candidates import find_candidates
 from association.tables import Place, Rays
 from association.tuning import FEW_KEPT
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
-from ..answers import explanations_of, ranked
+from ..answers import ranked
 from ..records import rays_of
 from ..reference import beams as beams_twin
 from ..reference import ranking as twin
@@ -65,13 +65,13 @@ def room(k: int) -> RigidTransform:
     return pose(INSIDE.x + 12.0 * k, INSIDE.y, INSIDE.theta)
 
 
-def candidates_of(index: MapIndex, poses: list[RigidTransform]) -> Candidates:
+def candidates_of(index: MapIndex, poses: list[RigidTransform]) -> Records:
     """Return poses of the map frame as if a search had found them, in that order."""
     found = np.zeros(len(poses), FOUND)
     for row, at in zip(found, poses, strict=True):
         here = local(index, at)
         row["theta"], row["x"], row["y"] = here.theta, here.x, here.y
-    return Candidates(found, explanations_of(None).search)
+    return found
 
 
 def ranked_at(context: SearchContext, *poses: RigidTransform) -> list[ConsensusSet]:
@@ -238,7 +238,7 @@ def test_nothing_found_is_nothing_ranked() -> None:
     beams = beams_of(index, INSIDE)
     for scan in (scan_of(np.zeros((0, 4))), scan_of(np.zeros((0, 4)), viewpoint=(0.0, 0.0), beams=beams)):
         context = context_of(index, scan)
-        assert rank_candidates(context, find_candidates(context)) == []
+        assert rank_candidates(context, find_candidates(context).poses) == []
 
 
 class Looked(Deadline):
@@ -290,7 +290,7 @@ def test_no_rays_are_followed_through_a_crowd_when_the_deadline_has_passed() -> 
     in_time = context_of(index, scan)
     candidates = find_candidates(in_time)
     late = replace(in_time, deadline=Deadline(at=0.0))
-    (best, *_), (hurried, *_) = rank_candidates(in_time, candidates), rank_candidates(late, candidates)
+    (best, *_), (hurried, *_) = rank_candidates(in_time, candidates.poses), rank_candidates(late, candidates.poses)
     assert hurried.blocked == 0.0 < best.blocked
     assert missing_segments(late, best) == () != missing_segments(in_time, best)
     sparse = replace(context_of(index_of(ROOM), scan), deadline=Deadline(at=0.0))
@@ -304,7 +304,7 @@ def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPat
     candidates = find_candidates(context)
     late = replace(context, deadline=Deadline(at=0.0))
     assert candidates.report.complete
-    assert len(rank_candidates(late, candidates)) == len(rank_candidates(context, candidates)) > 0
+    assert len(rank_candidates(late, candidates.poses)) == len(rank_candidates(context, candidates.poses)) > 0
     monkeypatch.setattr(explaining, "find_candidates", lambda context, effort: candidates)
     assert search_and_explain(context).search.complete
     assert not search_and_explain(late).search.complete

@@ -14,6 +14,7 @@ import pytest
 from association import InvalidMapError, MapIndex
 from association.index.tuning import (
     CELL,
+    LEAST_DIFFERENCE,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
@@ -123,11 +124,28 @@ def test_directions_are_sorted_longest_first() -> None:
         bins = np.minimum(np.floor((walls.rows["angle"] + math.pi) / math.tau * count), count - 1)  # pi is in the last
         for b in range(count):
             inside = slice(walls.bin_starts[b], walls.bin_starts[b + 1])
-            assert (np.diff(walls.longest[inside]) <= 0.0).all()
+            assert (np.diff(np.rint(walls.longest[inside] / LEAST_DIFFERENCE)) <= 0.0).all()
             assert (bins[inside] == b).all()
         assert walls.bin_starts[-1] == len(walls.rows)
         np.testing.assert_allclose(walls.longest, lengths(walls))
         np.testing.assert_allclose(walls.summed, [walls.longest[:k].sum() for k in range(len(walls.rows) + 1)])
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("oriented", [True, False])
+def test_the_last_bits_of_equal_lengths_do_not_order_walls(seed: int, oriented: bool) -> None:
+    """As from another processor: the same map, moved by fewer bits than lengths are rounded to."""
+    rng = np.random.default_rng(seed)
+    begins = np.array([[0.0, 3.0 * k] for k in range(8)])
+    length, angle = 2.0 + rng.random(), rng.uniform(-math.pi, math.pi)
+    ends = begins + np.array([length, 0.0])
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    rows = np.hstack([begins @ turn, ends @ turn])
+    moved = rows + 1e-13 * rng.standard_normal(rows.shape)
+    one, other = (MapIndex.build(Segments.from_array(some), oriented=oriented) for some in (rows, moved))
+    np.testing.assert_array_equal(one.wall_of_piece, other.wall_of_piece)
+    for mine, its in ((one.walls, other.walls), (one.chains, other.chains)):
+        np.testing.assert_allclose(mine.rows["offset"], its.rows["offset"], atol=1e-9)
 
 
 def test_far_from_the_origin_nothing_is_lost() -> None:

@@ -11,7 +11,7 @@ import pytest
 from association import Status
 from association.consensus.tuning import CONTRADICTION
 from association.verdict.reasons import ORDER, SENTENCES
-from association.verdict.tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND
+from association.verdict.tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND, MOST_DISPLACED
 from association.verdict.verdict import judge
 from association.verdict.vetoes import VETOES, Findings, Origin, applied, contradict_prior, counted
 
@@ -42,6 +42,10 @@ LIMITS: dict[str, tuple[Findings, Findings]] = {
         replace(NOTHING, in_step=math.nextafter(LEAST_IN_STEP, 0.0)),
     ),
     "off_scale": (NOTHING, replace(NOTHING, off_scale=True)),
+    "displaced_walls": (
+        replace(NOTHING, displaced_walls=MOST_DISPLACED),
+        replace(NOTHING, displaced_walls=math.nextafter(MOST_DISPLACED, 1.0)),
+    ),
     "mirrored": (
         replace(NOTHING, mirrored_better=math.nextafter(MIRRORED_BETTER, 0.0)),
         replace(NOTHING, mirrored_better=MIRRORED_BETTER),
@@ -68,7 +72,7 @@ def test_a_veto_applies_from_its_limit_on_and_alone(name: str) -> None:
 
 
 def test_vetoes_apply_in_the_order_of_the_table() -> None:
-    everything = Findings(False, 1.0, 99.0, -99.0, True, True, True, 0.0, True, 1.0, 9.0)
+    everything = Findings(False, 1.0, 99.0, -99.0, True, True, True, 0.0, True, 1.0, 1.0, 9.0)
     assert [veto.name for veto in applied(everything)] == list(LIMITS)
 
 
@@ -78,7 +82,10 @@ def test_with_another_status_the_status_is_the_reason() -> None:
     for status, more in (
         (Status.NO_MATCH, set[str]()),
         (Status.DEGENERATE, {"outside_window", "unobservable_direction"}),
-        (Status.AMBIGUOUS, {"outside_window", "few_walls", "imprecise", "out_of_step", "off_scale", "mirrored"}),
+        (
+            Status.AMBIGUOUS,
+            {"outside_window", "few_walls", "imprecise", "out_of_step", "off_scale", "displaced_walls", "mirrored"},
+        ),
         (Status.OK, {"outside_window"}),
     ):
         assert {veto.name for veto in counted(VETOES, status)} == every | more

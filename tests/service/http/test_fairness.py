@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from service.http.reception import LATER
+from service.http.middleware import LATER
 from tests.running import RunningService, client_of, until
 from tests.service.searches import POST, searched_a_while, searched_briefly, searched_for, searching, store_hard_map
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from association import Deadline
-from service.http.searching import WATCH_AFTER, HangUpError, unless_hung_up
+from service.http.search_stage import WATCH_AFTER, HangUpError, unless_hung_up
 
 Receive = Callable[[], Awaitable[dict[str, Any]]]
 

@@ -12,10 +12,10 @@ from scipy.spatial import cKDTree
 
 from registration.limits import MAX_LENGTH
 
-from ..errors import MalformedFileError
-from ..limits import MAX_EXTENT, MAX_NAMED
-from ..report import listed
-from .drawing import Drawing
+from ...errors import MalformedFileError
+from ...limits import MAX_EXTENT, MAX_NAMED
+from ...report import listed
+from ..drawing import Drawing
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

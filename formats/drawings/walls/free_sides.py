@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from ..errors import InvalidOptionError
+from ...errors import InvalidOptionError
 
 Floats = NDArray[np.float64]
 

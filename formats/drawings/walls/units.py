@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..options import UNITS, ImportOptions
-from .drawing import Drawing
+from ...options import UNITS, ImportOptions
+from ..drawing import Drawing
 
 Floats = NDArray[np.float64]
 

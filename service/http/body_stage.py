@@ -15,7 +15,7 @@ from ..schemas.limits import Limits
 from ..telemetry.traces import stage
 from ..work.job import Stopwatch
 from .exchange import Exchange
-from .searching import in_slot_of, unless_hung_up
+from .search_stage import in_slot_of, unless_hung_up
 
 T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]

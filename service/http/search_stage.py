@@ -1,4 +1,4 @@
-"""The last stage of a request: its slots at the gate, given up when the client hangs up."""
+"""The third stage of a request: its search, in a slot of the gate, given up when the client hangs up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scans of scanners that are mounted on a robot, to views of the search: the one place where mount and motion count."""
+"""Ranges of scanners on a robot to views of the search: the one place where mount and motion count."""
 
 from __future__ import annotations
 

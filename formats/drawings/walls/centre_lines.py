@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..options import ImportOptions
-from .drawing import Drawing
+from ...options import ImportOptions
+from ..drawing import Drawing
 from .meeting import AT_ONCE, MEETS, in_frame, parallel_to
 
 Floats = NDArray[np.float64]

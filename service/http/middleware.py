@@ -1,4 +1,4 @@
-"""The outermost layer of the application: a request's state, its key, the log, the counts, and the last catch."""
+"""The outermost layer of the application, as ASGI: a request's state, key, log and counts, and the last catch."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
     return f"{random.getrandbits(128):032x}"  # unique, and no secret
 
 
-class Reception:
+class RequestMiddleware:
     """Written as plain ASGI: Starlette's `BaseHTTPMiddleware` would hide that a client hung up."""
 
     def __init__(self, app: ASGIApp, services: Services) -> None:

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from registration import InputError, Segments
 
-from ..errors import IncompleteFileError, MalformedFileError
-from ..line_map import LineMap
-from ..options import ImportOptions
-from .centres import are_centres, walls_of
-from .drawing import Drawing
-from .far import near_lines
-from .inside import Sides, sides_seen
-from .solid import outline
+from ...errors import IncompleteFileError, MalformedFileError
+from ...line_map import LineMap
+from ...options import ImportOptions
+from ..drawing import Drawing
+from .centre_lines import are_centres, walls_of
+from .far_lines import near_lines
+from .free_sides import Sides, sides_seen
+from .outline import outline
 from .units import note_unit
 
 Floats = NDArray[np.float64]

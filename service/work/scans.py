@@ -1,4 +1,4 @@
-"""The one place that calls `vectorization`: ranges and points to the input of the search."""
+"""Ranges and points of a request to scans: the one place of the service that calls `vectorization`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from association import AssociationWarning, Scan, View
 from linefix import view_of
-from linefix.mounted import RangeScan
+from linefix.ranges import RangeScan
 from registration import RigidTransform
 from vectorization import (
     LaserScan,
