@@ -32,7 +32,7 @@ from .sensitivity import sensitivity
 from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
-from .upkeep import upkeep
+from .upkeep import UPKEEP
 from .views import views
 from .worlds import worlds
 
@@ -139,7 +139,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "sensitivity": sensitivity,
     "plan": plan,
     "ros2": ros2,
-    "upkeep": upkeep,
+    **UPKEEP,
     "starts": starts,
 }
 
@@ -153,6 +153,7 @@ def main() -> None:
     parser.add_argument("--quick", type=int, default=1, metavar="N", help="take about one in N of everything")
     args = parser.parse_args()
     names = list(TABLES) if args.tables == ["all"] else args.tables or list(DEFAULT)
+    names = [one for name in names for one in (UPKEEP if name == "upkeep" else (name,))]
     unknown = [name for name in names if name not in TABLES]
     if unknown or args.quick < 1:
         parser.error(f"no such table: {', '.join(unknown)}" if unknown else "--quick takes a number from 1 up")

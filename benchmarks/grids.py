@@ -140,20 +140,7 @@ def _of_log(name: str, folder: Path, count: int) -> Scene:
     with np.load(DATA / "lidar" / f"{name}.npz") as data:
         poses, angles, ranges = data["poses_refined"], data["angles"], data["ranges"].astype(np.float64)
         reach, good = float(data["range_max_valid"]), np.flatnonzero(data["pose_good"])
-    limit = min(reach, LOG_RANGE)
-    low = poses[good, :2].min(axis=0) - limit - MARGIN
-    shape = tuple(np.ceil((poses[good, :2].max(axis=0) + limit + MARGIN - low) / RESOLUTION).astype(int)[::-1])
-    hits, passed = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
-    for k in good[good % 2 == 0]:
-        seen = (ranges[k] > 0.1) & (ranges[k] < limit)
-        heading = angles[seen] + poses[k, 2]
-        ends, to = ranges[k][seen], np.stack([np.sin(heading), np.cos(heading)])
-        _count(hits, poses[k, :2] - low, to, ends)
-        for r in np.arange(0.1, limit, RESOLUTION):
-            through = ends > r + 2.0 * RESOLUTION
-            _count(passed, poses[k, :2] - low, to[:, through], np.full(int(through.sum()), r))
-    occupied = (hits > 1) & (hits > 0.2 * passed)
-    path = _write(folder / f"{name}.yaml", occupied, passed > 0, (float(low[0]), float(low[1])))
+    path = grid_of_log(name, good[good % 2 == 0], folder / f"{name}.yaml")
     chosen = good[good % 2 == 1]
     chosen = chosen[np.linspace(0, len(chosen) - 1, count).astype(int)]
     step = float(angles[1] - angles[0])
@@ -164,6 +151,26 @@ def _of_log(name: str, folder: Path, count: int) -> Scene:
         for k in chosen
     ]
     return Scene(f"{name} (log)", path, tuple(("log", one) for one in scans))
+
+
+def grid_of_log(name: str, chosen: NDArray[np.intp], path: Path) -> Path:
+    """Draw a grid from some scans of a log at their refined poses, and write it as map_server has it."""
+    with np.load(DATA / "lidar" / f"{name}.npz") as data:
+        poses, angles, ranges = data["poses_refined"], data["angles"], data["ranges"].astype(np.float64)
+        limit = min(float(data["range_max_valid"]), LOG_RANGE)
+    low = poses[chosen, :2].min(axis=0) - limit - MARGIN
+    shape = tuple(np.ceil((poses[chosen, :2].max(axis=0) + limit + MARGIN - low) / RESOLUTION).astype(int)[::-1])
+    hits, passed = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    for k in chosen:
+        seen = (ranges[k] > 0.1) & (ranges[k] < limit)
+        heading = angles[seen] + poses[k, 2]
+        ends, to = ranges[k][seen], np.stack([np.sin(heading), np.cos(heading)])
+        _count(hits, poses[k, :2] - low, to, ends)
+        for r in np.arange(0.1, limit, RESOLUTION):
+            through = ends > r + 2.0 * RESOLUTION
+            _count(passed, poses[k, :2] - low, to[:, through], np.full(int(through.sum()), r))
+    occupied = (hits > 1) & (hits > 0.2 * passed)
+    return _write(path, occupied, passed > 0, (float(low[0]), float(low[1])))
 
 
 def _count(

@@ -76,9 +76,9 @@ def scans_of(log: Log) -> Iterator[LoggedScan]:
 
 
 def spread(found: Sequence[T], most: int) -> list[T]:
-    """Return so many at most, evenly over all."""
-    step = max(1, math.ceil(len(found) / most))
-    return list(found[::step])
+    """Return so many, evenly over all; all of them where there are no more."""
+    count = min(most, len(found))
+    return [found[k * len(found) // count] for k in range(count)]
 
 
 def print_notes(log: Log, where: TextIO) -> None:

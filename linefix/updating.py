@@ -71,7 +71,7 @@ def update_map(
     ...     return linefix.LaserScan(scanner.angle_min, scanner.angle_increment, ranges)
     >>> places = [(1, 1), (5, 1), (2, 5.5), (5, 6), (1, 3.5), (7.5, 1.5)]
     >>> visits = {day: [seen_from(*place) for place in places] for day in ("monday", "tuesday")}
-    >>> update = linefix.update_map(room + pillar, visits)
+    >>> update = linefix.update_map({"segments": room + pillar, "sigma": 0.005}, visits)
     >>> [(change.code, change.segments) for change in update.changes]
     [('removed', (6, 7, 8, 9))]
     >>> len(update.segments)

@@ -1,8 +1,8 @@
 """Updates of maps: whether changes of a building are found, and whether maps are ever made worse.
 
-``python -m benchmarks upkeep``
+``python -m benchmarks upkeep``, or a part of it, such as ``upkeep-changes``.
 """
 
-from .tables import upkeep
+from .tables import UPKEEP
 
-__all__ = ["upkeep"]
+__all__ = ["UPKEEP"]

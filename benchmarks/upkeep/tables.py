@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -170,45 +171,75 @@ def foreign(families: Sequence[str], logs: int) -> list[Row]:
 
 
 def speed(families: Sequence[str], scans: int, least: int) -> list[Row]:
-    """Return the rows about many scans in a large map: buildings next to one another."""
+    """Return the rows about many scans in a large map: buildings next to one another, at least so many segments."""
     rng = np.random.default_rng(17)
     shift, seed = 0.0, 0
     walls: list[np.ndarray] = []
     taken: list[list[VisitScan]] = []
-    while sum(len(one) for one in walls) < least:
+    while (so_far := sum(len(one) for one in walls)) < least:
         scene = draw(families[seed % len(families)], seed, PLACES)
+        seed += 1
+        if so_far + len(scene.mapped.segments) > 1.1 * least:
+            continue
         low, high = (f(scene.mapped.segments.endpoints[:, [0, 2]]) for f in (np.min, np.max))
         walls.append(scene.mapped.segments.endpoints + np.array([shift - low, 0.0, shift - low, 0.0]))
-        taken.append([one for one, _ in visits(scene, VISITS, rng)])
-        shift, seed = shift + float(high - low) + 20.0, seed + 1
+        taken.append(_aside(with_poses(list(visits(scene, VISITS, rng)), rng), shift - low))
+        shift += float(high - low) + 20.0
     together = [one for some in zip(*taken, strict=True) for one in some][:scans]
     index = MapIndex.build(Segments.from_array(np.concatenate(walls)), MAP_SIGMA)
     map_quality.update(index, together[:20])
-    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    map_quality.update(index, together)
-    took, most = time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    what = f"{len(together)} scans in a map of {len(index.segments)} segments"
+    rows, before = [], _memory()
+    for how, some in (
+        ("without poses", [replace(one, pose=None, covariance=None) for one in together]),
+        ("each with a pose of the robot", together),
+    ):
+        begun = time.process_time()
+        update = map_quality.update(index, some)
+        what = f"seconds of a core for {len(some)} scans in a map of {len(index.segments)} segments, {how}"
+        rows.append(at_most(what, time.process_time() - begun, 20.0, form=".1f"))
+        rows.append(at_least(f"  changes proposed, {how}", float(len(update.changes)), form=".0f"))
     return [
-        at_most(f"seconds of a core for {what}", took, 20.0, form=".1f"),
-        at_most("  memory of the process at most, MB", most / 1024.0, 500.0, form=".0f"),
-        at_most("  of this before the update, MB", before / 1024.0, form=".0f"),
+        *rows,
+        at_most("memory of the process at most, MB", _memory(), 500.0, form=".0f"),
+        at_most("  before the updates, MB", before, form=".0f"),
     ]
 
 
-def upkeep(quick: int) -> list[Row]:
-    """Return the rows of all tables; buildings of which none is fitted on."""
-    families = [name for name, one in FAMILIES.items() if one.held_out]
-    seeds = range(max(1, 4 // quick))
-    parts: dict[str, Callable[[], list[Row]]] = {
-        "changes": lambda: changes(families, seeds),
-        "walls of grids": lambda: sharper(families, seeds[: max(1, len(seeds) // 2)]),
-        "rounds": lambda: rounds(families, seeds[:1]),
-        "foreign logs": lambda: foreign(families, max(6, 1000 // quick)),
-        "speed": lambda: speed(families, max(100, 1000 // quick), max(500, 2000 // quick)),
-    }
-    rows: list[Row] = []
-    for name, part in parts.items():
-        found = part()
-        print_rows(f"Map updates: {name}", found)
-        rows += found
-    return rows
+def _aside(scans: Sequence[VisitScan], shift: float) -> list[VisitScan]:
+    """Return scans whose poses are shifted along x."""
+    aside = RigidTransform(shift, 0.0, 0.0)
+    return [one if one.pose is None else replace(one, pose=aside.compose(one.pose)) for one in scans]
+
+
+def _memory() -> float:
+    """Return the most memory that the process has had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def _families() -> list[str]:
+    """Return the kinds of buildings that nothing is fitted on."""
+    return [name for name, one in FAMILIES.items() if one.held_out]
+
+
+PARTS: dict[str, Callable[[int], list[Row]]] = {
+    "upkeep-changes": lambda quick: changes(_families(), range(max(1, 4 // quick))),
+    "upkeep-without-poses": lambda quick: changes(_families(), range(max(1, 2 // quick)), own=False),
+    "upkeep-grids": lambda quick: sharper(_families(), range(max(1, 2 // quick))),
+    "upkeep-rounds": lambda quick: rounds(_families()[:: min(quick, 4)], range(1)),
+    "upkeep-foreign": lambda quick: foreign(_families(), max(6, 1000 // quick)),
+    "upkeep-speed": lambda quick: speed(_families(), max(100, 1000 // quick), max(500, 2000 // quick)),
+}
+
+
+def printed(name: str) -> Callable[[int], list[Row]]:
+    """Return a part that prints its rows."""
+
+    def part(quick: int) -> list[Row]:
+        rows = PARTS[name](quick)
+        print_rows(f"Map updates: {name}", rows)
+        return rows
+
+    return part
+
+
+UPKEEP = {name: printed(name) for name in PARTS}

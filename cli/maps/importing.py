@@ -19,7 +19,7 @@ from ..options import AsJson, Picture, Server, grouped
 from ..printing import noted, print_json, print_rows
 from .checking import check_rows, samples_of
 from .drawing import write_document
-from .updating import update_by_drive, update_rows
+from .updating import draw_changes, update_by_drive, update_rows
 
 if TYPE_CHECKING:
     from formats import ImportOptions
@@ -150,14 +150,16 @@ def import_map(
     if update and log is not None:
         updated = update_by_drive(answer["map"], log)
         rows += update_rows(updated)
+        if picture is not None:
+            draw_changes(answer["map"], updated, picture)
         answer = {**answer, "map": updated.pop("map"), "update": updated}
-    if out is not None:
-        write_document(answer["map"], out)
-    if picture is not None:
+    elif picture is not None:
         with needing_formats("drawing a picture"):
             from formats import draw_map
 
             draw_map(line_map_of(answer["map"]), picture)
+    if out is not None:
+        write_document(answer["map"], out)
     if as_json:
         print_json(answer)
     else:

@@ -17,7 +17,7 @@ from ..asking import server_at, whole_map
 from ..contract import Json
 from ..errors import WrongUseError
 from ..inputs import line_map_of, needing_formats, read_map_or_id
-from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent
+from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Picture, Server, grouped
 from ..printing import print_json, print_rows
 from .drawing import write_document
@@ -137,16 +137,16 @@ def _scans(log: Path, source: LogOptions) -> list[LoggedScan]:
 
 
 def thinned(found: Iterable[LoggedScan], most: int) -> list[LoggedScan]:
-    """Return at most so many, evenly over all, without all of them in memory."""
+    """Return so many, evenly over all, without all of them in memory; all of them where there are no more."""
     kept: list[LoggedScan] = []
     step = 1
     for number, one in enumerate(found):
         if number % step:
             continue
         kept.append(one)
-        if len(kept) > most:
+        if len(kept) > 4 * most:
             kept, step = kept[::2], 2 * step
-    return kept
+    return spread(kept, most)
 
 
 def update_by_drive(document: Json, log: Path) -> Json:

@@ -99,31 +99,42 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
     if not len(near) or not len(ranges):
         return Followed(*(np.zeros(0, dtype=np.intp) for _ in range(4)))
     walls = chunks.walls.take(near)
-    slant, across = rays @ walls.normals.T, rays @ walls.directions.T
-    to_line = walls.offsets[None, :] - origins @ walls.normals.T
+    beams, columns = _crossed(walls, origins, rays)
+    normals = walls.normals[columns]
+    slant = np.einsum("ij,ij->i", rays[beams], normals)
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = to_line / slant
-        along = (
-            origins @ walls.directions.T
-            + distance * across
-            - np.einsum("ij,ij->i", walls.endpoints[:, :2], walls.directions)[None, :]
-        )
-        behind = (ranges[:, None] - distance) * np.abs(slant)
-        met = (np.abs(slant) >= LEAST_SLANT) & (distance > 0.0) & (along >= 0.0) & (along < walls.lengths[None, :])
-    beams, columns = np.nonzero(met)
-    gap, slanted, far = behind[beams, columns], slant[beams, columns], distance[beams, columns]
-    tolerance = _tolerance(one, sigma, far)
-    share = along[beams, columns] / walls.lengths[columns]
+        distance = (walls.offsets[columns] - np.einsum("ij,ij->i", origins[beams], normals)) / slant
+        gap = (ranges[beams] - distance) * np.abs(slant)
+        tolerance = _tolerance(one, sigma, distance)
+        kept = (np.abs(slant) >= LEAST_SLANT) & (distance > 0.0) & (gap >= -np.maximum(HIDDEN, tolerance))
+    beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
+    gap, tolerance = gap[kept], tolerance[kept]
+    directions, lengths = walls.directions[columns], walls.lengths[columns]
+    across = np.einsum("ij,ij->i", rays[beams], directions)
+    off = origins[beams] - walls.endpoints[columns, :2]
+    along = np.clip(np.einsum("ij,ij->i", off, directions) + distance * across, 0.0, lengths)
     counts = chunks.counts[near[columns]]
-    chunk = chunks.first[near[columns]] + np.minimum((share * counts).astype(np.intp), counts - 1)
-    facing = (slanted < 0.0) | (not oriented)
+    chunk = chunks.first[near[columns]] + np.minimum((along / lengths * counts).astype(np.intp), counts - 1)
+    facing = (slant < 0.0) | (not oriented)
     # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
-    deep = along[beams, columns] + THROUGH * tolerance / np.abs(slanted) * across[beams, columns]
-    within = (deep >= 0.0) & (deep <= walls.lengths[columns])
+    deep = along + THROUGH * tolerance / np.abs(slant) * across
+    within = (deep >= 0.0) & (deep <= lengths)
     passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
     hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
     seen, where = np.unique(chunk, return_inverse=True)
     return Followed(seen, *(np.bincount(where[one], minlength=len(seen)) for one in (passed, ended, hidden)))
+
+
+def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, Indices]:
+    """Return the pairs of a beam and a wall whose lines meet on the wall, before or behind the beam's origin.
+
+    The ends of such a wall lie on different sides of the beam's line.
+    """
+    left = np.stack([-rays[:, 1], rays[:, 0]], axis=1)
+    own = np.einsum("ij,ij->i", left, origins)[:, None]
+    begins, ends = left @ walls.endpoints[:, :2].T >= own, left @ walls.endpoints[:, 2:].T >= own
+    beams, crossed = np.nonzero(begins != ends)
+    return beams, crossed
 
 
 def sees(chunks: Chunks, one: Localized, sigma: float) -> bool:

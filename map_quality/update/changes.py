@@ -176,11 +176,20 @@ def _continued(known: Segments, piece: Floats, step: float) -> int | None:
 
 
 def _may_be_door(known: Segments, piece: Floats) -> bool:
-    """Return whether a new wall is no longer than the leaf of a door, and begins or ends at the end of another wall."""
-    if np.hypot(*(piece[2:] - piece[:2])) > LONGEST_LEAF:
+    """Return whether a new wall may be a part of the leaf of a door: the end of another wall is near on its line.
+
+    An open leaf may be seen at its tip only.
+    """
+    along = piece[2:] - piece[:2]
+    length = float(np.hypot(*along))
+    if length > LONGEST_LEAF:
         return False
-    gaps = known.endpoints.reshape(-1, 1, 2) - piece.reshape(1, 2, 2)
-    return bool(np.linalg.norm(gaps, axis=2).min() <= JAMB)
+    off = known.endpoints.reshape(-1, 2) - piece[:2]
+    at = off @ along / length
+    across = np.abs(off @ np.array([-along[1], along[0]])) / length
+    beyond = np.maximum(-at, at - length)
+    reach = max(JAMB, LONGEST_LEAF - length)
+    return bool(((across <= JAMB) & (beyond >= -JAMB) & (beyond <= reach)).any())
 
 
 def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from .tuning import (
     MOST_OWN_SIGMA,
     MOST_SIGMA,
     MOST_TURN_SIGMA,
+    NEXT_HELD_BACK,
     OFF_SCALE,
     PLACE,
     SURE_OF_SCALE,
@@ -162,13 +163,23 @@ def visit_numbers(scans: Sequence[VisitScan]) -> tuple[list[str], list[int]]:
 
 
 def held_back(visits: Sequence[int]) -> list[bool]:
-    """Return which scans are held back: one in ten of each visit."""
+    """Return which scans are held back: one in ten of each visit, others where visits repeat a route."""
     counts: dict[int, int] = {}
     held = []
     for visit in visits:
         counts[visit] = counts.get(visit, -1) + 1
-        held.append(counts[visit] % HELD_BACK == HELD_BACK // 2)
+        held.append(counts[visit] % HELD_BACK == (HELD_BACK // 2 + NEXT_HELD_BACK * visit) % HELD_BACK)
     return held
+
+
+def on_map(one: Localized, segments: Segments) -> Localized:
+    """Return a scan with its correspondences on another map; without those on walls that this does not have."""
+    if one.on is segments:
+        return one
+    places = {ends.tobytes(): k for k, ends in enumerate(segments.endpoints)}
+    there = [(pair, places.get(one.on.endpoints[pair.map].tobytes())) for pair in one.result.correspondences]
+    kept = tuple(replace(pair, map=place) for pair, place in there if place is not None)
+    return replace(one, result=replace(one.result, correspondences=kept), on=segments)
 
 
 def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
@@ -224,7 +235,8 @@ def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float)
     if sure < max(LEAST_SCANS, LEAST_USABLE * len(own)):
         return (
             f"{sure} of {len(own)} scans are usable and precise, expected at least "
-            f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building."
+            f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building, "
+            "and that the map shows the places where they were taken."
         )
     factor, sigma_of_factor = scale_of(precise, sigma)
     if sigma_of_factor > SURE_OF_SCALE:

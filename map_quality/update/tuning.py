@@ -9,10 +9,11 @@ import math
 MOST_SIGMA, MOST_TURN_SIGMA = 0.05, math.radians(1.0)  # m, rad; deviations of a pose that is known well enough
 MOST_OWN_SIGMA = 0.5  # m; deviation of a sender's own pose that may confirm that of the search
 AGREEING = 11.3  # chi-square of 3 degrees of freedom, 99 %; of both poses
-LEAST_USABLE = 0.3  # fraction of a visit's scans, drawn; in another building nearly none are usable
+LEAST_USABLE = 0.2  # fraction of a visit's scans; other drawn buildings 0, a public log that is half off the map 0.29
 LEAST_SCANS = 3  # usable ones of a visit
 OFF_SCALE, SURE_OF_SCALE = 0.005, 0.0025  # fractions, drawn; lengths of a visit are off by, and known to
 HELD_BACK = 10  # one scan in so many gives no evidence, and tests the new map
+NEXT_HELD_BACK = 7  # by so many later in the next visit: a robot may pass the same places in the same order
 MOST_BEAMS = 720  # of a scan, time
 USUAL_SIGMA = 0.02  # m; of the walls of a map that does not declare it
 
@@ -51,10 +52,11 @@ LEAST_STEP = 0.02  # m; a wall that continues another is no farther off its line
 SAME_GAP = 0.3  # m; along the wall
 BIN = 0.05  # m; resolution of the ends of a new wall
 ON_MAP = 0.12  # m; nearer to a wall of the map, and parallel, nothing is added
+DOUBLED = 0.25  # m; across, between new walls that face the same way; public logs: flat beams are 0.2 m off
 SAME_SIDE = 0.5  # cosine between walls that face about the same way
 FULLY_ON_MAP = 0.85  # fraction of a scan line's length
 LONGEST_LEAF = 1.5  # m; of a door, and its width where it is a double door
-JAMB = 0.25  # m; between the end of a leaf and the end of a wall that it is fixed to, or shuts against
+JAMB = 0.25  # m; between a leaf and the end of a wall that it is fixed to, or shuts against
 DOOR_VISITS = 4  # that show a wall which may be a leaf; on fewer a door may happen to stand alike
 JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved

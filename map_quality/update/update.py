@@ -19,7 +19,17 @@ from .beams import Chunks, sees
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
-from .scans import Localized, UpdateError, VisitScan, choose_evidence, held_back, is_vouched, search, visit_numbers
+from .scans import (
+    Localized,
+    UpdateError,
+    VisitScan,
+    choose_evidence,
+    held_back,
+    is_vouched,
+    on_map,
+    search,
+    visit_numbers,
+)
 from .sharpening import sharpen
 from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
@@ -196,8 +206,7 @@ class _Update:
             new = self._index(drafts) if drafts else None
             if new is None:
                 return None
-            # To sharpen walls, all scans have to be searched on one map.
-            found = yield from self._search_all(new, found, None if self.is_blurred else changed)
+            found = yield from self._search_all(new, found, changed)
             if self.deadline.passed:
                 return None
             dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
@@ -235,11 +244,8 @@ class _Update:
         chosen, _ = choose_evidence(names, found, self.sigma)
         if not self.is_blurred or not chosen or self.deadline.passed:
             return None
-        whole = apply(self.known, proposed.changes)
-        if any(one.on is not chosen[0].on for one in chosen):
-            return None  # scans that were searched on different maps
-        index = self._indexed(whole)
-        better = sharpen(index, chosen, self.sigma)
+        index = self._indexed(apply(self.known, proposed.changes))
+        better = sharpen(index, [on_map(one, index.segments) for one in chosen], self.sigma)
         old = kept_indices(len(self.known), proposed.changes)[better.segments]
         mine = old >= 0
         sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from cli.maps.updating import thinned
 from registration import RigidTransform, Segments
 from simulation import scan
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
@@ -18,6 +19,14 @@ from tests.running import RunningService
 from .running import Linefix
 
 HALL, TODAY = segments(RACK, PILLAR), segments(PILLAR)
+
+
+REMOVED = (0xD5, 0x5E, 0x00)
+
+
+def colours_of(path: Path) -> set[tuple[int, ...]]:
+    with Image.open(path) as picture:
+        return {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
 
 
 def write_visit(path: Path, walls: Segments, seed: int) -> None:
@@ -52,9 +61,7 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
     new = json.loads((folder / "new.json").read_text())
     assert new["segments"] == TODAY.endpoints.tolist()
     assert (new["sigma"], new["meta"]) == (0.005, "A 3")
-    with Image.open(folder / "changes.png") as picture:
-        colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
-    assert (0xD5, 0x5E, 0x00) in colours  # what is removed
+    assert REMOVED in colours_of(folder / "changes.png")
 
 
 def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: RunningService) -> None:
@@ -110,10 +117,22 @@ def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) ->
     lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
     (folder / "drive.log").write_text("".join(lines))
     plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
-    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json")
+    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
     assert told.code == 0, told.err
+    assert REMOVED in colours_of(folder / "changes.png")
     answer = json.loads(told.out)
     assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
     assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
     wrong = linefix(*plain, "--update")
     assert (wrong.code, "--update: found no log" in wrong.err) == (2, True)
+
+
+@pytest.mark.parametrize("count", [3, 200, 228, 401, 455, 1597, 10_000])
+def test_a_long_log_gives_as_many_scans_as_wanted_from_all_over_it(count: int) -> None:
+    numbers = list(range(count))
+    taken = np.array(thinned(numbers, 200))  # type: ignore[type-var]
+    assert len(taken) == min(count, 200)
+    steps = np.diff(taken)
+    assert taken[0] == 0
+    assert taken[-1] >= count - 2.0 * count / len(taken)
+    assert steps.max() <= 2.0 * count / len(taken)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import linefix
-from linefix import checking, explaining, locating, ranges
+from linefix import checking, explaining, locating, ranges, updating
 
 ROOT = Path(linefix.__file__).parent.parent
 
@@ -46,7 +46,7 @@ def test_every_name_says_what_it_is(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", [linefix, checking, explaining, locating, ranges], ids=lambda module: module.__name__
+    "module", [linefix, checking, explaining, locating, ranges, updating], ids=lambda module: module.__name__
 )
 def test_examples_give_what_they_show(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]

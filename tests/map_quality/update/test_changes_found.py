@@ -45,7 +45,7 @@ def test_an_unchanged_hall_stays_as_it_is() -> None:
     found = updated(hall, *visits(hall, hall, hall))
     assert found.changes == ()
     assert found.segments.endpoints.tolist() == hall.endpoints.tolist()
-    assert (found.usable.scans, found.held_back.scans) == (21, 3)
+    assert (found.usable.scans, found.held_back.scans) == (22, 2)
     assert found.usable.before == found.usable.after > 18
 
 
@@ -106,6 +106,12 @@ def test_a_door_that_is_open_on_one_visit_and_shut_on_another_is_no_change() -> 
     assert updated(hall, *visits(shut, hall, shut, hall)).changes == ()
     assert updated(shut, *visits(shut, hall, hall, shut)).changes == ()
     assert updated(hall, *visits(shut, shut)).changes == ()
+
+
+def test_the_tip_of_an_open_leaf_is_no_wall_before_four_visits() -> None:
+    hall, tip = segments(RACK, PILLAR), segments(RACK, PILLAR, box(6.98, 6.7, 7.02, 7.2))  # hinged at (7, 8)
+    assert updated(hall, *visits(tip, tip, tip)).changes == ()
+    assert {one.code for one in updated(hall, *visits(*[tip] * 5)).changes} == {"added"}
 
 
 def test_a_doorway_that_stays_shut_on_many_visits_is_closed() -> None:

@@ -14,7 +14,7 @@ import map_quality
 from association import CancelledError, Deadline, MapIndex
 from map_quality import UpdateError, VisitScan
 from map_quality.update.hanging import hanging_lines, on_lines
-from map_quality.update.scans import Localized, scale_of, search
+from map_quality.update.scans import Localized, held_back, scale_of, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner
 
@@ -63,6 +63,24 @@ def test_scans_of_another_building_change_nothing_and_the_visits_are_named() -> 
     assert found.changes == ()
     assert [one.visit for one in found.refused_visits] == ["day 0", "day 1", "day 2"]
     assert "usable" in found.refused_visits[0].message
+
+
+def test_a_visit_counts_though_most_of_its_scans_are_off_the_map() -> None:
+    """As where the map shows a part of the building."""
+    other = Segments.from_array(np.array([[0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10], [11, 10, 0, 10],
+                                          [0, 10, 0, 0]], dtype=float))  # fmt: skip
+    scans = [*days(TODAY), *days(other), *days(other)]
+    found = map_quality.update(index(), scans)
+    assert found.refused_visits == ()
+    assert [one.code for one in found.changes] == ["removed"]
+    (refused, *_) = map_quality.update(index(), [*days(TODAY), *days(other) * 4]).refused_visits
+    assert "that the map shows the places" in refused.message
+
+
+def test_visits_along_one_route_hold_other_places_back() -> None:
+    held = np.array(held_back([k // 60 for k in range(300)])).reshape(5, 60)
+    assert held.sum(axis=1).tolist() == [6] * 5
+    assert held.sum(axis=0).max() == 1
 
 
 def test_a_proposal_that_there_is_no_time_to_verify_is_none() -> None:
@@ -126,7 +144,9 @@ def test_the_scale_of_scans_is_estimated_beside_their_poses_and_an_error_of_all_
     known, found = index(), []
     for number, one in enumerate(days(HALL, change=lambda ranges: ranges * factor + 0.01)):
         result = search(known, one, Deadline())
-        if result.usable and not any(warning.code == "map_scale" for warning in result.warnings):
+        # Most scans that are off scale are not usable, because they fit the map too badly; their poses are right.
+        is_placed = {reason.code for reason in result.reasons} <= {"map_mismatch", "insufficient_evidence"}
+        if is_placed and not any(warning.code == "map_scale" for warning in result.warnings):
             found.append(Localized(number, 0, one.scan, result, HALL, False))
     assert len(found) > 3
     estimated, sigma = scale_of(found, 0.005)

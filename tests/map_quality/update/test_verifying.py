@@ -17,7 +17,7 @@ from map_quality.update.applying import apply, kept_indices
 from map_quality.update.beams import Chunks, sees
 from map_quality.update.changes import Draft
 from map_quality.update.evidence import Gatherer
-from map_quality.update.scans import Localized, is_vouched, search
+from map_quality.update.scans import Localized, is_vouched, on_map, search
 from map_quality.update.verifying import blamed, is_better, keeps_usable
 from registration import Segments
 
@@ -111,3 +111,15 @@ def test_changes_replace_remove_and_append_segments_in_their_order() -> None:
     expected = [old.endpoints[0], shorter[0], old.endpoints[2], old.endpoints[4], shorter[1], new[0]]
     assert apply(old, changes).endpoints.tolist() == np.array(expected).tolist()
     assert kept_indices(5, changes).tolist() == [0, -1, 2, 4, -1, -1]
+
+
+def test_correspondences_go_over_to_another_map_with_the_same_walls() -> None:
+    one = localized(HALL, HALL)[0]
+    matched = [pair.map for pair in one.result.correspondences]
+    gone = matched[-1]
+    other = np.delete(HALL.endpoints, gone, axis=0)[::-1]
+    moved = on_map(one, Segments.derived(np.ascontiguousarray(other)))
+    kept = [(pair.scan, pair.map) for pair in one.result.correspondences if pair.map != gone]
+    assert [pair.scan for pair in moved.result.correspondences] == [scan for scan, _ in kept]
+    assert np.array_equal(moved.on.endpoints[[pair.map for pair in moved.result.correspondences]],
+                          HALL.endpoints[[wall for _, wall in kept]])  # fmt: skip
