@@ -70,7 +70,7 @@ def associate(
     2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
     3. Search again to scale, if scan and map differ by a factor near one according to the best explanation.
     4. Judge: how likely the best explanation is right, and whether a robot may use it.
-    5. If it may not: search by the ends of beams, too. What explains the scan better is put to scale and judged.
+    5. If it may not: search by the ends of beams, too. A pose that explains the scan better is put to scale and judged.
     6. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.
     7. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
 

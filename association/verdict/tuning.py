@@ -71,8 +71,8 @@ OFFSET_OF_FEW = 0.002  # m, measured; only of segments, and where they are off b
 TOLERANCE = (0.3, math.radians(3.0))  # m, rad; a pose that is off by less is right
 # The probability that is allowed of a pose beyond that, by its covariance. Measured: rejects 8 of 1,734 usable answers.
 MOST_BEYOND = 0.05
-# Fraction of a scan's length that is parallel to walls at 0.1 to 0.35 m. Measured: of 365 right answers on distorted maps
-# and with turning robots 11 have more, and nine of these are 4 to 11 standard deviations off; of 253 in logs 1.
+# Fraction of a scan's length that is parallel to walls, 0.1 to 0.35 m from them. Measured: of 365 right answers on
+# distorted maps and with turning robots 11 have more, nine of these 4 to 11 standard deviations off; of 253 in logs 1.
 MOST_DISPLACED = 0.25
 NO_ALTERNATIVE = 8.0  # nats, tables; an explanation that scores so much less is no alternative
 TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not returned
