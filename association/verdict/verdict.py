@@ -17,6 +17,7 @@ from .features import Description, describe_answer
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import SENTENCES, Doubts, reasons_of
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from .turning import turn_during_scan
 from .unobservable import beyond_tolerance, choose_along_direction
 from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 
@@ -160,6 +161,7 @@ def findings_of(
         off_scale=off_scale,
         beyond_tolerance=beyond_tolerance(context, answer),
         displaced_walls=displaced_walls(context, answer.best),
+        turned=turn_during_scan(context, answer.best),
     )
 
 

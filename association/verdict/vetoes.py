@@ -45,6 +45,8 @@ class Findings:
         Probability by the covariance that the pose is off by more than `TOLERANCE`, 0 to 1.
     displaced_walls : float
         Fraction of the scan's length that is parallel to walls of the map, at 0.1 to 0.35 m from them; 0 to 1.
+    turned : float
+        By how much the robot seems to have turned during the scan, rad; 0 if its walls do not show it.
     mirrored_better : float
         Score of the mirrored scan over the answer's, less 1; 0 where it is less, or was not searched.
     """
@@ -60,6 +62,7 @@ class Findings:
     off_scale: bool = False
     beyond_tolerance: float = 0.0
     displaced_walls: float = 0.0
+    turned: float = 0.0
     mirrored_better: float = 0.0
 
 
@@ -120,6 +123,10 @@ IMPRECISE = (
 DISPLACED = (
     "Much of the scan is parallel to walls of the map, at one to three decimetres from them. Check the map: it may be "
     "distorted, or show the middle of the walls."
+)
+TURNED = (
+    "The angles of the scan are distorted: the robot turned during it, or `angle_increment` is wrong. Send `twist` and "
+    "`time_increment`, or scan again at rest."
 )
 BETTER_ELSEWHERE = Veto(
     "better_elsewhere",
@@ -195,6 +202,16 @@ DISPLACED_WALLS = Veto(
     settles=True,
     message=DISPLACED,
 )
+TURNED_MEANWHILE = Veto(
+    "turned",
+    lambda found: found.turned > 0.0,
+    ("map_mismatch",),
+    Origin.MEASURED,
+    caps=Status.AMBIGUOUS,
+    counts_with=frozenset({Status.AMBIGUOUS}),
+    settles=True,
+    message=TURNED,
+)
 MIRRORED_FITS_BETTER = Veto(
     "mirrored",
     lambda found: found.mirrored_better >= MIRRORED_BETTER,
@@ -216,6 +233,7 @@ VETOES: tuple[Veto, ...] = (
     OUT_OF_STEP,
     OFF_ITS_SCALE,
     DISPLACED_WALLS,
+    TURNED_MEANWHILE,
     MIRRORED_FITS_BETTER,
 )
 

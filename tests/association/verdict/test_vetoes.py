@@ -46,6 +46,7 @@ LIMITS: dict[str, tuple[Findings, Findings]] = {
         replace(NOTHING, displaced_walls=MOST_DISPLACED),
         replace(NOTHING, displaced_walls=math.nextafter(MOST_DISPLACED, 1.0)),
     ),
+    "turned": (NOTHING, replace(NOTHING, turned=1e-9)),
     "mirrored": (
         replace(NOTHING, mirrored_better=math.nextafter(MIRRORED_BETTER, 0.0)),
         replace(NOTHING, mirrored_better=MIRRORED_BETTER),
@@ -72,7 +73,7 @@ def test_a_veto_applies_from_its_limit_on_and_alone(name: str) -> None:
 
 
 def test_vetoes_apply_in_the_order_of_the_table() -> None:
-    everything = Findings(False, 1.0, 99.0, -99.0, True, True, True, 0.0, True, 1.0, 1.0, 9.0)
+    everything = Findings(False, 1.0, 99.0, -99.0, True, True, True, 0.0, True, 1.0, 1.0, 1.0, 9.0)
     assert [veto.name for veto in applied(everything)] == list(LIMITS)
 
 
@@ -84,7 +85,16 @@ def test_with_another_status_the_status_is_the_reason() -> None:
         (Status.DEGENERATE, {"outside_window", "unobservable_direction"}),
         (
             Status.AMBIGUOUS,
-            {"outside_window", "few_walls", "imprecise", "out_of_step", "off_scale", "displaced_walls", "mirrored"},
+            {
+                "outside_window",
+                "few_walls",
+                "imprecise",
+                "out_of_step",
+                "off_scale",
+                "displaced_walls",
+                "turned",
+                "mirrored",
+            },
         ),
         (Status.OK, {"outside_window"}),
     ):

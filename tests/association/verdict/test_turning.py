@@ -1,0 +1,71 @@
+"""Whether the angles of a scan are distorted by a turn of the robot, or by a wrong angle between its beams."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from association import MapIndex, Scan, associate
+from association.explain import explain_at
+from association.verdict.turning import turn_during_scan
+from registration import RigidTransform, Segments
+from simulation import Scanner
+from simulation import scan as simulate
+from vectorization import LaserScan, vectorize
+
+from ..scenes import INSIDE, ROOM, context_of, index_of
+
+FAN = math.radians(270.0)
+BEAMS = 811
+
+
+def sent(turn: float) -> Scan:
+    """Return a scan of the room whose beams go `turn` radians farther, in all, than is declared."""
+    step = FAN / (BEAMS - 1)
+    real = 1.0 + turn / FAN
+    scanner = Scanner(beams=BEAMS, angle_min=-0.5 * FAN * real, angle_increment=step * real, sigma=0.005)
+    walls = Segments.from_array(ROOM)
+    ranges = simulate(walls, INSIDE, scanner, np.random.default_rng(1)).ranges
+    seen = vectorize(LaserScan(-0.5 * FAN, step, ranges, 0.0, scanner.range_max))
+    return Scan(seen.measured, (0.0, 0.0), seen.beams)
+
+
+def turned(scan: Scan) -> float:
+    context = context_of(index_of(ROOM), scan)
+    answer = explain_at(context, INSIDE).answer
+    assert answer is not None
+    return turn_during_scan(context, answer.best)
+
+
+@pytest.mark.parametrize("degrees", [-8.0, -4.0, 4.0, 8.0])
+def test_the_turn_is_estimated(degrees: float) -> None:
+    assert math.degrees(turned(sent(math.radians(degrees)))) == pytest.approx(abs(degrees), rel=0.25)
+
+
+def test_a_robot_at_rest_does_not_turn() -> None:
+    assert turned(sent(0.0)) == 0.0
+
+
+def test_such_an_answer_is_not_usable_and_says_why() -> None:
+    index = MapIndex.build(Segments.from_array(ROOM), 0.01)
+    assert associate(index, sent(0.0)).usable
+    answer = associate(index, sent(math.radians(6.0)))
+    assert not answer.usable
+    (reason,) = (one for one in answer.reasons if one.code == "map_mismatch")
+    assert "`twist`" in reason.message
+
+
+def test_segments_without_ranges_do_not_say_when_they_were_seen() -> None:
+    scan = sent(math.radians(6.0))
+    assert turned(Scan(scan.measured, (0.0, 0.0))) == 0.0
+
+
+def test_a_pose_far_from_the_map_frame_changes_nothing() -> None:
+    by = RigidTransform(3.0, -2.0, 2.9)
+    walls = by.apply(ROOM.reshape(-1, 2, 2)).reshape(-1, 4)
+    context = context_of(index_of(walls), sent(math.radians(6.0)))
+    answer = explain_at(context, by.compose(INSIDE)).answer
+    assert answer is not None
+    assert math.degrees(turn_during_scan(context, answer.best)) == pytest.approx(6.0, rel=0.25)
