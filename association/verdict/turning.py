@@ -8,6 +8,7 @@ import numpy as np
 
 from ..consensus.consensus_set import ConsensusSet
 from ..context import SearchContext
+from ..tuning import MODEL_ANGLE
 from .tuning import FEWEST_FOR_TURN, MANY, TURN_DEVIATIONS
 
 
@@ -19,7 +20,8 @@ def turn_during_scan(context: SearchContext, best: ConsensusSet) -> float:
     angles between the matched lines and their walls. The residuals give the deviation; of few lines it is not below
     that of the lines' angles.
 
-    0 if the rate is within `TURN_DEVIATIONS` deviations of 0, without ranges, of several views, and of few lines.
+    0 if the rate is within `TURN_DEVIATIONS` deviations of 0; if the turn is below `MODEL_ANGLE`, as rounding makes of
+    scans without noise; without ranges, of several views, and of few lines.
     """
     scan = context.scan
     if scan.beams is None or scan.views is not None or len(scan.beams.angles) < 2:
@@ -44,5 +46,5 @@ def turn_during_scan(context: SearchContext, best: ConsensusSet) -> float:
     scale = float(weights @ left**2) / (len(lines) - 2)
     if len(lines) < MANY:
         scale = max(1.0, scale)
-    shown = abs(rate) > TURN_DEVIATIONS * math.sqrt(scale / information)
-    return abs(rate * (last - first)) if shown else 0.0
+    turn = abs(rate * (last - first))
+    return turn if turn > MODEL_ANGLE and abs(rate) > TURN_DEVIATIONS * math.sqrt(scale / information) else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -41,6 +42,22 @@ def _room(with_beams: bool) -> SearchContext:
     return context_of(ROOM_INDEX, replace(SCAN, beams=beams))
 
 
+@cache
+def _walls_of_lines() -> list[int]:
+    """Return the wall of ROOM that each line of the scan lies on."""
+    walls, at = ROOM_INDEX.walls.rows, local(ROOM_INDEX, INSIDE)
+    found = []
+    for line in _room(False).lines.rows:
+        x, y = at.apply(np.array([[line["x"], line["y"]]]))[0]
+        theta = line["angle"] + at.theta
+        turned = walls["dx"] * math.cos(theta) + walls["dy"] * math.sin(theta)
+        off = np.abs(walls["dx"] * y - walls["dy"] * x - walls["offset"])
+        along = walls["dx"] * x + walls["dy"] * y
+        on = (off < 1e-6) & (turned > 0.999) & (along > walls["begin"]) & (along < walls["end"])
+        found.append(int(np.flatnonzero(on)[0]))
+    return found
+
+
 def matches_of(walls: Sequence[int]) -> Records:
     """Return matches with these walls, or -1."""
     matches = np.zeros(len(walls), MATCH)
@@ -74,7 +91,7 @@ def ranked(
     }
     named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
-    matches = matches_of([k if k < matched else -1 for k in range(8)])
+    matches = matches_of([wall if k < matched else -1 for k, wall in enumerate(_walls_of_lines())])
     each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
     matches["score"] = np.where(matches["wall"] >= 0, each, 0.0)
     return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)

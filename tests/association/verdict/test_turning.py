@@ -1,4 +1,4 @@
-"""Whether the angles of a scan are distorted by a turn of the robot, or by a wrong angle between its beams."""
+"""The angles of a scan are distorted if the robot turns meanwhile, or if the angle between beams is wrong."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from simulation import Scanner
 from simulation import scan as simulate
 from vectorization import LaserScan, vectorize
 
-from ..scenes import INSIDE, ROOM, context_of, index_of
+from ..scenes import INSIDE, ROOM, beams_of, context_of, index_of, scan_of, seen
 
 FAN = math.radians(270.0)
 BEAMS = 811
@@ -46,6 +46,17 @@ def test_the_turn_is_estimated(degrees: float) -> None:
 
 def test_a_robot_at_rest_does_not_turn() -> None:
     assert turned(sent(0.0)) == 0.0
+
+
+def test_rounding_is_no_turn() -> None:
+    """Without any noise the residuals are as small as the rate."""
+    for degrees in range(0, 360, 10):
+        here = RigidTransform(INSIDE.x, INSIDE.y, math.radians(degrees))
+        index = index_of(ROOM)
+        context = context_of(index, scan_of(seen(ROOM, here)[0], viewpoint=(0.0, 0.0), beams=beams_of(index, here)))
+        answer = explain_at(context, here).answer
+        assert answer is not None
+        assert turn_during_scan(context, answer.best) == 0.0
 
 
 def test_such_an_answer_is_not_usable_and_says_why() -> None:
