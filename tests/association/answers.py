@@ -43,7 +43,7 @@ def _room(with_beams: bool) -> SearchContext:
 
 
 @cache
-def _walls_of_lines() -> list[int]:
+def walls_of_lines() -> list[int]:
     """Return the wall of ROOM that each line of the scan lies on."""
     walls, at = ROOM_INDEX.walls.rows, local(ROOM_INDEX, INSIDE)
     found = []
@@ -73,9 +73,13 @@ def ranked(
     matched: int = 8,
     at: RigidTransform | None = None,
     covariance: Floats = SHARP,
+    walls: Sequence[int] = range(8),
     **scores: Any,
 ) -> ConsensusSet:
-    """Return an explanation of a scan of 8 segments; `at` in the index frame, `prior` what one says of it."""
+    """Return an explanation of a scan of 8 segments, matched with `walls`.
+
+    `at` in the index frame, `prior` what one says of it.
+    """
     usual = {
         "inside": True,
         "chi_square": 6.0,
@@ -91,7 +95,7 @@ def ranked(
     }
     named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
-    matches = matches_of([wall if k < matched else -1 for k, wall in enumerate(_walls_of_lines())])
+    matches = matches_of([wall if k < matched else -1 for k, wall in enumerate(walls)])
     each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
     matches["score"] = np.where(matches["wall"] >= 0, each, 0.0)
     return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)

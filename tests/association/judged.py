@@ -27,6 +27,7 @@ from .answers import (
     registered_corridor,
     registered_room,
     room,
+    walls_of_lines,
 )
 from .reference import verdict as twin
 from .scenes import INSIDE, pose
@@ -145,6 +146,7 @@ class Drawn:
             n.score,
             self.prior,
             matched=self.matched,
+            walls=walls_of_lines(),
             fraction=n.share,
             misfit=n.misfit,
             read=n.read,
