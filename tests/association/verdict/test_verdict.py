@@ -267,6 +267,10 @@ def test_what_is_compared_after_the_deadline_is_not_usable(
     compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
 
     def late(*arguments: Any) -> Any:
+        if during == "search":  # it would stop if it saw the deadline
+            found = compared(*arguments)
+            deadline.at = 0.0
+            return found
         deadline.at = 0.0
         return compared(*arguments)
 
