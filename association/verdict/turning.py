@@ -21,10 +21,10 @@ def turn_during_scan(context: SearchContext, best: ConsensusSet) -> float:
     that of the lines' angles.
 
     0 if the rate is within `TURN_DEVIATIONS` deviations of 0; if the turn is below `MODEL_ANGLE`, as rounding makes of
-    scans without noise; without ranges, of several views, and of few lines.
+    scans without noise; without ranges or their order, of several views, and of few lines.
     """
     scan = context.scan
-    if scan.beams is None or scan.views is not None or len(scan.beams.angles) < 2:
+    if scan.beams is None or scan.views is not None or not scan.ordered or len(scan.beams.angles) < 2:
         return 0.0
     matched = best.matched
     lines, walls = context.lines.rows[matched], context.index.walls.rows[best.matches["wall"][matched]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,9 +69,10 @@ def test_such_an_answer_is_not_usable_and_says_why() -> None:
     assert "`twist`" in reason.message
 
 
-def test_segments_without_ranges_do_not_say_when_they_were_seen() -> None:
+def test_the_time_of_a_segment_is_unknown_without_ranges_or_their_order() -> None:
     scan = sent(math.radians(6.0))
     assert turned(Scan(scan.measured, (0.0, 0.0))) == 0.0
+    assert turned(replace(scan, ordered=False)) == 0.0
 
 
 def test_a_pose_far_from_the_map_frame_changes_nothing() -> None:

@@ -26,7 +26,7 @@ def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Runn
                 with lock:
                     if key == "robot":
                         begun.set()
-                    # What is answered after the last counted one had no competition for its place.
+                    # Requests that are answered after the last counted one had no competition.
                     if begun.is_set() and not enough.is_set():
                         answers[key, answer.status_code] += 1
                     if answer.status_code == 429:
