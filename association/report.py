@@ -13,6 +13,7 @@ from registration import Ambiguity
 
 from .causes import Cause
 from .consensus.acceptance import correspondences, overlaps_at
+from .consensus.common_offset import CommonOffset
 from .consensus.consensus_set import ConsensusSet, matches_of
 from .consensus.estimation import EstimatedPose, estimate_poses, slices_between_looks
 from .consensus.kernels.measures import paper_measures
@@ -31,9 +32,13 @@ from .warnings import warnings_of, warnings_of_causes
 
 
 def report(
-    context: SearchContext, explanations: Explanations, verdict: Verdict, factor: Factor | None = None
+    context: SearchContext,
+    explanations: Explanations,
+    verdict: Verdict,
+    factor: Factor | None = None,
+    offset: CommonOffset | None = None,
 ) -> AssociationResult:
-    """Put an answer together; `factor` is the one by which the scan was put to scale.
+    """Put an answer together; `factor` is the one by which the scan was put to scale, `offset` that of all its walls.
 
     If the deadline passes before it is put together, the answer is not complete, and so not usable.
     """
@@ -63,7 +68,7 @@ def report(
         reasons=verdict.reasons,
         alternatives=alternatives,
         search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict, factor),
+        warnings=warnings_of(context, explanations.search, verdict, factor, offset),
     )
 
 

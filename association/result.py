@@ -34,6 +34,7 @@ WarningCode = Literal[
     "prior_contradicted",
     "search_incomplete",
     "map_scale",
+    "common_offset",
     "last_view_only",
     "mirrored",
     "reversed",

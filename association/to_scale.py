@@ -11,15 +11,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from registration import RigidTransform
+from registration.layout import Floats
 from registration.values import value
 
 from .consensus.acceptance import register_accepted
+from .consensus.common_offset import CommonOffset, fit_common_offset
 from .consensus.consensus_set import ConsensusSet
 from .consensus.ranking import rank_candidates
 from .consensus.similarity import Similarity, fit_similarity, fit_trimmed_similarity
 from .context import SearchContext
 from .explain import search_and_explain
-from .explanations import Explanations, add_alternatives
+from .explanations import Answer, Explanations, add_alternatives
 from .options import AssociationOptions
 from .scan.scan import Scan, scaled
 from .search.candidates import Effort, allowed_by, find_candidates
@@ -76,6 +79,8 @@ class ScaledSearch:
         By which the scan was put to scale; None where it is as it was sent.
     off_scale : bool
         True if it is as it was sent, and its consensus set is off by more than `MOST_FACTOR`.
+    offset : CommonOffset or None
+        That all walls of the answer share, where it is beyond noise and explains the scan without a factor.
     """
 
     context: SearchContext
@@ -83,6 +88,7 @@ class ScaledSearch:
     as_sent: Explanations
     factor: Factor | None = None
     off_scale: bool = False
+    offset: CommonOffset | None = None
 
     @property
     def score(self) -> float:
@@ -108,10 +114,11 @@ def search_to_scale(context: SearchContext) -> ScaledSearch:
 def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
     """Search a scan again to scale if its best explanation is off by a factor near one; use the result if much better.
 
-    1. Estimate the factor by a similarity that is fitted to the best consensus set.
-    2. Search the scan at that factor, until the factor is right.
-    3. Search for alternatives at other scales, each at the one that fits it best.
-    4. Add the uncertainty of the factor to the pose's covariance.
+    1. If an offset that all walls share explains the best consensus set without a factor, correct its pose by that.
+    2. Estimate the factor by a similarity that is fitted to the best consensus set.
+    3. Search the scan at that factor, until the factor is right.
+    4. Search for alternatives at other scales, each at the one that fits it best.
+    5. Add the uncertainty of the factor to the pose's covariance.
 
     Parameters
     ----------
@@ -127,6 +134,9 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
     first = ScaledSearch(context, as_sent, as_sent)
     if not _may_be_off(first):
         return first
+    with_offset = _with_common_offset(first)
+    if with_offset is not None:
+        return with_offset
     similarity = _similarity(first)
     found = _search_with_factor(first, similarity)
     if found.factor is None:
@@ -148,6 +158,27 @@ def _may_be_off(first: ScaledSearch) -> bool:
     if declared is None:
         return answer.estimated.wall_sigma >= LEAST_OFF_WALLS
     return LEAST_OFF_WALLS <= declared <= LOOSE_WALLS
+
+
+def _with_common_offset(first: ScaledSearch) -> ScaledSearch | None:
+    """Return the search with the pose of an offset that all walls share; None unless that explains it alone."""
+    context, answer = first.context, first.explanations.answer
+    assert answer is not None  # see `_may_be_off`
+    if answer.estimated.free or answer.estimated.degenerate:
+        return None
+    found = fit_common_offset(context, answer.best, answer.estimated.wall_sigma)
+    if found is None or is_factor(found.factor, found.factor_deviation):
+        return None
+    answer = _moved(context, answer, found.pose, found.covariance)
+    return replace(first, explanations=replace(first.explanations, answer=answer), offset=found)
+
+
+def _moved(context: SearchContext, answer: Answer, pose: RigidTransform, covariance: Floats) -> Answer:
+    """Return an answer with another pose, at which its pairs are evaluated."""
+    estimated = replace(answer.estimated, pose=pose, covariance=covariance)
+    registered = register_accepted(context, answer.best, answer.accepted, estimated, fitted=False)
+    assert registered is not None  # of pairs that it was registered of before
+    return replace(answer, estimated=estimated, registered=registered[0])
 
 
 def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> ScaledSearch:
@@ -203,7 +234,12 @@ def _similarity(found: ScaledSearch) -> Similarity | None:
 
 def is_off(similarity: Similarity) -> bool:
     """Return whether a similarity differs from a rigid motion by its factor."""
-    return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
+    return is_factor(similarity.factor, similarity.deviation)
+
+
+def is_factor(factor: float, deviation: float) -> bool:
+    """Return whether a factor with this standard deviation differs from one."""
+    return abs(factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * deviation)
 
 
 def is_far_off(similarity: Similarity) -> bool:
@@ -251,10 +287,7 @@ def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
     answer, factor, similarity = found.explanations.answer, found.factor, _similarity(found)
     if answer is None or factor is None or similarity is None:
         return found
-    estimated = replace(answer.estimated, pose=similarity.pose, covariance=similarity.covariance)
-    registered = register_accepted(found.context, answer.best, answer.accepted, estimated, fitted=False)
-    assert registered is not None  # of pairs that it was registered of before
-    answer = replace(answer, estimated=estimated, registered=registered[0])
+    answer = _moved(found.context, answer, similarity.pose, similarity.covariance)
     factor = Factor(factor.value * similarity.factor, similarity.deviation)
     return replace(found, explanations=replace(found.explanations, answer=answer), factor=factor)
 

@@ -9,6 +9,7 @@ import numpy as np
 from registration import Beams
 
 from .causes import Cause, Mistake
+from .consensus.common_offset import CommonOffset
 from .context import SearchContext
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
@@ -35,7 +36,11 @@ NOT_IN_ORDER = (
 
 
 def warnings_of(
-    context: SearchContext, search: SearchReport, verdict: Verdict, factor: Factor | None = None
+    context: SearchContext,
+    search: SearchReport,
+    verdict: Verdict,
+    factor: Factor | None = None,
+    offset: CommonOffset | None = None,
 ) -> tuple[AssociationWarning, ...]:
     """List the warnings about scan, search and map."""
     found = _of_scan(context) | {
@@ -45,6 +50,7 @@ def warnings_of(
         else None,
         "search_incomplete": None if search.complete else _incomplete(context),
         "map_scale": None if factor is None else _off_scale(factor),
+        "common_offset": None if offset is None else _offset(offset, context.index.sigma or 0.0),
     }
     return _listed(found)
 
@@ -104,6 +110,18 @@ def _off_scale(factor: Factor) -> str:
     return (
         f"The scan fits much better with its lengths times {factor.value:.4f} (+-{factor.deviation:.4f}), and was "
         "searched with this factor. The pose is in the unscaled map. Check the scale of the map and of the ranges."
+    )
+
+
+def _offset(offset: CommonOffset, sigma: float) -> str | None:
+    """Describe an offset of all walls that is greater than the map's sigma."""
+    if abs(offset.offset) <= sigma:
+        return None
+    side = "nearer to the sensor" if offset.offset > 0.0 else "farther from the sensor"
+    return (
+        f"All walls are {100.0 * abs(offset.offset):.1f} cm (+-{100.0 * offset.deviation:.1f} cm) {side} than the map "
+        "has them. The pose is corrected for this offset. Check the range bias of the laser, and whether the map has "
+        "the faces of walls or their centre lines."
     )
 
 

@@ -139,7 +139,7 @@ def _judged(context: SearchContext, found: ScaledSearch) -> tuple[AssociationRes
     By these ways are compared: any may be made up for by a factor. Usable is in each what its answer is.
     """
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
-    result = report(found.context, found.explanations, verdict, factor=found.factor)
+    result = report(found.context, found.explanations, verdict, factor=found.factor, offset=found.offset)
     if found.factor is None:
         return result, _trial(result), verdict
     verdict = judge(context, found.as_sent)

@@ -469,6 +469,7 @@ class WarningAnswer(TypedDict):
         "prior_contradicted",
         "search_incomplete",
         "map_scale",
+        "common_offset",
         "last_view_only",
         "mirrored",
         "reversed",
