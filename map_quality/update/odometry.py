@@ -52,7 +52,7 @@ class Carrying:
         """Carry poses forward and backward in each visit, one search at a step.
 
         1. Anchors are usable scans that another one of the visit confirms: the nearest before or after it agrees with
-           it by odometry. A scan that contradicts two which agree with one another is no evidence.
+           it by odometry. A usable scan that none confirms, and that contradicts an anchor, is no evidence.
         2. The pose of the last anchor, moved on by odometry, is the prior of the next scan. If that is usable with it,
            its pose is carried on.
         3. If the next anchor contradicts what was carried to it, the scans between lose the carried poses.
@@ -69,13 +69,18 @@ class Carrying:
             yield from self._along(rows[::-1], anchors)
 
     def _anchors(self, usable: Sequence[int]) -> set[int]:
-        """Return the usable scans that another one confirms; mark those that two others contradict."""
-        pairs = [(a, b) for a, b in itertools.pairwise(usable) if self._agree(a, b)]
-        confirmed = {k for pair in pairs for k in pair}
-        for before, one, after in zip(usable, usable[1:], usable[2:], strict=False):
-            if one not in confirmed and self._agree(before, after):
-                self.found[one] = replace(self.found[one], contradicted=True)
-                confirmed |= {before, after}
+        """Return the usable scans that another one confirms; mark those that only contradict one of these.
+
+        Where more neighbours contradict each other than agree, odometry is not known well, and shows nothing.
+        """
+        pairs = list(itertools.pairwise(usable))
+        agreeing = [pair for pair in pairs if self._agree(*pair)]
+        against = [pair for pair in pairs if self._distance(*pair) > AGREEING]
+        if len(against) > len(agreeing):
+            return set()
+        confirmed = {k for pair in agreeing for k in pair}
+        for one in {k for pair in against if confirmed.intersection(pair) for k in pair} - confirmed:
+            self.found[one] = replace(self.found[one], contradicted=True)
         return confirmed
 
     def _along(self, rows: Sequence[int], anchors: set[int]) -> Generator[None, None, None]:
@@ -100,14 +105,14 @@ class Carrying:
 
     def _carried(self, last: int, k: int) -> Localized | None:
         """Search a scan with the prior from another; None where the prior is too wide, or there is no time."""
-        pose, covariance = self._predicted(last, k)
-        if _sigma(covariance) > MOST_CONFIRMING_SIGMA or time.monotonic() > self.until:
-            return None
         if self.deadline.cancelled:
             raise CancelledError
+        pose, covariance = self._predicted(last, k)
+        if _sigma(covariance) > MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
+            return None
         sent = replace(self.scans[k], pose=pose, covariance=covariance)
         result = search(self.index, sent, self.deadline)
-        found = replace(self.found[k], result=result, vouched=is_vouched(sent, result))
+        found = replace(self.found[k], result=result, on=self.index.segments, vouched=is_vouched(sent, result))
         if found.located:
             self._trail.append((k, self.scans[k], self.found[k]))
             self.scans[k], self.found[k] = sent, found

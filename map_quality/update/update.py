@@ -278,6 +278,7 @@ class _Update:
         for one, now in zip(first, latest, strict=True):
             again = not one.precise and not self.deadline.passed and sees(changed, one, self.sigma)
             found.append((yield from self._search(new, one)) if again else now)
+        yield from Carrying(new, list(self.scans), found, self.deadline).carry()
         return found
 
     def _search_all(

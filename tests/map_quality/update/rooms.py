@@ -19,7 +19,7 @@ ROOM: list[list[float]] = [[0, 0, 4, 0], [4, 0, 4, 2.5], [4, 2.5, 3, 2.5], [3, 2
 CUPBOARD = box(1.6, 1.6, 2.2, 2.4)
 FIRST, SECOND = (14.0, 0.0), (14.0, 7.0)  # where the rooms are
 IN_HALL = [(4.5, 6.5), (1.5, 1.5), (6.0, 1.2), (9.5, 2.0), (10.5, 5.0)]
-IN_ROOM: list[list[float]] = [(0.8, 0.8), (0.9, 2.6), (1.5, 4.2), (2.6, 1.0), (2.5, 3.2)]
+IN_ROOM = [(0.8, 0.8), (0.9, 2.6), (1.5, 4.2), (2.6, 1.0), (2.5, 3.2)]
 
 
 def moved(things: Sequence[Sequence[float]], by: tuple[float, float]) -> list[list[float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 import map_quality
 from association import Deadline, MapIndex
 from map_quality import MapUpdate, VisitScan
+from map_quality.update.changes import Draft
 from map_quality.update.odometry import Carrying
+from map_quality.update.result import Change, Evidence
 from map_quality.update.scans import Localized, search
+from map_quality.update.update import _Update
 from registration import RigidTransform, Segments
 
 from .rooms import FIRST, IN_HALL, SECOND, drive, places_in, rooms, with_odometry
@@ -34,6 +38,16 @@ def days(
     places: list[tuple[float, float]], walls: Segments = TODAY, jumps: dict[int, tuple[float, float]] | None = None
 ) -> list[VisitScan]:
     return [one for k in range(3) for one in with_odometry(drive(walls, places, k), f"day {k}", jumps)]
+
+
+def finished(steps: Generator[None, None, list[Localized]]) -> list[Localized]:
+    """Return what a generator returns."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            found: list[Localized] = done.value
+            return found
 
 
 def carried(scans: list[VisitScan]) -> list[Localized]:
@@ -74,6 +88,11 @@ def test_with_odometry_in_another_unit_scans_alone_are_evidence(factor: float) -
     assert told(updated(scans)) == [("removed", (12, 13, 14, 15))]
 
 
+def test_odometry_that_mostly_contradicts_the_scans_shows_nothing() -> None:
+    scans = days([*IN_HALL, *places_in(SECOND)], jumps={2: (9.0, 0.0), 3: (-20.0, 0.0), 4: (30.0, 0.0)})[:10]
+    assert [one.precise for one in carried(scans)] == [True] * 5 + [False] * 5
+
+
 def test_a_usable_scan_that_two_others_contradict_is_no_evidence() -> None:
     scans = days(IN_HALL)[:5]
     assert [one.precise for one in carried(list(scans))] == [True] * 5
@@ -94,6 +113,19 @@ def test_a_pose_is_carried_from_scan_to_scan_so_that_odometry_may_drift() -> Non
     drifting = dict.fromkeys(range(len(IN_HALL), len(IN_AND_OUT)), (0.6, 0.0))
     found = carried(days(IN_AND_OUT, jumps=drifting)[:10])
     assert [one.located for one in found] == [True] * 10
+
+
+def test_poses_are_carried_from_scans_that_changes_make_usable() -> None:
+    """The map does not have the outline of the hall; a change adds it."""
+    old, new = Segments.derived(TODAY.endpoints[12:]), TODAY.endpoints[:12]
+    begun = _Update.of(MapIndex.build(old, 0.005), days([*IN_HALL, *places_in(SECOND)]), Deadline())
+    first, none = finished(begun.localize()), np.zeros(0, dtype=np.intp)
+    added = Change("added", (), new, np.full(12, 0.005), Evidence(0, 99, 9, 3, "day 0", "day 2"), 0.99)
+    draft = Draft(added.code, (), new, added.sigma, none, none)
+    found = finished(begun.search_others([(draft, added)], first, first))
+    rooms_first, rooms_then = ([one.located for one in some if one.number % 10 > 4] for some in (first, found))
+    assert not any(rooms_first)
+    assert sum(rooms_then) >= 12
 
 
 def test_scans_that_are_held_back_are_searched_alone() -> None:
