@@ -37,6 +37,7 @@ def update_map(
     visits : mapping of str to iterable of scans
         The scans of each visit, by its name; at least two visits are needed for a change. Scans with ranges, in a form
         that `scan_of` takes. A `VisitScan` may have a pose of its own; it keeps its scan, and takes the visit's name.
+        The `pose` of a scan of a log is its odometry; scans with odometry are in the order of time.
     deadline : Deadline, optional
         If it passes before the proposal is verified, nothing is proposed.
     accept : float, optional
@@ -86,10 +87,12 @@ def _visit_scan(one: Any, visit: str, number: int) -> VisitScan:
     """Return a scan of a visit; raises `InputError` where it is none with ranges."""
     if isinstance(one, VisitScan):
         return replace(one, visit=visit)
-    if isinstance(one, MountedScan):  # the mount does not matter to the map
+    odometry = None
+    if isinstance(one, MountedScan):  # the mount does not matter to the map; odometry is that of the sensor
+        odometry = getattr(one, "pose", None)
         one = RangeScan(one.laser, one.time_increment, None, one.flipped)
     scan = scan_of(one)
     if scan.beams is None:
         told = "found a scan without ranges, expected ranges: segments and points do not show free space"
         raise InvalidArgumentError(told, argument=f"visits.{visit}.{number}")
-    return VisitScan(scan, visit)
+    return VisitScan(scan, visit, odometry=odometry)

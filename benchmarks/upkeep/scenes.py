@@ -19,6 +19,7 @@ from vectorization import LaserScan
 SCANNER = Scanner.over(math.tau, 720, range_max=20.0, sigma=0.02)
 CLUTTER = 0.1  # of the beams end on people and pallets
 OWN_ERROR = (0.2, 0.2, 0.1)  # m, m, rad; of poses that a robot sends
+ODOMETRY_ERROR = (0.05, 0.01, 0.02)  # m for each metre, rad for each metre, rad for each radian
 AWAY = 0.4  # m; of a place from that of the visit before
 
 
@@ -79,6 +80,32 @@ def with_poses(taken: Sequence[tuple[VisitScan, RigidTransform]], rng: np.random
     for one, at in taken:
         x, y, theta = rng.normal(0.0, OWN_ERROR)
         out.append(replace(one, pose=RigidTransform(at.x + x, at.y + y, at.theta + theta), covariance=covariance))
+    return out
+
+
+def routed(scene: Scene) -> Scene:
+    """Return a scene with its places in the order of a route: the nearest of those left comes next."""
+    left = list(scene.places)
+    route = [left.pop(0)]
+    while left:
+        gaps = [math.hypot(one.x - route[-1].x, one.y - route[-1].y) for one in left]
+        route.append(left.pop(int(np.argmin(gaps))))
+    return replace(scene, places=tuple(route))
+
+
+def with_odometry(taken: Sequence[tuple[VisitScan, RigidTransform]], rng: np.random.Generator) -> list[VisitScan]:
+    """Return scans with odometry, which starts at zero in each visit, and whose error grows with the distance."""
+    out: list[VisitScan] = []
+    last, here = taken[0][1], RigidTransform(0.0, 0.0, 0.0)
+    for number, (one, at) in enumerate(taken):
+        if number and one.visit != taken[number - 1][0].visit:
+            last, here = at, RigidTransform(0.0, 0.0, 0.0)
+        step = last.inverse().compose(at)
+        way, (slip, bend, turn) = math.hypot(step.x, step.y), ODOMETRY_ERROR
+        x, y = rng.normal(0.0, slip * way, 2)
+        theta = rng.normal(0.0, math.hypot(bend * way, turn * step.theta))
+        here, last = here.compose(RigidTransform(step.x + x, step.y + y, step.theta + theta)), at
+        out.append(replace(one, odometry=here))
     return out
 
 

@@ -21,18 +21,22 @@ from ..outcomes import progress
 from ..table import Row, at_least, at_most, print_rows, within
 from .grids import errors, grid_map
 from .judging import Judged, is_false, judge
-from .scenes import Scene, draw, drawn, flipped, off_scale, visits, with_poses
+from .scenes import Scene, draw, drawn, flipped, off_scale, routed, visits, with_odometry, with_poses
 
 VISITS, PLACES = 5, 60
 MAP_SIGMA = 0.005  # m
 CONFIDENCES = ((0.0, 0.9), (0.9, 0.98), (0.98, 0.995), (0.995, 1.1))
 
 
-def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = False, own: bool = True) -> list[Row]:
-    """Return the rows about changes of buildings in which a fifth of what can move has moved."""
+def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = False, poses: str = "own") -> list[Row]:
+    """Return the rows about changes of buildings in which a fifth of what can move has moved.
+
+    Scans have `poses` of the robot's own, by "odometry" along a route, or "none".
+    """
     judged, usable, seconds = [], np.zeros(3), []
-    for scene in drawn(families, seeds, PLACES):
-        one, counts, took = _update(scene, listing=listing, own=own)
+    for drawn_scene in drawn(families, seeds, PLACES):
+        scene = routed(drawn_scene) if poses == "odometry" else drawn_scene
+        one, counts, took = _update(scene, listing=listing, poses=poses)
         judged.append(one)
         usable += counts
         seconds.append(took)
@@ -61,10 +65,12 @@ def _by_confidence(total: Judged) -> list[Row]:
     return rows
 
 
-def _update(scene: Scene, *, listing: bool, own: bool) -> tuple[Judged, np.ndarray, float]:
+def _update(scene: Scene, *, listing: bool, poses: str) -> tuple[Judged, np.ndarray, float]:
     rng = np.random.default_rng(7)
     taken = list(visits(scene, VISITS, rng))
-    scans = with_poses(taken, rng) if own else [one for one, _ in taken]
+    scans = [one for one, _ in taken]
+    if poses != "none":
+        scans = with_poses(taken, rng) if poses == "own" else with_odometry(taken, rng)
     begun = time.perf_counter()
     update = map_quality.update(MapIndex.build(scene.mapped.segments, MAP_SIGMA), scans)
     took = time.perf_counter() - begun
@@ -155,7 +161,8 @@ def foreign(families: Sequence[str], logs: int) -> list[Row]:
         except SimulationError:
             continue
         rng, kind = np.random.default_rng(number), ("another building", "mirrored", "off scale by 2 %")[number % 3]
-        scans = [one for one, _ in visits(strange if number % 3 == 0 else mapped, 3, rng)]
+        taken = list(visits(routed(strange if number % 3 == 0 else mapped), 3, rng))
+        scans = with_odometry(taken, rng) if number // 3 % 2 else [one for one, _ in taken]
         if kind == "mirrored":
             scans = flipped(scans)
         elif kind != "another building":
@@ -223,7 +230,8 @@ def _families() -> list[str]:
 
 PARTS: dict[str, Callable[[int], list[Row]]] = {
     "upkeep-changes": lambda quick: changes(_families(), range(max(1, 4 // quick))),
-    "upkeep-without-poses": lambda quick: changes(_families(), range(max(1, 2 // quick)), own=False),
+    "upkeep-without-poses": lambda quick: changes(_families(), range(max(1, 2 // quick)), poses="none"),
+    "upkeep-odometry": lambda quick: changes(_families(), range(max(1, 2 // quick)), poses="odometry"),
     "upkeep-grids": lambda quick: sharper(_families(), range(max(1, 2 // quick))),
     "upkeep-rounds": lambda quick: rounds(_families()[:: min(quick, 4)], range(1)),
     "upkeep-foreign": lambda quick: foreign(_families(), max(6, 1000 // quick)),

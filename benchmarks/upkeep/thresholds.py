@@ -28,7 +28,7 @@ from ..threshold_effects import MOVED
 from ..thresholds import Threshold, moved, thresholds
 from .grids import grid_map
 from .judging import Judged, judge
-from .scenes import Scene, drawn, visits, with_poses
+from .scenes import Scene, drawn, routed, visits, with_odometry, with_poses
 
 SEED, VISITS, MAP_SIGMA = 30, 5, 0.005
 KINDS = ("cubicles", "mirrored_flats", "supermarket", "hotel")
@@ -70,7 +70,8 @@ def main() -> None:
         print_table(f"{len(chosen)} thresholds", ("name", "value"), [(one.name, str(one.value)) for one in chosen])
         return
     sample = [
-        visited(scene, on_grid=k == args.buildings - 1) for k, scene in enumerate(scenes(args.buildings, args.places))
+        visited(scene, on_grid=k == args.buildings - 1, odometry=k % 2 == 0)
+        for k, scene in enumerate(scenes(args.buildings, args.places))
     ]
     remember_searches()
     before, rows = proposals(sample), []
@@ -92,28 +93,35 @@ def scenes(count: int, places: int) -> list[Scene]:
     return [scene for k, name in enumerate(kinds) for scene in drawn([name], [SEED + k // len(KINDS)], places)]
 
 
-def visited(scene: Scene, *, on_grid: bool) -> Visited:
-    """Return the scans of a building; `on_grid`: in the map that a grid of it gives, whose walls can be sharpened."""
+def visited(scene: Scene, *, on_grid: bool, odometry: bool) -> Visited:
+    """Return the scans of a building, with odometry or with poses of the robot.
+
+    `on_grid`: in the map that a grid of it gives, whose walls can be sharpened.
+    """
+    scene = routed(scene) if odometry else scene
     rng = np.random.default_rng(SEED)
     old = grid_map(scene.mapped.segments, rng) if on_grid else None
     index = MapIndex.build(scene.mapped.segments, MAP_SIGMA) if old is None else MapIndex.build(old.segments, old.sigma)
     taken = list(visits(scene, VISITS, rng))
-    return Visited(None if on_grid else scene, index, with_poses(taken, rng), [(one.visit, at) for one, at in taken])
+    scans = with_odometry(taken, rng) if odometry else with_poses(taken, rng)
+    return Visited(None if on_grid else scene, index, scans, [(one.visit, at) for one, at in taken])
 
 
 def remember_searches() -> None:
     """Let updates take the answer of a scan that was searched in the same map before."""
-    updating = importlib.import_module("map_quality.update.update")
-    search: Search = updating.search
-    known: dict[tuple[int, bytes, float | None], AssociationResult] = {}
+    modules = [importlib.import_module(f"map_quality.update.{name}") for name in ("update", "odometry")]
+    search: Search = modules[0].search
+    known: dict[tuple[Any, ...], AssociationResult] = {}
 
     def remembered(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
-        key = id(one), index.segments.endpoints.tobytes(), index.sigma
+        prior = None if one.covariance is None else one.covariance.tobytes()
+        key = id(one.scan), one.pose, prior, index.segments.endpoints.tobytes(), index.sigma
         if key not in known:
             known[key] = search(index, one, deadline)
         return known[key]
 
-    updating.search = remembered  # type: ignore[attr-defined]
+    for module in modules:
+        module.search = remembered  # type: ignore[attr-defined]
 
 
 def proposals(sample: Sequence[Visited]) -> Proposals:

@@ -111,7 +111,10 @@ def _sent(one: LoggedScan) -> Json:
         raise WrongUseError(
             "LOG: found a laser that is mounted upside down, expected one that is not with --server; omit --server"
         )
-    return {name: view[name] for name in ("laser", "twist") if name in view}
+    told: Json = {name: view[name] for name in ("laser", "twist") if name in view}
+    if one.pose is not None:
+        told["odometry"] = {"x": one.pose.x, "y": one.pose.y, "theta": one.pose.theta}
+    return told
 
 
 def visit_names(logs: list[Path]) -> list[str]:

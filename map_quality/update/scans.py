@@ -57,6 +57,9 @@ class VisitScan:
         is not usable, because the map is too old there, is evidence if this pose confirms it.
     covariance : (3, 3) or None
         Of additive (x, y, theta) of `pose`; required with it.
+    odometry : RigidTransform or None
+        odom_from_scan, in a frame that is fixed during the visit. Scans of a visit that have it are in the order of
+        time. From usable scans it carries poses to others that have no `pose`.
 
     Raises
     ------
@@ -68,6 +71,7 @@ class VisitScan:
     visit: str
     pose: RigidTransform | None = None
     covariance: Floats | None = None
+    odometry: RigidTransform | None = None
 
     def __post_init__(self) -> None:
         if self.scan.beams is None or self.scan.viewpoint is None:
@@ -103,6 +107,8 @@ class Localized:
         True if it gives no evidence, and tests the new map.
     vouched : bool
         True if the sender's own pose confirms one that is not usable because of the map's age.
+    contradicted : bool
+        True if other usable scans of the visit contradict its pose by odometry.
     """
 
     number: int
@@ -112,6 +118,7 @@ class Localized:
     on: Segments
     held_back: bool
     vouched: bool = False
+    contradicted: bool = False
 
     @property
     def usable(self) -> bool:
@@ -126,7 +133,7 @@ class Localized:
     @property
     def precise(self) -> bool:
         """Return whether the pose is known well enough, without a warning about the ranges."""
-        if not self.located or self.result.covariance is None:
+        if not self.located or self.contradicted or self.result.covariance is None:
             return False
         x, y, theta = np.sqrt(np.diag(self.result.covariance))
         doubtful = any(one.code in DOUBTFUL for one in self.result.warnings)
@@ -202,10 +209,14 @@ def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
     if not {reason.code for reason in result.reasons} <= OF_OLD_MAPS or result.usable:
         return False
     x, y, _ = np.sqrt(np.diag(one.covariance))
-    away = np.array([result.pose.x - one.pose.x, result.pose.y - one.pose.y,
-                     wrap_angle(result.pose.theta - one.pose.theta)])  # fmt: skip
-    square = float(away @ np.linalg.solve(np.asarray(one.covariance) + result.covariance, away))
+    square = mahalanobis(one.pose, result.pose, np.asarray(one.covariance) + result.covariance)
     return bool(max(x, y) <= MOST_OWN_SIGMA and square <= AGREEING)
+
+
+def mahalanobis(a: RigidTransform, b: RigidTransform, covariance: Floats) -> float:
+    """Return the squared Mahalanobis distance of two poses; chi-square of three degrees of freedom."""
+    away = np.array([b.x - a.x, b.y - a.y, wrap_angle(b.theta - a.theta)])
+    return float(away @ np.linalg.solve(covariance, away))
 
 
 def choose_evidence(

@@ -7,8 +7,11 @@ import math
 # --- Scans that give evidence -----------------------------------------------------------------------------------------
 
 MOST_SIGMA, MOST_TURN_SIGMA = 0.05, math.radians(1.0)  # m, rad; deviations of a pose that is known well enough
-MOST_OWN_SIGMA = 0.5  # m; deviation of a sender's own pose that may confirm that of the search
+MOST_OWN_SIGMA = 1.0  # m; deviation of an own or carried pose that may confirm that of the search; drawn
 AGREEING = 11.3  # chi-square of 3 degrees of freedom, 99 %; of both poses
+ODOMETRY, ODOMETRY_A_METRE = 0.1, 0.1  # m, and for each metre; deviations of odometry, as `linefix replay` has them
+ODOMETRY_TURN, ODOMETRY_TURN_A_METRE, ODOMETRY_TURN_A_RADIAN = 0.05, 0.02, 0.1  # rad, for each metre, for each radian
+MOST_CONFIRMING_SIGMA = 2.0  # m; deviation of odometry by which one usable scan may confirm another
 LEAST_USABLE = 0.2  # fraction of a visit's scans; other drawn buildings 0, a public log that is half off the map 0.29
 LEAST_SCANS = 3  # usable ones of a visit
 OFF_SCALE, SURE_OF_SCALE = 0.005, 0.0025  # fractions, drawn; lengths of a visit are off by, and known to

@@ -18,6 +18,7 @@ from .applying import apply, apply_changes, kept_indices, with_ends
 from .beams import Chunks, sees
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
+from .odometry import Carrying
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import (
     Localized,
@@ -134,7 +135,7 @@ class _Update:
     """An update in the making."""
 
     index: MapIndex
-    scans: tuple[VisitScan, ...]
+    scans: list[VisitScan]  # with the poses that odometry carries to them
     deadline: Deadline
     gatherer: Gatherer
     latest: dict[int, Localized] = field(default_factory=dict)  # by the number of a scan: its last search
@@ -144,7 +145,7 @@ class _Update:
         """Begin an update."""
         known = Segments.derived(index.segments.endpoints[: index.directed])
         sigma, oriented = USUAL_SIGMA if index.sigma is None else index.sigma, len(index.segments) == index.directed
-        return cls(index, tuple(scans), deadline, Gatherer(known, sigma, oriented))
+        return cls(index, list(scans), deadline, Gatherer(known, sigma, oriented))
 
     @property
     def known(self) -> Segments:
@@ -162,7 +163,7 @@ class _Update:
         return self.index.sigma is not None and self.index.sigma >= LEAST_BLUR
 
     def localize(self) -> Generator[None, None, list[Localized]]:
-        """Search all scans that there is time for."""
+        """Search all scans that there is time for: each alone, and those that are not usable by odometry."""
         _, visits = visit_numbers(self.scans)
         held, found = held_back(visits), []
         now = time.monotonic()
@@ -178,6 +179,7 @@ class _Update:
                 Localized(number, visits[number], one.scan, result, self.index.segments, held[number], vouched)
             )
             yield
+        yield from Carrying(self.index, self.scans, found, self.deadline, at).carry()
         return found
 
     def draft(
@@ -276,6 +278,7 @@ class _Update:
         for one, now in zip(first, latest, strict=True):
             again = not one.precise and not self.deadline.passed and sees(changed, one, self.sigma)
             found.append((yield from self._search(new, one)) if again else now)
+        yield from Carrying(new, list(self.scans), found, self.deadline).carry()
         return found
 
     def _search_all(

@@ -20,13 +20,18 @@ MOST_VISITS = 100
 
 
 class UpdateScan(LaserScan):
-    """A scan as ranges, and optionally the pose of it that the robot assumed."""
+    """A scan as ranges, and optionally the pose of it that the robot assumed, or its odometry."""
 
     pose: Pose | None = Field(
         None, description="assumed pose, a prior of the search; it is evidence only if the search confirms it"
     )
     covariance: Covariance | None = Field(
         None, description="covariance of additive (x, y, theta) of `pose`, required with it; m^2, m rad, rad^2"
+    )
+    odometry: Pose | None = Field(
+        None,
+        description="pose of the scan by odometry, in a frame that is fixed during the visit; "
+        "it carries poses from usable scans of the visit to scans without `pose`",
     )
 
     @model_validator(mode="after")
@@ -40,7 +45,9 @@ class Visit(Strict):
     """Scans of one visit to the building, such as a drive or a day."""
 
     visit: Annotated[str, Field(min_length=1, max_length=128)] = Field(description="name of the visit")
-    scans: Annotated[list[UpdateScan], Field(min_length=1)] = Field(description="the scans, in any order")
+    scans: Annotated[list[UpdateScan], Field(min_length=1)] = Field(
+        description="the scans; those with `odometry` in the order of time"
+    )
 
 
 class UpdateRequest(Strict):

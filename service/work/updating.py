@@ -79,7 +79,8 @@ def _scan_of(asked: UpdateRequest, visit: int, number: int) -> VisitScan:
     one = asked.visits[visit].scans[number]
     with placed(f"/visits/{visit}/scans/{number}"):
         pose = None if one.pose is None else transform_of(one.pose)
-        return VisitScan(scanned_of(one).scan, asked.visits[visit].visit, pose, one.covariance)
+        odometry = None if one.odometry is None else transform_of(one.odometry)
+        return VisitScan(scanned_of(one).scan, asked.visits[visit].visit, pose, one.covariance, odometry)
 
 
 def take_steps(progress: Progress, deadline: Deadline) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from cli.maps.updating import thinned
 from registration import RigidTransform, Segments
 from simulation import scan
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
+from tests.map_quality.update.rooms import FIRST, IN_HALL, SECOND, places_in, rooms
 from tests.running import RunningService
 
 from .running import Linefix
@@ -29,14 +31,16 @@ def colours_of(path: Path) -> set[tuple[int, ...]]:
         return {colour for _, colour in picture.convert("RGB").getcolors(1 << 24)}
 
 
-def write_visit(path: Path, walls: Segments, seed: int) -> None:
+def write_visit(
+    path: Path, walls: Segments, seed: int, places: Sequence[tuple[float, float]] = PLACES, *, odometry: bool = True
+) -> None:
     """Write a log of a visit, as CARMEN does."""
     rng, lines = np.random.default_rng(seed), ["# a log"]
-    for k, (x, y) in enumerate(PLACES):
+    for k, (x, y) in enumerate(places):
         pose = RigidTransform(x, y, rng.uniform(-math.pi, math.pi))
         ranges = scan(walls, pose, SCANNER, rng).ranges
         told = " ".join(f"{r:.4f}" if math.isfinite(r) else "99" for r in ranges)
-        at = f"{pose.x:.6f} {pose.y:.6f} {pose.theta:.6f}"
+        at = f"{pose.x:.6f} {pose.y:.6f} {pose.theta:.6f}" if odometry else "0 0 0"
         head = f"ROBOTLASER1 0 {SCANNER.angle_min:.6f} {math.tau:.6f} {SCANNER.angle_increment:.9f}"
         lines.append(f"{head} 20.0 0.01 0 {len(ranges)} {told} 0 {at} {at} 0 0 0 0 0 {100 + k} host {100 + k}")
     path.write_text("\n".join(lines) + "\n")
@@ -78,6 +82,24 @@ def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: Run
     wrong = linefix("map", "update", "hall.json", *logs, *server)
     assert (wrong.code, wrong.out) == (2, "")
     assert "expected the id of a stored map with --server" in wrong.err
+
+
+@pytest.mark.parametrize("where", ["here", "server"])
+def test_odometry_of_the_logs_localizes_scans_in_rooms_that_look_alike(
+    where: str, linefix: Linefix, folder: Path, patient: RunningService
+) -> None:
+    old, today, places = rooms(), rooms(cupboards=[FIRST]), [*IN_HALL, *places_in(SECOND), *IN_HALL[::-1]]
+    (folder / "rooms.json").write_text(json.dumps({"segments": old.endpoints.tolist(), "sigma": 0.005}))
+    more = ("--json", *(("--server", patient.url) if where == "server" else ()))
+    assert where == "here" or linefix("map", "put", "rooms", "rooms.json", *more).code == 0
+    name = "rooms" if where == "server" else "rooms.json"
+    logs = [f"day {k}.log" for k in range(3)]
+    for odometry, expected in ((False, []), (True, [[32, 33, 34, 35]])):
+        for k, log in enumerate(logs):
+            write_visit(folder / log, today, k, places, odometry=odometry)
+        told = linefix("map", "update", name, *logs, *more)
+        assert told.code == 0, told.err
+        assert [one["segments"] for one in json.loads(told.out)["changes"]] == expected
 
 
 def test_a_change_is_refused_by_its_number_or_for_its_confidence(linefix: Linefix, folder: Path) -> None:

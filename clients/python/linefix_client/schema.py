@@ -727,7 +727,7 @@ class Twist(TypedDict):
 
 class UpdateScan(TypedDict):
     """
-    A scan as ranges, and optionally the pose of it that the robot assumed.
+    A scan as ranges, and optionally the pose of it that the robot assumed, or its odometry.
     """
 
     frame_id: NotRequired[str]
@@ -738,6 +738,7 @@ class UpdateScan(TypedDict):
     twist: NotRequired[Twist | None]
     pose: NotRequired[Pose | None]
     covariance: NotRequired[list[list[float]] | None]
+    odometry: NotRequired[Pose | None]
 
 
 class VectorizeOptions(TypedDict):

@@ -113,6 +113,12 @@ def test_a_pose_needs_its_covariance_and_a_positive_definite_one(client: httpx.C
     assert answer.json()["errors"][0]["pointer"].startswith("/visits/0/scans/0")
 
 
+def test_a_wrong_odometry_is_named(client: httpx.Client) -> None:
+    answer = client.post(URL, json={"visits": [visit("a", HALL, 1, odometry={"x": 1.0, "y": 1.0, "theta": 90.0})]})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == "/visits/0/scans/0/odometry/theta"
+
+
 def test_a_deadline_ends_it_without_a_proposal(client: httpx.Client) -> None:
     today = segments(PILLAR)
     answer = client.post(URL, json={"visits": days(today, today, today), "deadline_ms": 60})

@@ -1,0 +1,152 @@
+"""Poses that odometry carries from usable scans of a visit to the scans next to them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from association import CancelledError, Deadline, MapIndex
+from registration import RigidTransform
+
+from .scans import Localized, VisitScan, is_vouched, mahalanobis, search
+from .tuning import (
+    AGREEING,
+    MOST_CONFIRMING_SIGMA,
+    ODOMETRY,
+    ODOMETRY_A_METRE,
+    ODOMETRY_TURN,
+    ODOMETRY_TURN_A_METRE,
+    ODOMETRY_TURN_A_RADIAN,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrying:
+    """Localizes scans that are not usable alone by the odometry of their visit.
+
+    Attributes
+    ----------
+    index : MapIndex
+    scans : list of VisitScan
+        All scans; those that odometry localizes get the carried pose as their own.
+    found : list of Localized
+        Their answers without odometry; replaced where odometry helps.
+    deadline : Deadline
+    until : float
+        `time.monotonic()` seconds from which on no scan is searched.
+    """
+
+    index: MapIndex
+    scans: list[VisitScan]
+    found: list[Localized]
+    deadline: Deadline
+    until: float = math.inf
+    _trail: list[tuple[int, VisitScan, Localized]] = field(default_factory=list)  # since the last anchor, as before
+
+    def carry(self) -> Generator[None, None, None]:
+        """Carry poses forward and backward in each visit, one search at a step.
+
+        1. Anchors are usable scans that another one of the visit confirms: the nearest before or after it agrees with
+           it by odometry. A usable scan that none confirms, and that contradicts an anchor, is no evidence.
+        2. The pose of the last anchor, moved on by odometry, is the prior of the next scan. If that is usable with it,
+           its pose is carried on.
+        3. If the next anchor contradicts what was carried to it, the scans between lose the carried poses.
+
+        Raises
+        ------
+        CancelledError
+            When the deadline was cancelled.
+        """
+        for visit in sorted({one.visit for one in self.found}):
+            rows = [k for k, one in enumerate(self.found) if one.visit == visit and self.scans[k].odometry is not None]
+            anchors = self._anchors([k for k in rows if self.found[k].usable])
+            yield from self._along(rows, anchors)
+            yield from self._along(rows[::-1], anchors)
+
+    def _anchors(self, usable: Sequence[int]) -> set[int]:
+        """Return the usable scans that another one confirms; mark those that only contradict one of these.
+
+        If more pairs of neighbours contradict each other than agree, the odometry of the visit is not used.
+        """
+        pairs = list(itertools.pairwise(usable))
+        agreeing = [pair for pair in pairs if self._agree(*pair)]
+        against = [pair for pair in pairs if self._distance(*pair) > AGREEING]
+        if len(against) > len(agreeing):
+            return set()
+        confirmed = {k for pair in agreeing for k in pair}
+        for one in {k for pair in against if confirmed.intersection(pair) for k in pair} - confirmed:
+            self.found[one] = replace(self.found[one], contradicted=True)
+        return confirmed
+
+    def _along(self, rows: Sequence[int], anchors: set[int]) -> Generator[None, None, None]:
+        """Carry poses along some scans in this order, from anchor to anchor."""
+        last: int | None = None
+        self._trail.clear()
+        for k in rows:
+            if k in anchors:
+                if last is not None and self._distance(last, k) > AGREEING:
+                    self._undo()
+                last = k
+                self._trail.clear()
+            elif last is not None and self._is_wanted(k):
+                carried = self._carried(last, k)
+                if carried is not None:
+                    yield
+                    last = k if carried.precise else last
+
+    def _is_wanted(self, k: int) -> bool:
+        one = self.found[k]
+        return not (one.located or one.held_back) and self.scans[k].pose is None
+
+    def _carried(self, last: int, k: int) -> Localized | None:
+        """Search a scan with the prior from another; None where the prior is too wide, or there is no time."""
+        if self.deadline.cancelled:
+            raise CancelledError
+        pose, covariance = self._predicted(last, k)
+        if _sigma(covariance) > MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
+            return None
+        sent = replace(self.scans[k], pose=pose, covariance=covariance)
+        result = search(self.index, sent, self.deadline)
+        found = replace(self.found[k], result=result, on=self.index.segments, vouched=is_vouched(sent, result))
+        if found.located:
+            self._trail.append((k, self.scans[k], self.found[k]))
+            self.scans[k], self.found[k] = sent, found
+        return found
+
+    def _undo(self) -> None:
+        for k, sent, found in self._trail:
+            self.scans[k], self.found[k] = sent, found
+
+    def _agree(self, a: int, b: int) -> bool:
+        """Return whether the poses of two scans agree with odometry, which is precise enough to tell."""
+        return _sigma(self._predicted(a, b)[1]) <= MOST_CONFIRMING_SIGMA and self._distance(a, b) <= AGREEING
+
+    def _distance(self, a: int, b: int) -> float:
+        """Return the squared Mahalanobis distance of the poses of two scans by odometry."""
+        pose, covariance = self._predicted(a, b)
+        other = self.found[b]
+        assert other.result.covariance is not None
+        return mahalanobis(pose, other.pose, covariance + other.result.covariance)
+
+    def _predicted(self, a: int, b: int) -> tuple[RigidTransform, np.ndarray]:
+        """Return the pose of a scan by that of another and odometry, with its covariance."""
+        begin, end, known = self.scans[a].odometry, self.scans[b].odometry, self.found[a]
+        assert begin is not None
+        assert end is not None
+        assert known.result.covariance is not None
+        step = begin.inverse().compose(end)
+        distance = math.hypot(step.x, step.y)
+        place = ODOMETRY + ODOMETRY_A_METRE * distance
+        turn = ODOMETRY_TURN + ODOMETRY_TURN_A_METRE * distance + ODOMETRY_TURN_A_RADIAN * abs(step.theta)
+        moved = known.pose.carry(known.result.covariance, step)
+        return known.pose.compose(step), moved + np.diag([place**2, place**2, turn**2])
+
+
+def _sigma(covariance: np.ndarray) -> float:
+    """Return the larger standard deviation of x and y, metres."""
+    return float(np.sqrt(np.diag(covariance)[:2].max()))
