@@ -85,7 +85,7 @@ FARTHER = 1.5
 
 LEAST_OFF_WALLS = 0.01  # m, tables; walls that are off by less, as estimated, leave nothing to a factor
 LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables; a factor is tried that is so far from one,
-FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations
+FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations, as an offset that all walls share
 FACTOR_ROUNDS = 3  # tables
 FACTOR_GAP = GAIN  # nats, tables; it is taken where the answer scores so much more,
 FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes

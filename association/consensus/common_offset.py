@@ -17,9 +17,9 @@ from registration.layout import Floats, Records
 from registration.values import value
 
 from ..context import SearchContext
-from ..tuning import ROUGHNESS
+from ..tuning import FACTOR_DEVIATIONS, LOOSE_WALLS, ROUGHNESS
 from .consensus_set import ConsensusSet
-from .tuning import OFFSET_DEVIATIONS, OFFSET_ROUNDS, OFFSET_SIGMAS, ROUGH_FRACTION
+from .tuning import ESTIMATION_ROUNDS, ROUGH_FRACTION
 
 UNKNOWNS = 5  # x, y, heading, offset, factor
 
@@ -56,33 +56,30 @@ def fit_common_offset(context: SearchContext, best: ConsensusSet, wall_sigma: fl
     """Fit a pose and a common offset to a consensus set by least squares, linearized at its pose.
 
     Each matched line gives its offset from its wall and its angle to it. The walls' own errors have the deviation
-    `wall_sigma`, common to the lines of one wall; the common offset has `OFFSET_SIGMAS` times the map's sigma, and
-    expectation 0.
+    `wall_sigma`, common to the lines of one wall; the common offset has `LOOSE_WALLS`, and expectation 0.
 
     Returns
     -------
     CommonOffset or None
         None where the map's sigma is not known, where the scan does not tell the free side of a wall, with few lines,
-        and where the offset is within `OFFSET_DEVIATIONS` of its deviations of 0.
+        and where the offset is within `FACTOR_DEVIATIONS` of its deviations of 0.
     """
-    sigma = context.index.sigma
-    if not sigma or context.scan.views is not None or np.count_nonzero(best.matched) < UNKNOWNS:
+    if not context.index.sigma or context.scan.views is not None or np.count_nonzero(best.matched) < UNKNOWNS:
         return None
     sides = _sides(context, best)
     if sides is None:
         return None
     lines = _Lines.of(context, best, sides, wall_sigma)
     pose, offset = best.pose, 0.0
-    for _ in range(OFFSET_ROUNDS):
-        normal, right = lines.normal_equations(pose, offset, OFFSET_SIGMAS * sigma)
+    for _ in range(ESTIMATION_ROUNDS):
+        normal, right = lines.normal_equations(pose, offset)
         covariance = np.linalg.pinv(normal[:4, :4], hermitian=True)
         x, y, turn, more = (covariance @ right[:4]).tolist()
         pose, offset = RigidTransform(pose.x + x, pose.y + y, pose.theta + turn), offset + more
     deviation = math.sqrt(covariance[3, 3])
-    if not abs(offset) > OFFSET_DEVIATIONS * deviation:
+    if not abs(offset) > FACTOR_DEVIATIONS * deviation:
         return None
-    # With the factor, once more from there.
-    normal, right = lines.normal_equations(pose, offset, OFFSET_SIGMAS * sigma)
+    normal, right = lines.normal_equations(pose, offset)
     with_factor = np.linalg.pinv(normal, hermitian=True)
     factor = 1.0 + float((with_factor @ right)[4])
     of_pose = covariance[:3, :3].astype(np.float64)
@@ -130,7 +127,7 @@ class _Lines:
         walls = context.index.walls.rows[numbers]
         return cls(rows, walls, matches["shift"], sides, inverse, rows["spread"] / variances)
 
-    def normal_equations(self, pose: RigidTransform, offset: float, sigma: float) -> tuple[Floats, Floats]:
+    def normal_equations(self, pose: RigidTransform, offset: float) -> tuple[Floats, Floats]:
         """Return the normal matrix (5, 5), and the right side (5,), of x, y, heading, offset and factor."""
         rows, walls = self.rows, self.walls
         c, s = math.cos(pose.theta), math.sin(pose.theta)
@@ -145,6 +142,6 @@ class _Lines:
         right = -columns.T @ self.inverse @ residuals
         normal[2, 2] += self.slopes @ cosines**2
         right[2] -= self.slopes @ (cosines * sines)
-        normal[3, 3] += 1.0 / sigma**2
-        right[3] -= offset / sigma**2
+        normal[3, 3] += 1.0 / LOOSE_WALLS**2
+        right[3] -= offset / LOOSE_WALLS**2
         return normal, right

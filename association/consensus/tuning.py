@@ -106,14 +106,6 @@ MIN_EXTENT = 1e-9  # m, rounding; least length that a segment along a wall count
 CONTRADICTION = GAIN  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls
 
-# --- Common offset: a pose together with an offset that all walls share -----------------------------------------------
-
-OFFSET_ROUNDS = 2  # rounding; of least squares, linearized anew
-# Deviation of the offset over the map's sigma, tables: the sigma of a grid is half a cell, and its walls lie up to a
-# cell off.
-OFFSET_SIGMAS = 2.0
-OFFSET_DEVIATIONS = 2.0  # geometry: 95 % of a normal distribution; an offset within so many is none
-
 # --- Similarity: a pose together with a factor ------------------------------------------------------------------------
 
 TRIMMED_FITS = 3  # tables
