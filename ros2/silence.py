@@ -47,9 +47,9 @@ class Silence:
         if now - self._scanned >= SILENT_SECONDS:
             for topic in self._topics.scans:
                 self._log(self._reason(topic))
-        elif not has_map:
+        if not has_map:
             self._log(self._reason(self._topics.maps[0]))
-        elif now - self._searched >= SILENT_SECONDS:
+        elif now - self._scanned < SILENT_SECONDS <= now - self._searched:
             self._log("scans arrive, but none can be searched; read the problem on /diagnostics")
         if self._topics.initial.incompatible:
             self._log(
