@@ -56,6 +56,19 @@ def test_a_missing_map_is_logged(domain: int, soon: None) -> None:
         wait_for(logged, expected, lambda: scans.publish(scan(1)))
 
 
+def test_a_map_that_is_not_used_is_not_missing(domain: int, soon: None) -> None:
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain, namespace="/nameless", map_topic="map"), None, logged.append):
+        net = DomainParticipant(domain)
+        scans = Publisher(net, "/nameless/scan", messages.LaserScan, SENSOR)
+        maps = Publisher(net, "/nameless/map", messages.OccupancyGrid, LATCHED)
+        maps.publish(grid_of_room(""))
+        wait_for(logged, "the map on /nameless/map is not used", lambda: scans.publish(scan(1)))
+        wait_for(logged, "scans arrive, but none can be searched", lambda: scans.publish(scan(1)))
+        wait_for(logged, "state no_map: no usable map has been received")
+    assert not [line for line in logged if "message on /nameless/map" in line]
+
+
 def test_a_subscriber_that_receives_nothing_is_logged(domain: int, room: linefix.MapIndex, soon: None) -> None:
     logged: list[str] = []
     with running(NodeOptions(domain=domain, namespace="/late"), room, logged.append):
