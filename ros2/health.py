@@ -28,7 +28,7 @@ class State(StrEnum):
 
 
 STATES = {
-    State.NO_MAP: (WARN, "no map has been published"),
+    State.NO_MAP: (WARN, "no usable map has been received"),
     State.NO_SCAN: (WARN, "no scan can be searched"),
     State.SEARCHING: (WARN, "no pose is agreed yet"),
     State.AGREED: (OK, "the pose is agreed"),

@@ -148,6 +148,7 @@ class Node:
             return
         for maps in self._topics.maps:
             for grid in maps.take():
+                self._silence.map()
                 self._converter.take(grid)
         converted = self._converter.result()
         if converted is None:
@@ -175,7 +176,7 @@ class Node:
             self._next[0] = ready
         while self._next and not self._searcher.busy:
             self._search(self._next.pop(next(iter(self._next))))
-        self._silence.look(has_map=self._maps is not None)
+        self._silence.look()
 
     def _turn_results(self) -> None:
         """Take results; each waits until odometry has reached its stamp, or long enough.
@@ -220,7 +221,7 @@ class Node:
         stamp = scans[0].header.stamp
         if self._maps is None:
             converting = self._converter is not None and self._converter.busy
-            problem = "the map is being converted" if converting else "no map has been published"
+            problem = "the map is being converted" if converting else "no usable map has been received"
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
             return
         looks, missing = looks_of(scans, self._frames, self._options, self._odometry)

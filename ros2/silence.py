@@ -27,6 +27,7 @@ class Silence:
         self._options, self._topics, self._log = options, topics, log
         self._scanned = self._searched = self._looked = time.monotonic()
         self._first = True
+        self._mapped = options.map_topic is None
 
     def scan(self) -> None:
         """Note that a scan has come."""
@@ -34,11 +35,15 @@ class Silence:
             self._log(f"first scan on {self._topics.scans[0].name}")
         self._first, self._scanned = False, time.monotonic()
 
+    def map(self) -> None:
+        """Note that a map has come: if it is not used, that is another problem."""
+        self._mapped = True
+
     def searched(self) -> None:
         """Note that a scan is searched."""
         self._searched = time.monotonic()
 
-    def look(self, *, has_map: bool) -> None:
+    def look(self) -> None:
         """Log missing input."""
         now = time.monotonic()
         if now - self._looked < SILENT_SECONDS:
@@ -47,9 +52,9 @@ class Silence:
         if now - self._scanned >= SILENT_SECONDS:
             for topic in self._topics.scans:
                 self._log(self._reason(topic))
-        elif not has_map:
+        if not self._mapped:
             self._log(self._reason(self._topics.maps[0]))
-        elif now - self._searched >= SILENT_SECONDS:
+        elif now - self._scanned < SILENT_SECONDS <= now - self._searched:
             self._log("scans arrive, but none can be searched; read the problem on /diagnostics")
         if self._topics.initial.incompatible:
             self._log(

@@ -123,6 +123,10 @@ class Publisher(Generic[Message]):
         """Publish a message."""
         self._writer.write(message)
 
+    def received(self, seconds: float) -> bool:
+        """Return whether all connected subscribers have received everything within a time; of a reliable publisher."""
+        return bool(self._writer.wait_for_acks(duration(seconds=seconds)))
+
     @property
     def incompatible(self) -> bool:
         """Return whether there are subscribers whose quality of service does not fit."""

@@ -71,19 +71,35 @@ def test_the_forge_runs_what_a_checkout_has_to_pass() -> None:
     assert YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())["title"] == "Linefix"
 
 
-def test_the_unit_is_one() -> None:
+def unit_of(name: str) -> configparser.RawConfigParser:
     unit = configparser.RawConfigParser(strict=False)
     unit.optionxform = str  # type: ignore[method-assign,assignment]
-    unit.read(DEPLOY / "linefix.service")
-    assert unit["Service"]["ExecStart"].split()[1:] == ["serve"]
+    unit.read(DEPLOY / name)
+    return unit
+
+
+@pytest.mark.parametrize(("name", "command"), [("linefix.service", "serve"), ("linefix-ros2.service", "ros2")])
+def test_the_unit_is_one(name: str, command: str) -> None:
+    unit = unit_of(name)
+    assert unit["Service"]["ExecStart"].split()[1] == command
     assert unit["Service"]["DynamicUser"] == "yes"
     if shutil.which("systemd-analyze") is None:
         pytest.skip("no systemd-analyze")
-    command = ["systemd-analyze", "verify", "--man=no", str(DEPLOY / "linefix.service")]
-    told = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+    verify = ["systemd-analyze", "verify", "--man=no", str(DEPLOY / name)]
+    told = subprocess.run(verify, capture_output=True, text=True, check=False).stderr
     # That the program is not where the unit expects it is all that may be said of it here.
-    wrong = [line for line in told.splitlines() if "linefix.service" in line and "not executable" not in line]
+    wrong = [line for line in told.splitlines() if name in line and "not executable" not in line]
     assert wrong == []
+
+
+def test_units_with_users_of_their_own_share_no_folder() -> None:
+    """Else systemd takes the folder from the unit that runs, and gives it to the one that starts."""
+    units = {name: unit_of(name)["Service"] for name in ("linefix.service", "linefix-ros2.service")}
+    for kind in ("StateDirectory", "CacheDirectory"):
+        folders = [folder for unit in units.values() for folder in unit.get(kind, "").split()]
+        assert len(folders) == len(set(folders)), kind
+    for name, unit in units.items():
+        assert f"LINEFIX_KERNELS=%C/{unit['CacheDirectory']}\n" in (DEPLOY / name).read_text()
 
 
 def nginx(service_port: int, port: int, folder: Path) -> list[str]:

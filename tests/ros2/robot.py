@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from cyclonedds.util import duration
 
 import linefix
 from ros2 import Maps, Node, NodeOptions, messages
@@ -113,7 +112,7 @@ def wait_until(condition: Callable[[], object], problem: Callable[[], object] = 
 def deliver(publisher: Publisher[Any]) -> None:
     """Wait until a bridge has received what was published reliably."""
     wait_until(lambda: publisher.joined() or publisher.subscribed)
-    assert publisher._writer.wait_for_acks(duration(seconds=PATIENCE))
+    assert publisher.received(PATIENCE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -176,6 +176,15 @@ def test_a_grid_is_received(domain: int, program: Path) -> None:
     assert float(found[4]) == pytest.approx(1.0, abs=0.05)
 
 
+def test_stamps_that_jump_back_and_stamps_of_zero(domain: int, room: linefix.MapIndex, program: Path) -> None:
+    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
+        robot.mount()
+        robot.until("initialpose", Way(robot, 1000.0))
+        robot.until("pose", Way(robot, 10.0), lambda words: float(words[1]) < 1000.0)
+        robot.until("diagnostics linefix: localization: the pose is agreed", Way(robot, 20.0))
+        robot.until("pose 0 0", lambda: robot.drive(linefix.RigidTransform(0.8, 1.0, 0.1), 0.0))
+
+
 def silent_for_five_scans(robot: Peer, way: Way) -> None:
     """Rest until five scans in succession are without an initialpose; the first may come again with odometry."""
     found: list[str] = []
@@ -229,3 +238,23 @@ def test_the_map_of_the_agreed_pose(domain: int, program: Path) -> None:
         robot.until("initialpose", way)
         with peer_without_bridge(program, domain, "/tower") as late:
             assert late.until("map_id") == ["map_id", "hq-2"]
+
+
+def test_two_robots_in_one_domain(domain: int, program: Path) -> None:
+    """Each has a namespace and a map; the mounts of both are on one topic, with the prefix of the robot."""
+    with ExitStack() as stack:
+        ways = []
+        for name, walls in zip(("robot1", "robot2"), FLOORS.values(), strict=True):
+            options = NodeOptions(domain=domain, namespace=f"/{name}", frame_prefix=f"{name}/")
+            stack.enter_context(running(options, linefix.index_map(walls)))
+            ways.append(Way(stack.enter_context(peer(program, domain, f"/{name}"))))
+            ways[-1].walls = walls
+        right = BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta
+        ways[1].robot.send("global_mount", "robot2/", 5.0, 5.0, 0.0)
+        ways[0].robot.send("global_mount", "robot1/", *right)
+        for way, other in (ways, ways[::-1]):
+            found = way.robot.until("initialpose", way)
+            assert float(found[4]) == pytest.approx(1.0, abs=0.03)
+            assert float(found[5]) == pytest.approx(0.1, abs=0.02)
+            assert not [line for line in other.robot.lines() if line.startswith("initialpose")]
+            ways[1].robot.send("global_mount", "robot2/", *right)

@@ -106,6 +106,7 @@ def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapInde
         assert math.sqrt(covariance[5, 5]) >= math.radians(2.0) - 1e-4
         states = [one.message for one in robot.status.take()]
         assert "the pose is agreed" in states
+        assert {one.markers[0].ns for one in robot.markers.take()} == {"linefix/robot"}
 
 
 def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room: linefix.MapIndex) -> None:

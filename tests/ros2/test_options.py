@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -152,3 +153,27 @@ def test_a_wrong_parameter_ends_with_2(
 def test_a_wrong_name_ends_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str], domain: int) -> None:
     assert run(["ros2", *arguments]) == 2
     assert "expected" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("hq.json", "{}", "map.segments: expected at least one segment, found none"),
+        ("hq.yaml", "hq", "hq.yaml: expected a YAML mapping with image, resolution and origin"),
+        ("hq.yaml", "{image: hq.pgm, resolution: 0.05, origin: [0, 0, 0]}", "hq.pgm"),
+    ],
+)
+def test_a_map_that_cannot_be_used_ends_with_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str, expected: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    assert run(["ros2", "--map", str(tmp_path / name)]) == 3
+    assert expected in capsys.readouterr().err
+
+
+def test_packages_that_are_missing_end_with_3(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "ros2", None)
+    assert run(["ros2"]) == 3
+    assert 'pip install ".[formats,ros2]"' in capsys.readouterr().err
