@@ -110,13 +110,14 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
     walls: list[Floats] = []
     sigmas: list[float] = []
     left = np.argsort(-seen.lines.lengths, kind="stable")
+    endpoints, directions = seen.lines.endpoints[left], seen.lines.directions[left]
     while len(left):
-        rest = seen.take(left)
-        mine = _along(rest)
-        left = left[~mine]
-        group = rest.take(mine)
-        if not _is_seen_often(group.visits, group.places):
+        mine = _along(endpoints, directions)
+        rows = left[mine]
+        left, endpoints, directions = left[~mine], endpoints[~mine], directions[~mine]
+        if not _is_seen_often(seen.visits[rows], seen.places[rows]):
             continue
+        group = seen.take(rows)
         found = _pieces(group, known, Segments.derived(np.array(walls).reshape(-1, 4)))
         walls += [piece for piece, _ in found]
         sigmas += [sigma for _, sigma in found]
@@ -126,17 +127,20 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
 
 
 def _is_seen_often(visits: Indices, places: Indices) -> bool:
+    if len(visits) < LEAST_VISITS:
+        return False
     return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
 
-def _along(seen: SeenLines) -> Bools:
+def _along(endpoints: Floats, directions: Floats) -> Bools:
     """Return which lines continue or repeat the first one, itself included."""
-    lines = seen.lines
-    direction, normal, offset = lines.directions[0], lines.normals[0], lines.offsets[0]
-    mine = lines.directions @ direction >= np.cos(SAME_ANGLE)
-    for ends in (lines.endpoints[:, :2], lines.endpoints[:, 2:]):
-        mine &= np.abs(ends @ normal - offset) <= SAME_LINE
-    begins, ends = lines.endpoints[:, :2] @ direction, lines.endpoints[:, 2:] @ direction
+    direction = directions[0]
+    normal = np.array([-direction[1], direction[0]])
+    offset = 0.5 * float((endpoints[0, :2] + endpoints[0, 2:]) @ normal)
+    mine = directions @ direction >= np.cos(SAME_ANGLE)
+    for points in (endpoints[:, :2], endpoints[:, 2:]):
+        mine &= np.abs(points @ normal - offset) <= SAME_LINE
+    begins, ends = endpoints[:, :2] @ direction, endpoints[:, 2:] @ direction
     low, high = begins[0], ends[0]
     inside = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
     inside[0] = True
