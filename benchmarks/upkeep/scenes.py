@@ -94,7 +94,7 @@ def routed(scene: Scene) -> Scene:
 
 
 def with_odometry(taken: Sequence[tuple[VisitScan, RigidTransform]], rng: np.random.Generator) -> list[VisitScan]:
-    """Return scans with odometry, which starts anew at each visit, and whose error grows with the way."""
+    """Return scans with odometry, which starts at zero in each visit, and whose error grows with the distance."""
     out: list[VisitScan] = []
     last, here = taken[0][1], RigidTransform(0.0, 0.0, 0.0)
     for number, (one, at) in enumerate(taken):

@@ -71,7 +71,7 @@ class Carrying:
     def _anchors(self, usable: Sequence[int]) -> set[int]:
         """Return the usable scans that another one confirms; mark those that only contradict one of these.
 
-        Where more neighbours contradict each other than agree, odometry is not known well, and shows nothing.
+        If more pairs of neighbours contradict each other than agree, the odometry of the visit is not used.
         """
         pairs = list(itertools.pairwise(usable))
         agreeing = [pair for pair in pairs if self._agree(*pair)]
