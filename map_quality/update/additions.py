@@ -14,7 +14,6 @@ from .evidence import are_enough
 from .scans import Localized
 from .tuning import (
     BIN,
-    DOUBLED,
     FULLY_ON_MAP,
     LEAST_PIECE,
     LEAST_SEEN,
@@ -110,14 +109,15 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
     walls: list[Floats] = []
     sigmas: list[float] = []
     left = np.argsort(-seen.lines.lengths, kind="stable")
+    endpoints, directions = seen.lines.endpoints[left], seen.lines.directions[left]
     while len(left):
-        rest = seen.take(left)
-        mine = _along(rest)
-        left = left[~mine]
-        group = rest.take(mine)
-        if not _is_seen_often(group.visits, group.places):
+        mine = _along(endpoints, directions)
+        rows = left[mine]
+        left, endpoints, directions = left[~mine], endpoints[~mine], directions[~mine]
+        if not _is_seen_often(seen.visits[rows], seen.places[rows]):
             continue
-        found = _pieces(group, known, Segments.derived(np.array(walls).reshape(-1, 4)))
+        group = seen.take(rows)
+        found = _pieces(group, known)
         walls += [piece for piece, _ in found]
         sigmas += [sigma for _, sigma in found]
         if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
@@ -126,17 +126,20 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
 
 
 def _is_seen_often(visits: Indices, places: Indices) -> bool:
+    if len(visits) < LEAST_VISITS:
+        return False
     return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
 
-def _along(seen: SeenLines) -> Bools:
+def _along(endpoints: Floats, directions: Floats) -> Bools:
     """Return which lines continue or repeat the first one, itself included."""
-    lines = seen.lines
-    direction, normal, offset = lines.directions[0], lines.normals[0], lines.offsets[0]
-    mine = lines.directions @ direction >= np.cos(SAME_ANGLE)
-    for ends in (lines.endpoints[:, :2], lines.endpoints[:, 2:]):
-        mine &= np.abs(ends @ normal - offset) <= SAME_LINE
-    begins, ends = lines.endpoints[:, :2] @ direction, lines.endpoints[:, 2:] @ direction
+    direction = directions[0]
+    normal = np.array([-direction[1], direction[0]])
+    offset = 0.5 * float((endpoints[0, :2] + endpoints[0, 2:]) @ normal)
+    mine = directions @ direction >= np.cos(SAME_ANGLE)
+    for points in (endpoints[:, :2], endpoints[:, 2:]):
+        mine &= np.abs(points @ normal - offset) <= SAME_LINE
+    begins, ends = endpoints[:, :2] @ direction, endpoints[:, 2:] @ direction
     low, high = begins[0], ends[0]
     inside = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
     inside[0] = True
@@ -149,11 +152,8 @@ def _along(seen: SeenLines) -> Bools:
     return np.asarray(inside)
 
 
-def _pieces(group: SeenLines, known: Segments, new: Segments) -> list[tuple[Floats, float]]:
-    """Return the pieces of one line that several visits show, with their sigma.
-
-    Pieces along a wall of the map, and pieces close before or behind another new wall, are left out.
-    """
+def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
+    """Return the pieces of one line that several visits show, with their sigma; none along a wall of the map."""
     place, direction, sigma = _fit(group)
     begins = (group.lines.endpoints[:, :2] - place) @ direction
     ends = (group.lines.endpoints[:, 2:] - place) @ direction
@@ -164,9 +164,7 @@ def _pieces(group: SeenLines, known: Segments, new: Segments) -> list[tuple[Floa
     for visit, begin, end in zip(group.visits, begins, ends, strict=True):
         covered[visit] |= (middles >= begin) & (middles <= end)
     points = place + middles[:, None] * direction
-    seen = (
-        (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, points, direction) & ~_doubled(new, points, direction)
-    )
+    seen = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, points, direction)
     return [
         (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
         for a, b in runs(seen)
@@ -205,15 +203,3 @@ def _on_map(known: Segments, points: Floats, direction: Floats) -> Bools:
     along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
     gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
     return np.asarray((gaps <= ON_MAP).any(axis=1))
-
-
-def _doubled(new: Segments, points: Floats, direction: Floats) -> Bools:
-    """Return which points of a line lie close before or behind a new wall that faces the same way, (k,).
-
-    The one in front hides the other, so that both are never seen. Flat beams show a wall too near, for example.
-    """
-    walls = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * SAME_ANGLE)))
-    off = points[:, None, :] - walls.endpoints[None, :, :2]
-    along = np.einsum("kij,ij->ki", off, walls.directions)
-    across = np.abs(np.einsum("kij,ij->ki", off, walls.normals))
-    return np.asarray(((along >= 0.0) & (along <= walls.lengths) & (across <= DOUBLED)).any(axis=1))

@@ -102,11 +102,12 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
     beams, columns = _crossed(walls, origins, rays)
     normals = walls.normals[columns]
     slant = np.einsum("ij,ij->i", rays[beams], normals)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (walls.offsets[columns] - np.einsum("ij,ij->i", origins[beams], normals)) / slant
-        gap = (ranges[beams] - distance) * np.abs(slant)
-        tolerance = _tolerance(one, sigma, distance)
-        kept = (np.abs(slant) >= LEAST_SLANT) & (distance > 0.0) & (gap >= -np.maximum(HIDDEN, tolerance))
+    ahead = walls.offsets[columns] - np.einsum("ij,ij->i", origins[beams], normals)
+    met = (np.abs(slant) >= LEAST_SLANT) & (ahead * slant > 0.0)
+    beams, columns, slant = beams[met], columns[met], slant[met]
+    distance = ahead[met] / slant
+    gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
+    kept = gap >= -np.maximum(HIDDEN, tolerance)
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
     directions, lengths = walls.directions[columns], walls.lengths[columns]
@@ -121,8 +122,9 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
     within = (deep >= 0.0) & (deep <= lengths)
     passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
     hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
-    seen, where = np.unique(chunk, return_inverse=True)
-    return Followed(seen, *(np.bincount(where[one], minlength=len(seen)) for one in (passed, ended, hidden)))
+    counted = [np.bincount(chunk[one], minlength=len(chunks)) for one in (passed, ended, hidden)]
+    seen = np.flatnonzero(sum(counted))
+    return Followed(seen, *(one[seen] for one in counted))
 
 
 def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, Indices]:
@@ -133,8 +135,7 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
     left = np.stack([-rays[:, 1], rays[:, 0]], axis=1)
     own = np.einsum("ij,ij->i", left, origins)[:, None]
     begins, ends = left @ walls.endpoints[:, :2].T >= own, left @ walls.endpoints[:, 2:].T >= own
-    beams, crossed = np.nonzero(begins != ends)
-    return beams, crossed
+    return np.divmod(np.flatnonzero(begins != ends), len(walls))
 
 
 def sees(chunks: Chunks, one: Localized, sigma: float) -> bool:

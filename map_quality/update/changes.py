@@ -16,6 +16,7 @@ from .tuning import (
     CONTRADICTING,
     DEVIATIONS,
     DOOR_VISITS,
+    DOUBLED,
     DOUBT_POSE,
     DOUBT_VISIT,
     JAMB,
@@ -122,14 +123,17 @@ def _new_walls(
     extended: dict[int, Draft] = {}
     added = []
     there, gone = evidence.there, evidence.gone
+    pieces: list[Floats] = []
     for number, sigma in enumerate(sigmas):
         wall = len(known) + number
         own = evidence.chunks.of_wall(wall)
-        for begin, end in runs(_filled(there[own], gone[own])):
+        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), evidence, wall)
+        for begin, end in runs(_filled(there[own], gone[own]) & single):
             piece = _part(evidence, wall, begin, end)
             chunks = own.start + begin + np.flatnonzero(there[own][begin:end])
             if np.hypot(*(piece[2:] - piece[:2])) < LEAST_PIECE:
                 continue
+            pieces.append(piece)
             old = _continued(known, piece, max(LEAST_STEP, DEVIATIONS * float(np.hypot(sigma, map_sigma))))
             if old is None or old in cut:
                 door = _may_be_door(known, piece)
@@ -152,6 +156,22 @@ def _filled(there: Bools, gone: Bools) -> Bools:
     out = there.copy()
     out[1:-1] |= there[:-2] & there[2:] & ~gone[1:-1]
     return out
+
+
+def _doubled(new: Segments, evidence: WallEvidence, wall: int) -> Bools:
+    """Return which chunks of a wall lie close before or behind a new wall that faces the same way, (k,).
+
+    The one in front hides the other, so that both are never seen. Flat beams show a wall too near, for example.
+    """
+    walls, count = evidence.chunks.walls, int(evidence.chunks.counts[wall])
+    direction = walls.directions[wall]
+    places = (np.arange(count) + 0.5) / count * walls.lengths[wall]
+    points = walls.endpoints[wall, :2] + places[:, None] * direction
+    near = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * SAME_ANGLE)))
+    off = points[:, None, :] - near.endpoints[None, :, :2]
+    along = np.einsum("kij,ij->ki", off, near.directions)
+    across = np.abs(np.einsum("kij,ij->ki", off, near.normals))
+    return np.asarray(((along >= 0.0) & (along <= near.lengths) & (across <= DOUBLED)).any(axis=1))
 
 
 def _part(evidence: WallEvidence, wall: int, begin: int, end: int) -> Floats:

@@ -86,14 +86,17 @@ class WallEvidence:
 
     def poses(self, *, on: bool) -> Indices:
         """Return the number of places from which each chunk, or one next to it, is read, or passed through, (c,)."""
-        rows = np.unique(self.sights[self.seen_on == on][:, :2], axis=0)
+        sights = self.sights[self.seen_on == on]
+        places = int(sights[:, 1].max(initial=0)) + 1
+        chunk, place = np.divmod(np.unique(sights[:, 0] * places + sights[:, 1]), places)
         wall = np.repeat(np.arange(len(self.chunks.walls)), self.chunks.counts)
-        spread = [rows]
+        spread = [chunk * places + place]
         for step in (-1, 1):
-            moved = rows + np.array([step, 0])
-            moved = moved[(moved[:, 0] >= 0) & (moved[:, 0] < len(self.chunks))]
-            spread.append(moved[wall[moved[:, 0]] == wall[moved[:, 0] - step]])
-        return np.bincount(np.unique(np.concatenate(spread), axis=0)[:, 0], minlength=len(self.chunks))
+            near = chunk + step
+            inside = (near >= 0) & (near < len(self.chunks))
+            inside[inside] = wall[near[inside]] == wall[chunk[inside]]
+            spread.append(near[inside] * places + place[inside])
+        return np.bincount(np.unique(np.concatenate(spread)) // places, minlength=len(self.chunks))
 
     def places_of(self, chunks: Indices, *, on: bool) -> int:
         """Return the number of places from which any of some chunks is read, or passed through."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,18 +37,20 @@ def hanging_lines(one: Localized, sigma: float) -> Floats:
     weights = 1.0 / (pairs.variances + sigma**2)
     local = pairs.about((one.pose.x, one.pose.y), (0.0, 0.0))
     total = JointSums.of_set(local, weights)
-    hanging: list[Floats] = []
+    normals, directions, middles = pairs.map_normals, pairs.map_directions, pairs.map_midpoints
+    lines: list[Floats] = []
+    rests: list[JointSums] = []
     left = np.ones(len(pairs), dtype=bool)
     while left.any():
         first = int(np.argmax(left))
-        normal, offset = pairs.map_normals[first], pairs.map_offsets[first]
-        mine = _on_line(pairs.map_directions, pairs.map_midpoints, normal, offset)
+        normal, offset = normals[first], pairs.map_offsets[first]
+        mine = _on_line(directions, middles, normal, offset)
         mine[first] = True
         left &= ~mine
-        rest = total - JointSums.of_set(local.take(mine), weights[mine])
-        if rest.count < 2 or _deviation(rest, one.pose, normal) > HANGING:
-            hanging.append(np.array([*normal, offset]))
-    return np.array(hanging).reshape(-1, 3)
+        lines.append(np.array([*normal, offset]))
+        rests.append(total - JointSums.of_set(local.take(mine), weights[mine]))
+    found = np.array(lines).reshape(-1, 3)
+    return found[_deviations(rests, one.pose, found[:, :2]) > HANGING]
 
 
 def on_lines(walls: Segments, lines: Floats) -> Bools:
@@ -63,12 +66,15 @@ def _on_line(directions: Floats, midpoints: Floats, normal: Floats, offset: floa
     return np.asarray((np.abs(directions @ normal) < 0.05) & (np.abs(midpoints @ normal - offset) < LEAST_TOLERANCE))
 
 
-def _deviation(sums: JointSums, pose: RigidTransform, normal: Floats) -> float:
-    """Return the standard deviation of a pose along a direction by some sums, metres; inf where it is free."""
-    information = sums.information(pose.theta)
+def _deviations(sums: Sequence[JointSums], pose: RigidTransform, normals: Floats) -> Floats:
+    """Return the standard deviation of a pose along a direction by each of some sums, (k,) metres; inf where free.
+
+    Of fewer than two correspondences it is inf.
+    """
+    information = np.array([one.information(pose.theta) for one in sums]).reshape(-1, 3, 3)
     values, vectors = np.linalg.eigh(information)
-    along = vectors.T @ np.array([normal[0], normal[1], 0.0])
-    free = values <= 1e-9 * max(1.0, float(values.max()))
-    if np.any(np.abs(along[free]) > 1e-3):
-        return math.inf
-    return float(np.sqrt(np.sum(along[~free] ** 2 / values[~free])))
+    along = np.einsum("kji,kj->ki", vectors[:, :2], normals)
+    free = values <= 1e-9 * np.maximum(1.0, values.max(axis=1, initial=0.0))[:, None]
+    square = np.where(free, 0.0, along**2 / np.where(free, 1.0, values)).sum(axis=1)
+    unknown = np.array([one.count < 2 for one in sums], dtype=bool) | (free & (np.abs(along) > 1e-3)).any(axis=1)
+    return np.where(unknown, math.inf, np.sqrt(square))

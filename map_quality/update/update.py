@@ -115,9 +115,8 @@ def updating(
     first = yield from begun.localize()
     latest, proposed = list(first), None
     shown: list[tuple[str, tuple[int, ...], int]] = []
-    _, refused = choose_evidence(names, first, begun.sigma)
+    chosen, refused = choose_evidence(names, first, begun.sigma)
     for number in range(ROUNDS):
-        chosen, _ = choose_evidence(names, latest, begun.sigma)
         drafts, evidence = yield from begun.draft(chosen, names)
         before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
         if begun.deadline.passed:
@@ -126,6 +125,7 @@ def updating(
             proposed = yield from begun.verify(drafts, evidence, first)
             break
         latest = yield from begun.search_others(drafts, first, latest)
+        chosen, _ = choose_evidence(names, latest, begun.sigma)
     sharper = (yield from begun.sharpen(proposed or Proposed(), first, names)) or proposed
     return begun.proposal(sharper or Proposed(), first, refused, accept, refuse)
 
@@ -242,9 +242,11 @@ class _Update:
         Proposed or None
             None if the map is sharp enough, if the sharper one fits the scans less, or if there is no time to try.
         """
+        if not self.is_blurred or self.deadline.passed:
+            return None
         found = proposed.found or tuple(first)
         chosen, _ = choose_evidence(names, found, self.sigma)
-        if not self.is_blurred or not chosen or self.deadline.passed:
+        if not chosen:
             return None
         index = self._indexed(apply(self.known, proposed.changes))
         better = sharpen(index, [on_map(one, index.segments) for one in chosen], self.sigma)

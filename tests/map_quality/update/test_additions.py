@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from map_quality.update.additions import SeenLines, candidates
+from map_quality.update.beams import Chunks
+from map_quality.update.changes import draft_changes
+from map_quality.update.evidence import WallEvidence
 from registration import Segments
 
-NO_MAP = Segments.derived(np.zeros((0, 4)))
+MAP = Segments.derived(np.array([[50.0, 50.0, 60.0, 50.0]]))
 WALL = [0.0, 0.0, 5.0, 0.0]
 
 
@@ -20,11 +23,32 @@ def seen(*lines: list[float]) -> SeenLines:
     return SeenLines(Segments.derived(ends), visits, places, np.full(len(ends), 1e4))
 
 
+def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
+    """Return the walls that two visits add from three places; beams pass through those at `passed`, their y."""
+    new, sigmas = candidates(seen(*lines), MAP)
+    chunks = Chunks.of(Segments.derived(np.concatenate([MAP.endpoints, new])))
+    wall = np.repeat(np.arange(len(chunks.walls)), chunks.counts)
+    on = np.full(len(wall), True) if passed is None else np.abs(chunks.walls.midpoints[wall, 1] - passed) > 0.06
+    counts = np.tile(9 * on, (2, 1)), np.tile(9 * ~on, (2, 1))
+    sights = np.array([(chunk, place, place) for chunk in range(len(wall)) for place in range(3)])
+    evidence = WallEvidence(chunks, counts[1], counts[0], np.zeros_like(counts[0]), sights, np.repeat(on, 3))
+    drafts = draft_changes(evidence, MAP, sigmas, 0.005)
+    return np.concatenate([one.new for one in drafts if one.code == "added"])
+
+
 @pytest.mark.parametrize("across", [0.18, -0.18])
 def test_a_line_close_before_or_behind_a_new_wall_is_the_same_wall(across: float) -> None:
-    walls, sigmas = candidates(seen(WALL, [2.0, across, 4.0, across]), NO_MAP)
+    walls = added(WALL, [2.0, across, 4.0, across])
+    assert walls.shape == (1, 4)
     assert np.abs(walls - [WALL]).max() < 0.06
-    assert len(sigmas) == 1
+
+
+def test_a_line_that_beams_pass_through_hides_no_wall_close_to_it() -> None:
+    """A shut door lies between the faces of its wall; lines across an open one continue these faces."""
+    door = [2.0, 0.18, 4.0, 0.18]
+    walls = added(WALL, door, passed=0.0)
+    assert walls.shape == (1, 4)
+    assert np.abs(walls - [door]).max() < 0.06
 
 
 @pytest.mark.parametrize(
@@ -36,5 +60,4 @@ def test_a_line_close_before_or_behind_a_new_wall_is_the_same_wall(across: float
     ],
 )
 def test_other_lines_are_walls_of_their_own(other: list[float]) -> None:
-    walls, _ = candidates(seen(WALL, other), NO_MAP)
-    assert np.abs(walls - [WALL, other]).max() < 0.06
+    assert np.abs(added(WALL, other) - [WALL, other]).max() < 0.06

@@ -1,0 +1,87 @@
+"""Evidence of beams, against slow and simple references."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from association import Deadline, MapIndex
+from map_quality.update.beams import Chunks, beams_in_map, follow
+from map_quality.update.evidence import WallEvidence
+from map_quality.update.scans import Localized, search
+from map_quality.update.tuning import DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, THROUGH
+from registration import Segments
+
+from .hall import PILLAR, RACK, segments, visit
+
+SIGMA, NO_LINES = 0.005, np.zeros((0, 3))
+
+
+def localized() -> list[Localized]:
+    """Return scans of a hall in which the rack is gone."""
+    index = MapIndex.build(segments(PILLAR, RACK), SIGMA)
+    taken = visit(segments(PILLAR), "monday", 1)
+    return [
+        Localized(k, 0, one.scan, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(taken)
+    ]
+
+
+def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
+    """Count the beams through, on and before each chunk, one beam and one wall after the other; (3, c)."""
+    assert one.result.covariance is not None
+    out, walls = np.zeros((3, len(chunks)), dtype=int), chunks.walls
+    position = np.linalg.eigvalsh(one.result.covariance[:2, :2]).max()
+    noise = np.median(one.scan.measured.sigma)
+    for origin, ray, reach in zip(*beams_in_map(one), strict=True):
+        for k in range(len(walls)):
+            slant, begin = ray @ walls.normals[k], walls.endpoints[k, :2]
+            distance = (walls.offsets[k] - origin @ walls.normals[k]) / slant
+            at = (origin + distance * ray - begin) @ walls.directions[k]
+            if abs(slant) < LEAST_SLANT or distance <= 0.0 or not 0.0 <= at <= walls.lengths[k]:
+                continue
+            deviation = math.sqrt(noise**2 + SIGMA**2 + position + one.result.covariance[2, 2] * distance**2)
+            tolerance, gap = max(LEAST_TOLERANCE, DEVIATIONS * deviation), (reach - distance) * abs(slant)
+            deep = at + THROUGH * tolerance / abs(slant) * (ray @ walls.directions[k])
+            chunk = chunks.first[k] + min(int(at / walls.lengths[k] * chunks.counts[k]), chunks.counts[k] - 1)
+            ended = abs(gap) <= tolerance and (slant < 0.0 or not oriented)
+            out[0, chunk] += gap > THROUGH * tolerance and 0.0 <= deep <= walls.lengths[k]
+            out[1, chunk] += ended
+            out[2, chunk] += -HIDDEN <= gap <= tolerance and not ended
+    return out
+
+
+def test_beams_are_counted_as_one_by_one() -> None:
+    chunks = Chunks.of(segments(PILLAR, RACK))
+    for one in localized():
+        for oriented in (False, True):
+            seen, expected = (
+                follow(chunks, one, NO_LINES, SIGMA, oriented=oriented),
+                counted(chunks, one, oriented=oriented),
+            )
+            assert seen.chunks.tolist() == np.flatnonzero(expected.sum(axis=0)).tolist()
+            assert np.array_equal([seen.through, seen.on, seen.before], expected[:, seen.chunks])
+            assert expected.any(axis=1).all()
+
+
+def test_a_chunk_counts_the_places_that_see_it_or_one_next_to_it_on_its_wall() -> None:
+    rng = np.random.default_rng(5)
+    chunks = Chunks.of(Segments.from_array([[0.0, k, length, k] for k, length in enumerate([0.2, 0.6, 1.4, 0.3])]))
+    sights = np.stack([rng.integers(len(chunks), size=40), rng.integers(9, size=40), np.arange(40)], axis=1)
+    seen_on, nothing = rng.random(40) < 0.6, np.zeros((1, len(chunks)), dtype=np.intp)
+    evidence = WallEvidence(chunks, nothing, nothing, nothing, sights, seen_on)
+    wall = np.repeat(np.arange(4), chunks.counts)
+    for on in (False, True):
+        expected = [
+            len(
+                {
+                    place
+                    for (other, place, _), seen in zip(sights.tolist(), seen_on, strict=True)
+                    if seen == on and abs(other - k) <= 1 and wall[other] == wall[k]
+                }
+            )
+            for k in range(len(chunks))
+        ]
+        assert evidence.poses(on=on).tolist() == expected
+    none = WallEvidence(chunks, nothing, nothing, nothing, sights[:0], seen_on[:0])
+    assert none.poses(on=True).tolist() == [0] * len(chunks)
