@@ -6,6 +6,7 @@ import math
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 MAX_FRAME = 255  # characters
 SHOWN_MAPS = 5  # of several maps, in the line of the start
+LEAVING_SECONDS = 1.0  # that the end waits for DDS
 CHOSEN, FILE = "linefix.ros2.namespace", "linefix.ros2.file"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "help")
 
@@ -244,9 +246,13 @@ def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
         signal.signal(number, lambda *_: node.end())
     print(f"linefix: {_started(options, maps)}", file=sys.stderr, flush=True)
     node.run()
-    if not node.close():
-        sys.stderr.flush()
-        os._exit(0)  # a search does not end in time, and Python would wait for it
+    node.close()
+    # DDS waits without limit for a robot that is gone, and Python for a search that does not end.
+    leaving = threading.Thread(target=node.leave, daemon=True)
+    leaving.start()
+    leaving.join(LEAVING_SECONDS)
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _started(options: NodeOptions, maps: Maps | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import time
 import weakref
@@ -114,6 +115,14 @@ class Node:
         until = time.monotonic() + seconds
         converted = self._converter is None or self._converter.end(seconds)
         return self._searcher.end(max(0.0, until - time.monotonic())) and converted
+
+    def leave(self) -> None:
+        """Delete the topics of the node, after `close`; other participants then know that it is gone.
+
+        DDS waits here for subscribers that have not received everything, and without limit for one that is gone.
+        """
+        self.__dict__.clear()
+        gc.collect()
 
     @property
     def waits_for_odometry(self) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import queue
 import shutil
+import signal
 import subprocess
 import threading
 import time
@@ -20,7 +21,7 @@ import pytest
 import linefix
 from ros2 import NodeOptions
 
-from .robot import BASE_FROM_LASER, FLOORS, PATIENCE, POLL, ROOM, SCANNER, floors, grid_of_room, running
+from .robot import BASE_FROM_LASER, FLOORS, PATIENCE, POLL, ROOM, SCANNER, bridge, floors, grid_of_room, running
 
 SOURCES = Path(__file__).parent / "fastdds"
 WALLS = linefix.Segments.from_array(ROOM)
@@ -238,6 +239,20 @@ def test_the_map_of_the_agreed_pose(domain: int, program: Path) -> None:
         robot.until("initialpose", way)
         with peer_without_bridge(program, domain, "/tower") as late:
             assert late.until("map_id") == ["map_id", "hq-2"]
+
+
+def test_the_end_does_not_wait_for_a_robot_that_is_gone(domain: int, map_file: str, program: Path) -> None:
+    """Its process was killed, so that it acknowledges nothing any more, and DDS waits for it."""
+    with bridge("--map", map_file, "--publish-tf") as started:
+        with peer_without_bridge(program, domain) as robot:
+            robot.mount()
+            way = Way(robot)
+            robot.until("initialpose", way)
+            way()
+        asked = time.monotonic()
+        started.process.send_signal(signal.SIGTERM)
+        assert started.process.wait(PATIENCE) == 0
+        assert time.monotonic() - asked < 5.0  # documented: 2 s
 
 
 def test_two_robots_in_one_domain(domain: int, program: Path) -> None:
