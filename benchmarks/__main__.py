@@ -29,6 +29,7 @@ from .replicas import replicas
 from .request import request
 from .ros2 import ros2
 from .sensitivity import sensitivity
+from .smoothness import smoothness
 from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
@@ -137,6 +138,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "views": views,
     "replicas": replicas,
     "sensitivity": sensitivity,
+    "smoothness": smoothness,
     "plan": plan,
     "ros2": ros2,
     **UPKEEP,

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from association.verdict.features import Features
-from association.verdict.models import MODELS, USUAL, Model, as_document
+from association.verdict.models import MODELS, USUAL, Model
 from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
 
 from .curves import Fitted, Task, fit, log_loss
@@ -191,6 +191,14 @@ def print_answered(
         "usable_wrong_in_map": float((verdicts.usable & ~right)[[not e.stranger for e in examples]].sum()),
         "usable_out_of_map": float(verdicts.usable[[e.stranger for e in examples]].sum()),
     }
+
+
+def as_document(model: Model) -> dict[str, list[float]]:
+    """Do the opposite of `association.verdict.models.as_model`."""
+    numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
+    for pair in model.pairs:
+        numbers[pair.key] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
+    return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
 
 def write(path: Path, models: dict[str, Model], manifest: dict[str, Any], usual: Features) -> None:

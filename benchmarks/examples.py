@@ -14,7 +14,7 @@ from association.context import SearchContext
 from association.to_scale import search_to_scale
 from association.verdict.alternatives import probability_among, probability_by_shown, probability_with_loose_walls
 from association.verdict.chance import find_null_score
-from association.verdict.features import Features, describe_answer, with_null_score
+from association.verdict.features import Features, add_null_score, describe_answer
 from association.verdict.models import USUAL
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
@@ -128,7 +128,9 @@ class Case:
         best, pose, right = found.answer.best, found.answer.registered.pose, False
         description = describe_answer(context, found, found.answer)
         weighed, plain = description.alternatives, Features(*description.features.item())
-        features = with_null_score(plain, best, find_null_score(context, best))
+        described = description.features.copy()
+        add_null_score(described, best, find_null_score(context, best))
+        features = Features(*described.item())
         findings = findings_of(context, found, description, off_scale=to_scale.off_scale)
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)

@@ -124,11 +124,6 @@ class Node:
         self.__dict__.clear()
         gc.collect()
 
-    @property
-    def waits_for_odometry(self) -> bool:
-        """Return whether the result of a scan waits until odometry has reached its stamp."""
-        return self._held is not None
-
     def turn(self) -> None:
         """Take the messages and results that have come, and search the newest scans."""
         self._turn_transforms()

@@ -168,18 +168,6 @@ def describe(best: ConsensusSet, facts: Records, alternatives: Records) -> Recor
     return features
 
 
-def features_of(context: SearchContext, answer: Answer, alternatives: Records) -> Features:
-    """Return the same by name."""
-    return Features(*describe(answer.best, facts_of(context, answer), alternatives).item())
-
-
-def with_null_score(features: Features, best: ConsensusSet, null: NullScore) -> Features:
-    """Return the features with those of the null score."""
-    described = np.array([features], FEATURES)
-    add_null_score(described, best, null)
-    return Features(*described.item())
-
-
 def add_null_score(features: Records, best: ConsensusSet, null: NullScore) -> None:
     """Write those of the null score into the features, (1,) of `FEATURES`."""
     write_null_features(best.score, null.score, null.symmetry, features)

@@ -144,14 +144,6 @@ def as_model(document: Mapping[str, Sequence[float]]) -> Model:
     return Model(curves, tuple(pairs))
 
 
-def as_document(model: Model) -> dict[str, list[float]]:
-    """Do the opposite of `as_model`."""
-    numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
-    for pair in model.pairs:
-        numbers[pair.key] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
-    return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
-
-
 def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     document = json.loads(files(__package__).joinpath(FILE).read_bytes())
     models = {name: as_model(curves) for name, curves in document["models"].items()}

@@ -18,6 +18,8 @@ from association.consensus.sight import BeamFractions
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.layout import LEVERAGE, MATCH
+from association.verdict.alternatives import compare_alternatives
+from association.verdict.features import Features, describe, facts_of
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -166,3 +168,8 @@ def explanations_of(answer: Answer | None, *others: ConsensusSet, complete: bool
     own = () if answer is None else (answer.best,)
     listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.posterior))
     return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0, "ordered", 0.75))
+
+
+def features_of(context: SearchContext, answer: Answer, rivals: Sequence[ConsensusSet] = ()) -> Features:
+    alternatives = compare_alternatives(answer.best, rivals)
+    return Features(*describe(answer.best, facts_of(context, answer), alternatives).item())

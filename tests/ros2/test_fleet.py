@@ -12,6 +12,7 @@ from cyclonedds.domain import DomainParticipant
 
 import linefix
 from ros2 import NodeOptions, messages
+from ros2.odometry import OdometryHistory
 from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 from .robot import (
@@ -138,8 +139,16 @@ def test_the_result_of_a_scan_waits_for_its_odometry(
     domain: int, room: linefix.MapIndex, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the odometry before, the scan would contradict the agreed pose, and the pose would be corrected."""
+    held: list[float] = []  # stamps of results that the node holds back
+
+    def awaited(history: OdometryHistory, stamp: messages.Time, before: Any = OdometryHistory.awaited) -> bool:
+        waits: bool = before(history, stamp)
+        held.extend([stamp.sec + 1e-9 * stamp.nanosec] * waits)
+        return waits
+
     monkeypatch.setattr("ros2.node.ODOMETRY_SECONDS", 3600.0)
-    with running(NodeOptions(domain=domain, agree=1), room) as node:
+    monkeypatch.setattr(OdometryHistory, "awaited", awaited)
+    with running(NodeOptions(domain=domain, agree=1), room):
         robot = Fleet(domain)
         robot.mounts.publish(mount())
         robot.until(robot.initial, lambda: robot.drive(moved(1.0), 1.0))
@@ -150,7 +159,7 @@ def test_the_result_of_a_scan_waits_for_its_odometry(
 
         def waiting() -> bool:
             robot.scans.publish(scan_from(further, second))
-            return node.waits_for_odometry
+            return second in held
 
         wait_until(waiting)
         found = robot.until(robot.agreed, lambda: robot.drive(further, second), lambda one: stamp_of(one) > 1.2)

@@ -17,13 +17,12 @@ from association.scan.alignment import aligned
 from association.scan.scan import Views, scaled
 from association.scan.scan_lines import parts_of
 from association.scan.views import corrected
-from association.verdict.alternatives import compare_alternatives
-from association.verdict.features import features_of
 from association.verdict.tuning import LEAST_IN_STEP
 from association.verdict.verdict import judge
 from registration import RigidTransform
 from registration.layout import Floats
 
+from ..answers import features_of
 from ..scenes import (
     INSIDE,
     ROOM,
@@ -336,6 +335,6 @@ def test_what_is_on_no_wall_counts_by_view_of_a_drive(
     context = context_of(INDEX, assemble(views))
     answer = search_and_explain(context).answer
     assert answer is not None
-    features = features_of(context, answer, compare_alternatives(answer.best, []))
+    features = features_of(context, answer)
     assert features.longest_unmatched == pytest.approx(longest, abs=0.01)
     assert features.root_unmatched**2 == pytest.approx(together, abs=0.02)

@@ -17,10 +17,10 @@ from association.explanations import Answer
 from association.verdict import tuning
 from association.verdict.alternatives import compare_alternatives, probability_among
 from association.verdict.chance import NullScore
-from association.verdict.features import Features, depends_on_one_wall, facts_of, features_of, with_null_score
+from association.verdict.features import FEATURES, Features, add_null_score, depends_on_one_wall, facts_of
 from registration.layout import Records
 
-from ..answers import answer_with, estimated_of, leverages_of, ranked, registered_room, room
+from ..answers import answer_with, estimated_of, features_of, leverages_of, ranked, registered_room, room
 from ..reference import verdict as twin
 
 CONTEXT = room()
@@ -30,7 +30,13 @@ SCORES = st.floats(1.0, 150.0)
 
 
 def features_beside(answer: Answer, rivals: Sequence[ConsensusSet]) -> Features:
-    return features_of(CONTEXT, answer, compare_alternatives(answer.best, rivals))
+    return features_of(CONTEXT, answer, rivals)
+
+
+def with_null_score(features: Features, best: ConsensusSet, null: NullScore) -> Features:
+    described = np.array([features], FEATURES)
+    add_null_score(described, best, null)
+    return Features(*described.item())
 
 
 def hinging(leverages: Records | None = None, weakest: float = 0.01, score: float = 100.0, **scores: Any) -> Answer:
