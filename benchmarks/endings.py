@@ -29,12 +29,13 @@ from .table import Row, at_most, machine, print_rows
 
 HANG_UP_MS, SLOW_S, REPLACED_S, DRAINED_S = 250.0, 10.0, 3.0, 10.0
 TRIES = 10
+HEAVY = 199_000  # segments of a large map
 HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 5000\r\n"
 
 
-def heavy(count: int = 199_000, seed: int = 0) -> bytes:
+def heavy(seed: int) -> bytes:
     """Return a request that takes a second or so: a large map, which has to be indexed."""
-    begins = np.random.default_rng(seed).uniform(0.0, 1e3, (count, 2))
+    begins = np.random.default_rng(seed).uniform(0.0, 1e3, (HEAVY, 2))
     body = {
         "map": {"segments": np.hstack([begins, begins + np.array([1.0, 0.1])])},
         "scan": {"segments": examples.SEEN},

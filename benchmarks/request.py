@@ -40,6 +40,7 @@ from .overload import family
 from .table import Row, at_most, print_rows, print_table
 
 ROUNDS = 15
+CALLS = 100  # of one part in a row
 BESIDE_MS, CLIENT_MS = 0.7, 1.3  # goals: of the processor, and as a client sees it
 BARE = """
 import sys
@@ -203,11 +204,11 @@ def bare() -> Iterator[Served]:
             process.terminate()
 
 
-def _thread_ms(call: Callable[[], object], count: int = 100) -> float:
+def _thread_ms(call: Callable[[], object]) -> float:
     before = time.thread_time()
-    for _ in range(count):
+    for _ in range(CALLS):
         call()
-    return 1e3 * (time.thread_time() - before) / count
+    return 1e3 * (time.thread_time() - before) / CALLS
 
 
 def _processor_seconds(pid: int) -> float:

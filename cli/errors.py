@@ -97,9 +97,7 @@ class Asked:
 NOTHING = Asked()
 
 
-def error_of(
-    status: int, code: str, detail: str, faults: Sequence[Mapping[str, Any]], asked: Asked = NOTHING
-) -> CommandError:
+def error_of(status: int, code: str, detail: str, faults: Sequence[Mapping[str, Any]], asked: Asked) -> CommandError:
     """Return the error that a problem of the service stands for.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import sys
@@ -155,7 +154,7 @@ class Publishing:
         typer.Option(
             metavar="RADIANS", min=0.0, max=3.0, help="Minimum standard deviation of the heading in initialpose."
         ),
-    ] = round(math.radians(2.0), 4)
+    ] = 0.0349
     publish_tf: Annotated[
         bool,
         typer.Option(

@@ -62,11 +62,11 @@ class Notes:
         """Note what was taken."""
         _add(self.read, code, message, count)
 
-    def add_merged(self, code: str, message: str, count: int = 0) -> None:
+    def add_merged(self, code: str, message: str, count: int) -> None:
         """Note what became one."""
         _add(self.merged, code, message, count)
 
-    def add_dropped(self, code: str, message: str, count: int = 0) -> None:
+    def add_dropped(self, code: str, message: str, count: int) -> None:
         """Note what was left out."""
         _add(self.dropped, code, message, count)
 

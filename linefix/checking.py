@@ -88,7 +88,7 @@ def check(
 
 
 def try_in_time(
-    index: MapIndex, scan: Scan, deadline: Deadline, *, oriented: bool, said: RigidTransform | None = None
+    index: MapIndex, scan: Scan, deadline: Deadline, *, oriented: bool, said: RigidTransform | None
 ) -> Sample | None:
     """Try a sample scan, see `map_quality.try_sample`; return None when no time is left for it.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -67,7 +66,7 @@ class NodeOptions:
     agree: int = 3
     when: When = "start"
     min_sigma: float = 0.05
-    min_sigma_theta: float = math.radians(2.0)
+    min_sigma_theta: float = 0.0349  # 2 degrees
     publish_tf: bool = False
     domain: int = 0
     hardware_id: str = ""

@@ -210,9 +210,9 @@ def plan_cells(count: int, seed: int) -> list[Cell]:
     return cells
 
 
-def all_cells(count: int, seed: int, sizes: tuple[int, ...] = SIZES) -> list[Cell]:
+def all_cells(count: int, seed: int) -> list[Cell]:
     """Return every cell of the comparison with `count` queries each."""
-    drawn = [drawn_cell(k, s, level, count, seed) for k in KINDS for s in sizes for level in DRAWN_LEVELS]
+    drawn = [drawn_cell(k, s, level, count, seed) for k in KINDS for s in SIZES for level in DRAWN_LEVELS]
     return [*drawn, *plan_cells(count, seed)]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import map_quality
 from association import Deadline, MapIndex
-from map_quality import MapUpdate, VisitScan
+from map_quality import VisitScan
 from map_quality.update.scans import search
 from registration import RigidTransform, Segments
 from simulation import FAMILIES, SimulationError
@@ -28,7 +28,7 @@ MAP_SIGMA = 0.005  # m
 CONFIDENCES = ((0.0, 0.9), (0.9, 0.98), (0.98, 0.995), (0.995, 1.1))
 
 
-def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = False, poses: str = "own") -> list[Row]:
+def changes(families: Sequence[str], seeds: Sequence[int], *, poses: str = "own") -> list[Row]:
     """Return the rows about changes of buildings in which a fifth of what can move has moved.
 
     Scans have `poses` of the robot's own, by "odometry" along a route, or "none".
@@ -36,7 +36,7 @@ def changes(families: Sequence[str], seeds: Sequence[int], *, listing: bool = Fa
     judged, usable, seconds = [], np.zeros(3), []
     for drawn_scene in drawn(families, seeds, PLACES):
         scene = routed(drawn_scene) if poses == "odometry" else drawn_scene
-        one, counts, took = _update(scene, listing=listing, poses=poses)
+        one, counts, took = _update(scene, poses)
         judged.append(one)
         usable += counts
         seconds.append(took)
@@ -65,7 +65,7 @@ def _by_confidence(total: Judged) -> list[Row]:
     return rows
 
 
-def _update(scene: Scene, *, listing: bool, poses: str) -> tuple[Judged, np.ndarray, float]:
+def _update(scene: Scene, poses: str) -> tuple[Judged, np.ndarray, float]:
     rng = np.random.default_rng(7)
     taken = list(visits(scene, VISITS, rng))
     scans = [one for one, _ in taken]
@@ -77,21 +77,12 @@ def _update(scene: Scene, *, listing: bool, poses: str) -> tuple[Judged, np.ndar
     judged = judge(scene, [(one.visit, at) for one, at in taken], update)
     maps = (scene.mapped.segments, update.segments, scene.today.segments)
     counts = [_usable(MapIndex.build(one, MAP_SIGMA), taken) for one in maps]
-    if listing:
-        _list(scene, update, judged)
     return judged, np.array(counts), took
 
 
 def _usable(index: MapIndex, taken: Sequence[tuple[VisitScan, RigidTransform]]) -> int:
     """Return how many scans are usable on a map, without a pose of their own."""
     return sum(search(index, one, Deadline()).usable for one, _ in taken[:: VISITS - 1])
-
-
-def _list(scene: Scene, update: MapUpdate, judged: Judged) -> None:
-    print(f"{scene.family}: {judged}, {update.usable}, {update.held_back}, {len(update.refused_visits)} refused")
-    for one in update.changes:
-        if is_false(one, scene):
-            print("  false:", one.code, one.segments, one.new.round(2).tolist(), one.evidence, one.confidence)
 
 
 def sharper(families: Sequence[str], seeds: Sequence[int]) -> list[Row]:

@@ -122,11 +122,11 @@ class Drawing:
         (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
         return f" from ({left:g}, {bottom:g}) to ({right:g}, {top:g})"
 
-    def drop(self, kind: str, count: int = 1, *, hint: str = "") -> None:
+    def drop(self, kind: str, *, hint: str = "") -> None:
         """Note what is no wall or cannot be read, and what to do about it."""
         name = shown(kind)
         said = f"{name} is not read" + (f": it {hint}" if hint else "")
-        self.notes.add_dropped(f"entity_{name.lower().replace(' ', '_')}", said, count)
+        self.notes.add_dropped(f"entity_{name.lower().replace(' ', '_')}", said, 1)
 
     def without_lines(self) -> MalformedFileError:
         """Return the error for a drawing without lines: it names what is there instead."""

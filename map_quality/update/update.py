@@ -94,10 +94,10 @@ def update(
 def updating(
     index: MapIndex,
     scans: Sequence[VisitScan],
-    deadline: Deadline | None = None,
+    deadline: Deadline | None,
     *,
-    accept: float | None = None,
-    refuse: Collection[int] = (),
+    accept: float | None,
+    refuse: Collection[int],
 ) -> Generator[None, None, MapUpdate]:
     """Do what `update` does, one search at a step, and return the same; between steps others may have their turn.
 

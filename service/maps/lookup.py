@@ -55,14 +55,9 @@ class MapLookup:
     store : MapStore
     parser : ParserProcess
         Parses large stored maps.
-    most_together : int
-        Segments of maps that are searched together.
     """
 
-    def __init__(
-        self, cache: IndexCache, store: MapStore, parser: ParserProcess, most_together: int = MOST_TOGETHER
-    ) -> None:
-        self._most_together = most_together
+    def __init__(self, cache: IndexCache, store: MapStore, parser: ParserProcess) -> None:
         self._cache = cache
         self._store = store
         self._parser = parser
@@ -177,8 +172,8 @@ class MapLookup:
             parts[name] = MapPart(segments, document.sigma, is_oriented(oriented, document.oriented))
             frame_ids.append(document.frame_id)
         count = sum(len(part.segments) for part in parts.values())
-        if count > self._most_together:
-            raise TooManyError("/maps", self._most_together, "segments of all maps together")
+        if count > MOST_TOGETHER:
+            raise TooManyError("/maps", MOST_TOGETHER, "segments of all maps together")
         self._cache.make_room(2 * INDEXED_BYTES * count)
         try:
             maps = MapSet(parts, deadline)
