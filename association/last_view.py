@@ -122,11 +122,9 @@ def last_view(scan: Scan) -> tuple[Scan, Indices]:
 
 def _of_one_place(measured: MeasuredSegments, beams: Beams | None, views: Views) -> Scan:
     """Return a scan of several views; of one in the scan's frame, that scan itself."""
-    sighted = views.viewpoints[~np.isnan(views.viewpoints[:, 0])]
-    viewpoint = (float(sighted[0, 0]), float(sighted[0, 1])) if len(sighted) else None
     if len(views) > 1:
-        return Scan(measured, viewpoint, beams, views)
-    return Scan(measured, viewpoint, beams and replace(beams, origins=None), None)
+        return Scan(measured, views.viewpoint, beams, views)
+    return Scan(measured, views.viewpoint, beams and replace(beams, origins=None), None)
 
 
 def _measured(measured: MeasuredSegments, own: Indices) -> MeasuredSegments:

@@ -29,6 +29,8 @@ from .result import (
     Status,
 )
 
+FIRST_NAMES = 5  # of maps, in a message
+
 
 def in_own_frames(found: Stages, ids: Sequence[str]) -> AssociationResult:
     """Return an answer with its poses, segments and alternatives on the map that each is on.
@@ -188,6 +190,6 @@ def _named(reason: Reason, result: AssociationResult) -> Reason:
     )
 
 
-def _some(names: Sequence[str], most: int = 5) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - FIRST_NAMES} more" if len(names) > FIRST_NAMES else ""
+    return ", ".join(names[:FIRST_NAMES]) + more

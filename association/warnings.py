@@ -20,7 +20,7 @@ from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .units import UNIT_NAMES, unit_mistake
 from .verdict.verdict import Verdict
 
-SENTENCES: Mapping[Mistake, str] = {
+WARNING_MESSAGES: Mapping[Mistake, str] = {
     Mistake.MIRRORED: "The scan fits much better with left and right exchanged. The laser may be mounted upside down, "
     "or its angles may increase clockwise. Reverse the order of its ranges, or negate every y and exchange begin and "
     "end.",
@@ -82,7 +82,7 @@ def _listed(found: Mapping[WarningCode, str | None]) -> tuple[AssociationWarning
 
 def _mistaken(cause: Cause) -> str:
     if cause.mistake is not Mistake.UNIT_SCALE:
-        return SENTENCES[cause.mistake]
+        return WARNING_MESSAGES[cause.mistake]
     unit, taken = None if cause.of_map else UNIT_NAMES.get(cause.factor), unit_mistake(cause.factor)
     what = "the scan or the map is not to scale"
     if unit is not None:

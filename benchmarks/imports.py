@@ -18,7 +18,7 @@ import numpy as np
 from association import AssociationResult, MapIndex, associate
 from formats import ImportOptions, LineMap, read_map, write_map
 from linefix import scan_of
-from registration import RigidTransform, Segments
+from registration import IDENTITY, RigidTransform, Segments
 
 from .centre_lines import drawn_plans
 from .collection import LEVELS, Collection
@@ -141,7 +141,7 @@ def _found_in_log(answers: list[AssociationResult], scans: list[PosedScan]) -> l
     pairs = [(a.pose, s.pose) for a, s in zip(answers, scans, strict=True) if a.usable and a.pose is not None]
     logged_at = np.array([(p.x, p.y) for _, p in pairs])
     found_at = np.array([(p.x, p.y) for p, _ in pairs])
-    best, agreed = RigidTransform(0.0, 0.0, 0.0), -1
+    best, agreed = IDENTITY, -1
     for pose, truth in pairs:
         grid_from_log = pose.compose(truth.inverse())
         away = np.hypot(*(grid_from_log.apply(logged_at) - found_at).T)

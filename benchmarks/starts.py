@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import linefix
-from registration import InputError, RigidTransform, Segments, wrap_angle
+from registration import IDENTITY, InputError, RigidTransform, Segments, wrap_angle
 from ros2.agreement import Agreement, Event, Observation
 from ros2.locating import OPTIONS, Located
 from ros2.messages import Time
@@ -99,7 +99,7 @@ def with_odometry(
     scans: Sequence[Observation], truths: Sequence[RigidTransform], rng: np.random.Generator
 ) -> list[Observation]:
     """Return scans with odometry: the true steps, with errors that grow with them."""
-    at = RigidTransform(0.0, 0.0, 0.0)
+    at = IDENTITY
     out = []
     for k, one in enumerate(scans):
         if k:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from ros2 import Maps, NodeOptions
 
 MAX_FRAME = 255  # characters
-SHOWN_MAPS = 5  # of several maps, in the line of the start
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
 CHOSEN, FILE = "linefix.ros2.namespace", "linefix.ros2.file"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "help")
@@ -255,12 +254,12 @@ def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
 
 
 def _started(options: NodeOptions, maps: Maps | None) -> str:
+    from formats.report import first_of
+
     scans = ", ".join(options.topic(name) for name in options.scans)
     source = f"map from the topic {options.topic(options.map_topic or 'map')}"
     if maps is not None:
-        names = list(maps.frames)
-        more = f" and {len(names) - SHOWN_MAPS} more" if len(names) > SHOWN_MAPS else ""
-        source = f"{'maps' if maps.several else 'map'} {', '.join(names[:SHOWN_MAPS])}{more}"
+        source = f"{'maps' if maps.several else 'map'} {first_of(list(maps.frames))}"
     return (
         f"subscribed to {scans} in domain {options.domain}; {source}; base frame {options.base_frame}; "
         f"{options.topic('initialpose')} when {options.agree} scans agree"

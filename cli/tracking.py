@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from linefix import SoftPrior
+from map_quality.update.odometry import odometry_deviations
 from registration import RigidTransform
 
 from .locators import Found
 
-# Assumed accuracy of odometry, as standard deviations: at rest, for each metre driven, for each radian turned.
-METRES, METRES_A_METRE = 0.1, 0.1
-RADIANS, RADIANS_A_METRE, RADIANS_A_RADIAN = 0.05, 0.02, 0.1
 LOST = 5.0  # m; a prior wider than this is dropped
 
 
@@ -50,8 +48,7 @@ class Tracker:
         self._last = odometry
         if self._pose is None or self._odometry is None or odometry is None:
             return None
-        sigma = METRES + METRES_A_METRE * self._driven
-        angle = RADIANS + RADIANS_A_METRE * self._driven + RADIANS_A_RADIAN * self._turned
+        sigma, angle = odometry_deviations(self._driven, self._turned)
         if sigma > LOST:
             return None
         here = self._pose.compose(self._odometry.inverse().compose(odometry))

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import MeasuredSegments, RigidTransform, Segments
+from registration import IDENTITY, MeasuredSegments, RigidTransform, Segments
 from simulation import Scanner, SimulatedScan, World, scan
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
@@ -80,7 +80,7 @@ class Measurement:
     def moved(self, by: RigidTransform) -> MeasuredSegments:
         """Return the segments in a frame that sees them moved."""
         s = self.measured
-        if by == RigidTransform(0.0, 0.0, 0.0):
+        if by == IDENTITY:
             return s
         ends = by.apply(s.segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4)
         moments = by.apply(s.centroids), s.spreads

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RegistrationOptions, RegistrationResult, RigidTransform, register, wrap_angle
+from registration import IDENTITY, RegistrationOptions, RegistrationResult, RigidTransform, register, wrap_angle
 
 from .measuring import Measurement, Setup, take
 from .scenes import MAKERS, UNIT, bound, poses, world
@@ -169,7 +169,7 @@ def _moved_from_scan(origin: str, scan: Measurement, pose: RigidTransform) -> Ri
     if origin == "middle" and len(scan.measured):
         x, y = scan.measured.segments.midpoints.mean(axis=0)
         return RigidTransform(-float(x), -float(y), 0.0)
-    return RigidTransform(0.0, 0.0, 0.0)
+    return IDENTITY
 
 
 def _difference(found: RigidTransform, truth: RigidTransform) -> tuple[float, float, float]:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+import orjson
 
 from .errors import IncompleteFileError, MalformedFileError, TooLargeError
+from .limits import MAX_JSON_VALUES
 from .report import shown
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
@@ -60,3 +64,21 @@ def text_of(content: bytes, name: str) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MalformedFileError("expected text in UTF-8", argument=name) from error
+
+
+def load_json(content: bytes, name: str) -> Any:
+    """Parse JSON, with or without a byte-order mark.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is none; orjson goes 1,024 levels deep at most.
+    TooLargeError
+        When it has so many values that they take much more memory than the file.
+    """
+    if sum(content.count(sign) for sign in (b",", b"[", b"{")) > MAX_JSON_VALUES:
+        raise TooLargeError(f"expected at most {MAX_JSON_VALUES} values, lists and objects", argument=name)
+    try:
+        return orjson.loads(text_of(content, name))
+    except orjson.JSONDecodeError as error:
+        raise MalformedFileError("is not JSON", argument=name) from error

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from .limits import MAX_NAMED, MAX_TEXT
+
+FIRST_NAMES = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,12 @@ def shown(text: str) -> str:
     """Return text of a file so that it can stand in one line."""
     line = "".join(c if c.isprintable() else "?" for c in text[: MAX_TEXT + 1])
     return line if len(line) <= MAX_TEXT else line[:MAX_TEXT] + "..."
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first `FIRST_NAMES` names in one line, and how many more there are."""
+    more = f" and {len(names) - FIRST_NAMES} more" if len(names) > FIRST_NAMES else ""
+    return ", ".join(map(shown, names[:FIRST_NAMES])) + more
 
 
 def listed(names: Iterable[str]) -> str:

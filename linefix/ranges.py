@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from association import AssociationWarning, Scan, View, mirrored
-from registration import RigidTransform
+from registration import IDENTITY, RigidTransform
 from vectorization import LaserScan, VectorizationOptions, vectorize
 from vectorization.laser import LONGEST_SCAN, USUAL_SCAN
 
 # Standard deviations of the speed of a robot whose motion is not known, m/s and rad/s: default limits of Nav2's
 # controllers.
 SPEED, TURN = 0.5, 1.0
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @runtime_checkable
@@ -68,7 +67,7 @@ class RangeScan:
     flipped: bool = False
 
 
-def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: float | None = None) -> View:
+def view_of(seen: MountedScan, base_from_then: RigidTransform = IDENTITY, sigma: float | None = None) -> View:
     """Return the view of a mounted scanner, in the frame of the robot; of the sensor where its mount is not known.
 
     Parameters
@@ -108,12 +107,12 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     """
     scan, warning = ranges_scan(seen.laser, sigma), motion_warning(seen)
     scan = scan if warning is None else replace(scan, warnings=(warning,))
-    place = base_from_then.compose(seen.mount or HERE)
+    place = base_from_then.compose(seen.mount or IDENTITY)
     shown = mirrored(scan) if seen.flipped else scan
     return View(shown, place, motion=_motion_root(seen, base_from_then))
 
 
-def _motion_root(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
+def _motion_root(seen: MountedScan, base_from_then: RigidTransform = IDENTITY) -> NDArray[np.float64] | None:
     """Return the error of a scanner's place by its motion during the scan, per variate; None if the motion is known.
 
     On average the beams are taken half the duration after the first one. A robot moves by ``v`` and ``omega``
@@ -134,7 +133,7 @@ def _motion_root(seen: MountedScan, base_from_then: RigidTransform = HERE) -> ND
     seconds = _seconds_moving(seen)
     if not seconds:
         return None
-    place = base_from_then.compose(seen.mount or HERE)
+    place = base_from_then.compose(seen.mount or IDENTITY)
     x, y = place.x - base_from_then.x, place.y - base_from_then.y
     c, s = math.cos(base_from_then.theta), math.sin(base_from_then.theta)
     moved = 0.5 * seconds * np.array([[c, -s, -y], [s, c, x], [0.0, 0.0, 1.0]])

@@ -9,10 +9,11 @@ from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .solve import register
-from .transform import RigidTransform, wrap_angle
+from .transform import IDENTITY, RigidTransform, wrap_angle
 from .wall_error import register_estimating
 
 __all__ = [
+    "IDENTITY",
     "Ambiguity",
     "Beams",
     "Correspondences",

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from .correspondences import Correspondences
 from .kernels import of_arrays
-from .kernels.compensated import compensated_sum
 from .kernels.joint import joint_sums_compensated
-from .layout import Floats, Records
+from .layout import Floats
+from .sums import CompensatedSums
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointSums:
+class JointSums(CompensatedSums):
     """All that the joint estimator needs of a set of pairs; adding or removing takes constant time whatever its size.
 
     For a pair, with the map line's normal ``n`` and offset ``p`` and the scan segment's centroid ``m``, direction ``d``
@@ -24,20 +24,14 @@ class JointSums:
     ``x' Q x`` with ``x = [cos, sin, t_x, t_y, 1]``; the sums are the upper triangle of ``Q``, two sums of Wahba's angle
     (Eq. 15, weighted ``w s``), and the number of pairs.
 
-    Additions and removals are compensated (double-double): after any number of them the sums are those of what
-    remains. A solution is as good as ``Q`` in plain doubles, so keep the coordinates near the origin
+    A solution is as good as ``Q`` in plain doubles, so keep the coordinates near the origin
     (`Correspondences.about`).
 
     Attributes
     ----------
     compensated : (2,) JOINT_SUMS
-        Values and their errors, read-only.
+        Values and their errors, read-only; `values` (18,).
     """
-
-    compensated: Records
-
-    def __post_init__(self) -> None:
-        self.compensated.setflags(write=False)
 
     @classmethod
     def of_set(cls, pairs: Correspondences, weights: ArrayLike) -> JointSums:
@@ -56,25 +50,6 @@ class JointSums:
     def remove(self, pairs: Correspondences, index: int, weight: float) -> JointSums:
         """Return the sums with one pair less; `weight` is the one that it was added with."""
         return self - self.of_pair(pairs, index, weight)
-
-    def __add__(self, other: JointSums) -> JointSums:
-        return self._combined(other, 1.0)
-
-    def __sub__(self, other: JointSums) -> JointSums:
-        return self._combined(other, -1.0)
-
-    def _combined(self, other: JointSums, sign: float) -> JointSums:
-        return JointSums(compensated_sum(self.compensated, other.compensated, sign))
-
-    @property
-    def values(self) -> Floats:
-        """The sums in plain doubles, (18,) in the order of JOINT_SUMS."""
-        return self.compensated[:1].view(np.float64)
-
-    @property
-    def count(self) -> int:
-        """Number of pairs."""
-        return round(float(self.compensated["count"][0]))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
         """Minimise the cost.

@@ -10,16 +10,13 @@ from numpy.typing import ArrayLike
 from .correspondences import Correspondences
 from .kernels import of_arrays
 from .kernels import one_step as kernels
-from .kernels.compensated import compensated_sum
-from .layout import Floats, Records
 from .options import Rotation
-from .transform import RigidTransform, wrap_angle
-
-IDENTITY = RigidTransform(0.0, 0.0, 0.0)
+from .sums import CompensatedSums
+from .transform import IDENTITY, RigidTransform, wrap_angle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OneStepSums:
+class OneStepSums(CompensatedSums):
     """All that the paper's estimator needs of a set of pairs; adding or removing takes constant time.
 
     They are taken about one reference transform, which changes nothing but rounding and the point where angles wrap.
@@ -28,20 +25,16 @@ class OneStepSums:
     whole set they do not, and it can. If angles spread over less than a half turn the mean is the same; pairs far
     off the reference should not be in the set.
 
-    Additions and removals are compensated (double-double); moving the reference is done in plain doubles.
+    Moving the reference is done in plain doubles.
 
     Attributes
     ----------
     compensated : (2,) ONE_STEP_SUMS
-        Values and their errors, read-only.
+        Values and their errors, read-only; `values` (12,).
     reference : RigidTransform
     """
 
-    compensated: Records
     reference: RigidTransform = IDENTITY
-
-    def __post_init__(self) -> None:
-        self.compensated.setflags(write=False)
 
     @classmethod
     def of_set(cls, pairs: Correspondences, weights: ArrayLike, reference: RigidTransform = IDENTITY) -> OneStepSums:
@@ -65,15 +58,8 @@ class OneStepSums:
         """Return the sums with one pair less; `weight` is the one that it was added with."""
         return self - self.of_pair(pairs, index, weight, self.reference)
 
-    def __add__(self, other: OneStepSums) -> OneStepSums:
-        return self._combined(other, 1.0)
-
-    def __sub__(self, other: OneStepSums) -> OneStepSums:
-        return self._combined(other, -1.0)
-
     def _combined(self, other: OneStepSums, sign: float) -> OneStepSums:
-        total = compensated_sum(self.compensated, other.about(self.reference).compensated, sign)
-        return OneStepSums(total, self.reference)
+        return CompensatedSums._combined(self, other.about(self.reference), sign)
 
     def about(self, reference: RigidTransform) -> OneStepSums:
         """Return the sums about another reference, without wrapping any angle again."""
@@ -84,16 +70,6 @@ class OneStepSums:
         return OneStepSums(
             kernels.one_step_moved(self.compensated, reference.x - old.x, reference.y - old.y, turn), reference
         )
-
-    @property
-    def values(self) -> Floats:
-        """The sums in plain doubles, (12,) in the order of ONE_STEP_SUMS."""
-        return self.compensated[:1].view(np.float64)
-
-    @property
-    def count(self) -> int:
-        """Number of pairs."""
-        return round(float(self.compensated["count"][0]))
 
     @property
     def determinant(self) -> float:

@@ -87,3 +87,6 @@ class RigidTransform:
         moved[..., 0] = c * p[..., 0] - s * p[..., 1] + self.x
         moved[..., 1] = s * p[..., 0] + c * p[..., 1] + self.y
         return moved
+
+
+IDENTITY = RigidTransform(0.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RigidTransform, wrap_angle
+from registration import IDENTITY, RigidTransform, wrap_angle
 
 from .tuning import (
     AGREEING_CHI_SQUARE,
@@ -41,8 +41,6 @@ from .tuning import (
 )
 
 Floats = NDArray[np.float64]
-
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,10 +115,10 @@ class _Hypothesis:
 
     def support(self, scan: Observation) -> None:
         """Take a usable scan that agrees; scans of nearly the same place and time count once."""
-        whole = step_between(self.first, scan) or HERE
+        whole = step_between(self.first, scan) or IDENTITY
         self.moved = max(self.moved, math.hypot(whole.x, whole.y))
         self.turned = max(self.turned, abs(whole.theta))
-        since = step_between(self.counted, scan) or HERE
+        since = step_between(self.counted, scan) or IDENTITY
         if (
             math.hypot(since.x, since.y) >= SEPARATE_DISTANCE
             or abs(since.theta) >= SEPARATE_ANGLE
@@ -226,7 +224,7 @@ def step_between(begin: Observation, end: Observation) -> RigidTransform | None:
     Without odometry at both it is taken to rest. None where odometry is known at one of them only.
     """
     if begin.odometry is None and end.odometry is None:
-        return HERE
+        return IDENTITY
     if begin.odometry is None or end.odometry is None:
         return None
     return begin.odometry.inverse().compose(end.odometry)

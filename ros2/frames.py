@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from registration import RigidTransform
+from formats.logs.transforms import between
+from registration import IDENTITY
 
 from .messages import TFMessage, TransformStamped
-from .transforms import NS, Floats, FrameError, Mount, between, matrix_of_message, mount_of
+from .transforms import NS, Floats, FrameError, Mount, matrix_of_message, mount_of
 from .tuning import CLOCK_BACK_NS, MAX_FRAMES, MAX_TRANSFORMS, STALE_NS, TRANSFORMS_KEPT
 
 LONGEST_CHAIN = 64  # frames from a sensor to the root
@@ -130,7 +131,7 @@ class Frames:
         """
         base, laser = base.strip("/"), laser.strip("/")
         if laser == base:
-            return Mount(RigidTransform(0.0, 0.0, 0.0))
+            return Mount(IDENTITY)
         matrix = self.lookup(base, laser, stamp)
         return None if matrix is None else mount_of(matrix, base, laser)
 

@@ -13,14 +13,12 @@ from formats.logs.lasers import laser_of
 from formats.logs.sensors import time_increment_of
 from formats.report import Notes
 from linefix.ranges import motion_warning
-from registration import RigidTransform
+from registration import IDENTITY, RigidTransform
 
 from .messages import LaserScan, Time
 from .names import quoted
 from .odometry import OdometryHistory, Speed, nanoseconds
 from .transforms import FrameError, Mount
-
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +50,7 @@ class Look:
     time_increment: float
     mount: RigidTransform
     flipped: bool = False
-    base_from_then: RigidTransform = HERE
+    base_from_then: RigidTransform = IDENTITY
     notes: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -9,13 +9,13 @@ import weakref
 from collections.abc import Callable, Sequence
 
 import linefix
+from registration import IDENTITY
 
 from .connecting import connect
 from .frames import Frames
 from .gathering import Gathering, looks_of
 from .health import Health, State, current_time
 from .localization import Localization
-from .looking import HERE
 from .map_conversion import MapConverter
 from .maps import Maps
 from .messages import LaserScan, Odometry
@@ -212,7 +212,7 @@ class Node:
         child = self._options.frame(child)
         base = self._options.base_of(child)
         if child in ("", base):
-            return HERE
+            return IDENTITY
         matrix = self._frames.between(child, base)
         if matrix is None:
             raise FrameError(

@@ -7,7 +7,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from registration import RigidTransform
+from registration import IDENTITY, RigidTransform
 
 from .messages import Odometry, Time
 from .transforms import NS, matrix_of, planar
@@ -15,7 +15,6 @@ from .tuning import CLOCK_BACK_NS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ class OdometryHistory:
         self._poses: deque[RigidTransform] = deque(maxlen=KEPT)
         self._speeds: deque[Speed] = deque(maxlen=KEPT)
 
-    def take(self, message: Odometry, child_from_base: RigidTransform = HERE) -> None:
+    def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY) -> None:
         """Take a message; when the clock is set back, as when a bag is played again, all before is forgotten.
 
         Parameters
@@ -114,7 +113,7 @@ class OdometryHistory:
         Times are in nanoseconds.
         """
         if begin == end:
-            return HERE
+            return IDENTITY
         a, b = self.at(begin), self.at(end)
         return None if a is None or b is None else a.inverse().compose(b)
 

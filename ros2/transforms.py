@@ -1,4 +1,4 @@
-"""Transforms of space: checked, interpolated, and what they are in the plane."""
+"""Transforms of space: checked, and what they are in the plane."""
 
 from __future__ import annotations
 
@@ -149,11 +149,3 @@ def matrix_of_message(transform: TransformStamped) -> Floats:
         return matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w))
     except FrameError as error:
         raise FrameError(f"{named} is not used: {error}") from None
-
-
-def between(a: Floats, b: Floats, fraction: float) -> Floats:
-    """Interpolate two transforms that are near each other; the axes are made orthonormal again."""
-    mixed = (1.0 - fraction) * a + fraction * b
-    u, _, vt = np.linalg.svd(mixed[:3, :3])
-    mixed[:3, :3] = u @ vt
-    return mixed

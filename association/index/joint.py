@@ -182,7 +182,7 @@ def checked_parts(parts: Sequence[MapPart]) -> tuple[MapPart, ...]:
     if not 1 <= len(parts) <= MOST_MAPS:
         raise InvalidMapError(f"expected 1 to {MOST_MAPS} maps, found {len(parts)}", argument="maps")
     for number, part in enumerate(parts):
-        MapIndex.require(part.segments, part.sigma, argument=f"maps.{number}")
+        MapIndex.require(part.segments, part.sigma, f"maps.{number}.")
     return tuple(parts)
 
 

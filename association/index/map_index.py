@@ -112,30 +112,30 @@ class MapIndex:
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        low, high = cls.require(segments, sigma, argument="map")
+        low, high = cls.require(segments, sigma, "map.")
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
         return cls._of(either, sigma, origin, len(segments), deadline)
 
     @staticmethod
-    def require(segments: Segments, sigma: float | None, *, argument: str) -> tuple[Floats, Floats]:
+    def require(segments: Segments, sigma: float | None, path: str) -> tuple[Floats, Floats]:
         """Return the low and the high corner of a map, (2,) metres, that can be indexed.
 
         Raises
         ------
         InvalidMapError
-            As `build`; `argument` is the name of the map.
+            As `build`; names of arguments begin with `path`.
         """
         if len(segments) == 0:
-            raise InvalidMapError("expected at least one segment, found none", argument=f"{argument}.segments")
+            raise InvalidMapError("expected at least one segment, found none", argument=f"{path}segments")
         if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
-            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument=f"{argument}.sigma")
+            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument=f"{path}sigma")
         corners = segments.endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
         if (high - low).max() > MAX_EXTENT:
             raise InvalidMapError(
                 f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit",
-                argument=f"{argument}.segments",
+                argument=f"{path}segments",
             )
         return low, high
 

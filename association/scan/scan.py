@@ -53,6 +53,12 @@ class Views:
         return len(self.poses)
 
     @property
+    def viewpoint(self) -> tuple[float, float] | None:
+        """The position of the first view that is from one place; None where none is."""
+        known = self.viewpoints[~np.isnan(self.viewpoints[:, 0])]
+        return (float(known[0, 0]), float(known[0, 1])) if len(known) else None
+
+    @property
     def uncertain(self) -> bool:
         """Return whether any pose is not exact."""
         return bool(self.root.shape[1] > 0)

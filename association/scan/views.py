@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import Beams, MeasuredSegments, RigidTransform, Segments
+from registration import IDENTITY, Beams, MeasuredSegments, RigidTransform, Segments
 
 from ..errors import InvalidSearchError
 from .scan import Scan, Views
@@ -18,7 +18,6 @@ Floats = NDArray[np.float64]
 
 MAX_VIEWS = 64
 MOST_VARIANCE = 100.0  # m^2 and rad^2, rounding; a step that is worse known says nothing
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +43,7 @@ class View:
     """
 
     scan: Scan
-    pose: RigidTransform = HERE
+    pose: RigidTransform = IDENTITY
     covariance: Floats | None = None
     relative_to: int | None = None
     motion: Floats | None = None
@@ -69,28 +68,27 @@ def assemble(views: Sequence[View]) -> Scan:
                 f"expected variances of at most {MOST_VARIANCE:g}", argument=f"scan.views.{v}.covariance"
             )
     order = _outward(views)
-    if len(views) == 1 and not _uncertain(views[0]) and views[0].motion is None and views[0].pose == HERE:
+    if len(views) == 1 and not _uncertain(views[0]) and views[0].motion is None and views[0].pose == IDENTITY:
         return views[0].scan
     root = np.hstack([_root(views, order), _motion_root(views)])
-    places = [_viewpoint(view) for view in views]
     with_beams = all(view.scan.beams is not None for view in views)
     beams = _together([moved_beams(view) for view in views]) if with_beams else None
-    sighted = [place for place in places if place is not None]
     counts = [len(view.scan.measured) for view in views]
     own = [len(view.scan.beams.angles) if with_beams and view.scan.beams else 0 for view in views]
+    together = Views(
+        poses=tuple(view.pose for view in views),
+        viewpoints=np.array([_viewpoint(view) or (math.nan, math.nan) for view in views]),
+        of_segment=np.repeat(np.arange(len(views)), counts),
+        of_beam=np.repeat(np.arange(len(views)), own),
+        root=root,
+        found=np.zeros(root.shape[1]),
+        spread=np.eye(root.shape[1]),
+    )
     return Scan(
         measured=_joined([moved(view.scan.measured, view.pose) for view in views]),
-        viewpoint=sighted[0] if sighted else None,
+        viewpoint=together.viewpoint,
         beams=beams,
-        views=Views(
-            poses=tuple(view.pose for view in views),
-            viewpoints=np.array([place or (math.nan, math.nan) for place in places]),
-            of_segment=np.repeat(np.arange(len(views)), counts),
-            of_beam=np.repeat(np.arange(len(views)), own),
-            root=root,
-            found=np.zeros(root.shape[1]),
-            spread=np.eye(root.shape[1]),
-        ),
+        views=together,
         ordered=all(view.scan.ordered for view in views),
         warnings=tuple({one.code: one for view in reversed(views) for one in view.scan.warnings}.values()),
     )
@@ -112,10 +110,8 @@ def corrected(scan: Scan, found: Floats, spread: Floats) -> Scan:
         turns = np.array([by.theta for by in moves])
         origins = _points_moved(beams.origins, views.of_beam, moves)
         beams = replace(beams, angles=beams.angles + turns[views.of_beam], origins=origins)
-    sighted = places[~np.isnan(places[:, 0])]
-    viewpoint = (float(sighted[0, 0]), float(sighted[0, 1])) if len(sighted) else None
     views = replace(views, poses=poses, viewpoints=places, found=found, spread=spread)
-    return Scan(measured, viewpoint, beams, views, scan.ordered, scan.warnings)
+    return Scan(measured, views.viewpoint, beams, views, scan.ordered, scan.warnings)
 
 
 def moved(measured: MeasuredSegments, by: RigidTransform) -> MeasuredSegments:

@@ -37,7 +37,7 @@ class Doubts:
     alone: bool = False
 
 
-SENTENCES: Mapping[ReasonCode, str] = {
+REASON_MESSAGES: Mapping[ReasonCode, str] = {
     "prior_contradicted": "The pose that the scan supports contradicts the prior. Check the prior, or search without "
     "it.",
     "search_incomplete": "The search is incomplete: the deadline passed, or too many walls of the map lie in one "
@@ -92,7 +92,7 @@ def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None
     codes = [code for code in ORDER if code in settled]
     if doubts.status is Status.AMBIGUOUS and features is not None and cautious is not None:
         codes += [code for code in _weighed(features, cautious, alone=doubts.alone) if code not in settled]
-    sentences = dict(SENTENCES)
+    sentences = dict(REASON_MESSAGES)
     sentences |= {veto.reasons[-1]: veto.message for veto in doubts.vetoes if veto.message is not None}
     return tuple(Reason(code, sentences[code]) for code in codes)
 

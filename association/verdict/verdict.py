@@ -15,7 +15,7 @@ from ..result import Reason, Status
 from .displaced_walls import displaced_walls
 from .features import Description, describe_answer
 from .probabilities import Probabilities, work_out_probabilities
-from .reasons import SENTENCES, Doubts, reasons_of
+from .reasons import REASON_MESSAGES, Doubts, reasons_of
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
 from .turning import turn_during_scan
 from .unobservable import beyond_tolerance, choose_along_direction
@@ -79,7 +79,7 @@ class Verdict:
         """Return the same, not usable, where something was left undone."""
         if not self.complete:
             return self
-        reasons = (*(Reason(code, SENTENCES[code]) for code in INCOMPLETE.reasons), *self.reasons)
+        reasons = (*(Reason(code, REASON_MESSAGES[code]) for code in INCOMPLETE.reasons), *self.reasons)
         vetoes = tuple(veto for veto in VETOES if veto in (*self.vetoes, INCOMPLETE))
         return replace(self, usable=False, vetoes=vetoes, reasons=reasons)
 

@@ -11,7 +11,7 @@ import numpy as np
 from association import mirrored
 from linefix import scan_of
 from map_quality import VisitScan
-from registration import RigidTransform, Segments
+from registration import IDENTITY, RigidTransform, Segments
 from simulation import FAMILIES, Building, Scanner, SimulationError, free_place, scan
 from simulation.changes import clutter, rearranged, with_doors
 from vectorization import LaserScan
@@ -96,10 +96,10 @@ def routed(scene: Scene) -> Scene:
 def with_odometry(taken: Sequence[tuple[VisitScan, RigidTransform]], rng: np.random.Generator) -> list[VisitScan]:
     """Return scans with odometry, which starts at zero in each visit, and whose error grows with the distance."""
     out: list[VisitScan] = []
-    last, here = taken[0][1], RigidTransform(0.0, 0.0, 0.0)
+    last, here = taken[0][1], IDENTITY
     for number, (one, at) in enumerate(taken):
         if number and one.visit != taken[number - 1][0].visit:
-            last, here = at, RigidTransform(0.0, 0.0, 0.0)
+            last, here = at, IDENTITY
         step = last.inverse().compose(at)
         way, (slip, bend, turn) = math.hypot(step.x, step.y), ODOMETRY_ERROR
         x, y = rng.normal(0.0, slip * way, 2)

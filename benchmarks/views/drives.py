@@ -10,7 +10,7 @@ import numpy as np
 
 from association import Scan, View, assemble
 from linefix.ranges import ranges_scan
-from registration import RigidTransform, Segments
+from registration import IDENTITY, RigidTransform, Segments
 from simulation import CONDITIONS, Case, Scanner, scan
 from simulation.conditions import Stranger
 from simulation.places import is_free
@@ -27,7 +27,6 @@ DRIFT_ANGLE = math.radians(1.0)  # rad; standard deviations after a metre, of a 
 MOST_STEPS = 8  # views before the last one
 LEAST_STEP = 0.5  # m
 LONGEST_STEP = 3.0  # m; where a log jumps farther there is no drive
-HERE = RigidTransform(0.0, 0.0, 0.0)
 TOUCHING = 1e-6  # m; a beam that reads the same in two scenes meets the same wall
 
 
@@ -60,7 +59,7 @@ def could_be_told(looks: Sequence[Look], scanner: Scanner, shown: Segments, pose
 
 def drive(looks: Sequence[Look], rng: np.random.Generator) -> Scan:
     """Put looks together, the latest first, by steps on which drift is put; the scan's frame is that of the latest."""
-    views, at = [View(looks[0].scan)], HERE
+    views, at = [View(looks[0].scan)], IDENTITY
     for k in range(1, len(looks)):
         step = looks[k - 1].pose.inverse().compose(looks[k].pose)
         far = max(0.01, math.hypot(step.x, step.y))

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import MalformedFileError, TooLargeError
-from ..files import name_of, read_bounded, text_of
+from ..files import load_json, name_of, read_bounded, text_of
 from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES
 from ..options import ImportOptions
 from ..report import Notes, shown
 from .drawing import Drawing
-from .geojson import load_json
 
 COLUMNS = ("x1", "y1", "x2", "y2")
 OWN_FIELDS = {"segments", "sigma", "oriented", "frame_id", "meta"}

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import orjson
-
 from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
-from ..files import name_of, read_bounded, text_of
-from ..limits import MAX_ENTITIES, MAX_JSON_VALUES, MAX_MAP_BYTES, MAX_UNITS
+from ..files import load_json, name_of, read_bounded
+from ..limits import MAX_ENTITIES, MAX_MAP_BYTES, MAX_UNITS
 from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
@@ -58,24 +56,6 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
             raise MalformedFileError("expected every feature to be an object", argument=name)
         _read_feature(feature, drawing)
     return drawing
-
-
-def load_json(content: bytes, name: str) -> Any:
-    """Parse JSON, with or without a byte-order mark.
-
-    Raises
-    ------
-    MalformedFileError
-        When it is none; orjson goes 1,024 levels deep at most.
-    TooLargeError
-        When it has so many values that they take much more memory than the file.
-    """
-    if sum(content.count(sign) for sign in (b",", b"[", b"{")) > MAX_JSON_VALUES:
-        raise TooLargeError(f"expected at most {MAX_JSON_VALUES} values, lists and objects", argument=name)
-    try:
-        return orjson.loads(text_of(content, name))
-    except orjson.JSONDecodeError as error:
-        raise MalformedFileError("is not JSON", argument=name) from error
 
 
 def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path, PureWindowsPath
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, UnsupportedFormatError
 from ..files import name_of, read_bounded, text_of
 from ..limits import MAX_METADATA_BYTES, MAX_RECORDED_FILES
-from ..report import Notes, shown
+from ..report import Notes, first_of
 from ..yaml import yaml_of
 
 FOLDER_SUFFIXES = (".mcap", ".db3")  # of files in the folder of a bag of ROS 2
@@ -55,10 +55,10 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     missing = [file.name for file in listed if _unpacked(file) not in found]
     if not found:
         _refuse_packed(path)
-        raise MalformedFileError(f"is missing the files that {METADATA} lists: {_named(missing)}", argument=name)
+        raise MalformedFileError(f"is missing the files that {METADATA} lists: {first_of(missing)}", argument=name)
     if missing:
         notes.add_dropped(
-            "missing_files", f"files that {METADATA} lists and that are missing: {_named(missing)}", len(missing)
+            "missing_files", f"files that {METADATA} lists and that are missing: {first_of(missing)}", len(missing)
         )
     return found
 
@@ -89,7 +89,7 @@ def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     stems = sorted({_NUMBER.sub("", file.stem) for file in found})
     if len(stems) > 1 or len({file.suffix.lower() for file in found}) > 1:
         raise IncompleteFileError(
-            f"has no {METADATA}, and files of several recordings: {_named([f.name for f in found])}; choose one of "
+            f"has no {METADATA}, and files of several recordings: {first_of([f.name for f in found])}; choose one of "
             "them",
             argument=name_of(folder),
         )
@@ -125,12 +125,13 @@ def _refuse_packed(folder: Path) -> None:
     packed, active = _packed(folder), _active(folder)
     if packed:
         raise UnsupportedFormatError(
-            f"is compressed file by file ({_named([file.name for file in packed])}); decompress it first with zstd -d",
+            f"is compressed file by file ({first_of([file.name for file in packed])}); decompress it first with "
+            "zstd -d",
             argument=name_of(folder),
         )
     if active:
         raise UnsupportedFormatError(
-            f"is not a bag of ROS 2, and has {_named([file.name for file in active])}; choose one file",
+            f"is not a bag of ROS 2, and has {first_of([file.name for file in active])}; choose one file",
             argument=name_of(folder),
         )
 
@@ -145,8 +146,3 @@ def _hint(path: Path) -> str | None:
     if lower.endswith(".bag.active"):
         return "was not closed by the recorder; rosbag reindex makes a .bag of it"
     return None
-
-
-def _named(names: list[str], most: int = 5) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(shown(name) for name in names[:most]) + more

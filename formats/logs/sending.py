@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from registration import RigidTransform
+from registration import IDENTITY
 from vectorization import LaserScan
 
 from .scan import LoggedScan
 
 FARTHEST = 1e4  # m; where a log names no greatest range
-HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 def scan_json(one: LoggedScan) -> dict[str, Any]:
     """Return the `scan` of a request: one view, with the mount, and the motion where it is known."""
-    laser, mount = one.laser, one.mount or HERE
+    laser, mount = one.laser, one.mount or IDENTITY
     most = laser.range_max if math.isfinite(laser.range_max) else FARTHEST
     view: dict[str, Any] = {
         "laser": {

@@ -129,7 +129,7 @@ class Track:
             end = min(after, len(stamps) - 1)
             return self._matrices[end] if abs(stamps[end] - stamp) <= STALE_NS else None
         fraction = (stamp - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
-        return _between(self._matrices[after - 1], self._matrices[after], fraction)
+        return between(self._matrices[after - 1], self._matrices[after], fraction)
 
     @property
     def stamps(self) -> Sequence[int]:
@@ -161,8 +161,8 @@ class Track:
         return within if 2 * (within[1] - within[0]) >= end - begin else (a, b)
 
 
-def _between(a: Floats, b: Floats, fraction: float) -> Floats:
-    """Return a transform between two near ones: places and axes in proportion, the axes made perpendicular again."""
+def between(a: Floats, b: Floats, fraction: float) -> Floats:
+    """Interpolate two transforms that are near each other, (4, 4) each; the axes are made orthonormal again."""
     mixed = (1.0 - fraction) * a + fraction * b
     u, _, vt = np.linalg.svd(mixed[:3, :3])
     mixed[:3, :3] = u @ vt

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Scan, View, assemble
-from registration import RigidTransform, Segments, wrap_angle
+from registration import IDENTITY, RigidTransform, Segments, wrap_angle
 from simulation import Scanner, scan
 
 STEP = 1.0  # m from view to view
@@ -101,7 +101,7 @@ def seen_on_the_way(views: Sequence[tuple[RigidTransform, Scan]], rng: np.random
     """
     covariance = np.diag(np.square(ODOMETRY))
     last = len(views) - 1
-    pose = RigidTransform(0.0, 0.0, 0.0)
+    pose = IDENTITY
     steps = rng.normal(0.0, ODOMETRY, (last, 3))
     out = [View(views[last][1])]
     for k in reversed(range(last)):

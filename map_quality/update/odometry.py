@@ -25,6 +25,12 @@ from .tuning import (
 )
 
 
+def odometry_deviations(driven: float, turned: float) -> tuple[float, float]:
+    """Return the standard deviations of position (m) and heading (rad) by odometry, after a way (m) and turns (rad)."""
+    heading = ODOMETRY_TURN + ODOMETRY_TURN_A_METRE * driven + ODOMETRY_TURN_A_RADIAN * turned
+    return ODOMETRY + ODOMETRY_A_METRE * driven, heading
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Carrying:
     """Localizes scans that are not usable alone by the odometry of their visit.
@@ -140,9 +146,7 @@ class Carrying:
         assert end is not None
         assert known.result.covariance is not None
         step = begin.inverse().compose(end)
-        distance = math.hypot(step.x, step.y)
-        place = ODOMETRY + ODOMETRY_A_METRE * distance
-        turn = ODOMETRY_TURN + ODOMETRY_TURN_A_METRE * distance + ODOMETRY_TURN_A_RADIAN * abs(step.theta)
+        place, turn = odometry_deviations(math.hypot(step.x, step.y), abs(step.theta))
         moved = known.pose.carry(known.result.covariance, step)
         return known.pose.compose(step), moved + np.diag([place**2, place**2, turn**2])
 

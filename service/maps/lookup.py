@@ -7,9 +7,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-
-from association import Deadline, IndexingEndedError, InvalidMapError, MapIndex, MapPart, MapSet
+from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapSet
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
@@ -23,7 +21,6 @@ from .records import MapOutline, MapRecord
 from .several import CachedMaps, FoundMaps
 from .store import MapStore
 
-MAX_EXTENT = 1e5  # m
 OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
 LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
 LONG_BYTES = 100_000  # of the document of one
@@ -251,13 +248,7 @@ def outline_of(document: MapDocument) -> MapOutline:
         When it could not be searched.
     """
     segments = Segments.from_array(document.segments, argument="segments")
-    if len(segments) == 0:
-        raise InvalidMapError("expected at least one segment, found none", argument="segments")
-    corners = segments.endpoints.reshape(-1, 2)
-    if np.ptp(corners, axis=0).max() > MAX_EXTENT:
-        raise InvalidMapError(
-            f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="segments"
-        )
     # No negative zeros: not every database keeps them.
-    low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
-    return MapOutline(len(segments), (low[0], low[1], high[0], high[1]), document.sigma, document.oriented)
+    corners = MapIndex.require(segments, document.sigma, "")
+    (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in corners)
+    return MapOutline(len(segments), (left, bottom, right, top), document.sigma, document.oriented)

@@ -12,7 +12,6 @@ from linefix.map_answers import analysis_json
 from map_quality import Analysis, PlaceVerdict, Robot
 from registration import Segments
 
-from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
 from ..schemas.analysis import AnalyzeRequest
@@ -86,10 +85,7 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
     """
     cached = lookup.indexed(on, oriented=None, deadline=job.deadline)
     analysis = analysis_of(cached, asked)
-    job.watch.lap("decode")
-    if job.deadline.passed and not job.deadline.cancelled:
-        raise DeadlinePassedError
-    job.searching.set()
+    job.begin_search()
     return Tally(analysis, reference_to(on), iter(analysis.standing.order.tolist()))
 
 

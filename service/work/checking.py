@@ -10,7 +10,6 @@ from linefix.checking import CheckedMap, concluded, try_in_time
 from linefix.map_answers import checked_json
 from map_quality import MapCheck, Sample, check_map
 
-from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
 from ..schemas.parts import InlineMap, is_oriented
@@ -61,10 +60,7 @@ def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | Non
     """
     cached = lookup.indexed(on, oriented=True, deadline=job.deadline)
     scans = [] if asked is None else scans_of(asked)
-    job.watch.lap("decode")
-    if job.deadline.passed and not job.deadline.cancelled:
-        raise DeadlinePassedError
-    job.searching.set()
+    job.begin_search()
     oriented = is_oriented(None, on.record.oriented if isinstance(on, FoundMap) else on.oriented)
     # Of its own: an index without directions, which a check may add to it, goes with the check, for the cache does not
     # count it.

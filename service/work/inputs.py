@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from association import PARTS, AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
 from linefix.answers import Included
 from registration import (
+    IDENTITY,
     InputError,
     InvalidArgumentError,
     MeasuredSegments,
@@ -37,7 +38,6 @@ from ..schemas.strict import Pose
 from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
 from .scans import Scanned, range_scan, scan_points, view_laser, viewpoint_of
 
-HERE = RigidTransform(0.0, 0.0, 0.0)
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
 
@@ -65,7 +65,7 @@ def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: 
     viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
         seen = range_scan(scan.laser, scan.twist, "/scan", timed=timed)
-        return _vectorized(assemble([view_laser(seen, HERE, scan.sigma, viewpoint)]))
+        return _vectorized(assemble([view_laser(seen, IDENTITY, scan.sigma, viewpoint)]))
     if isinstance(scan, PointScan):
         return _vectorized(scan_points(scan.points, scan.sigma, viewpoint))
     return Scanned(Scan(measured_of(scan), viewpoint), None)
@@ -105,7 +105,7 @@ def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
     seen = replace(range_scan(view.laser, view.twist, place, timed=timed), flipped=view.flipped)
     if view.relative_to is None and view.covariance is None and math.hypot(at.x, at.y) <= LONGEST_LEVER:
         # It turns with the robot, whose frame is that of the scan.
-        return view_laser(replace(seen, mount=at), HERE, view.sigma, viewpoint_of(view.viewpoint), place)
+        return view_laser(replace(seen, mount=at), IDENTITY, view.sigma, viewpoint_of(view.viewpoint), place)
     found = view_laser(seen, at, view.sigma, viewpoint_of(view.viewpoint), place)
     own = None if found.motion is None else found.motion @ found.motion.T
     parts = [one for one in (view.covariance, own) if one is not None]

@@ -9,6 +9,7 @@ from typing import Any
 
 from association import Deadline
 
+from ..admission.errors import DeadlinePassedError
 from ..schemas.encoding import encode
 
 
@@ -70,6 +71,19 @@ class Job:
     watch: Stopwatch
     deadline: Deadline
     searching: Event = field(default_factory=Event)
+
+    def begin_search(self) -> None:
+        """Note that the request is decoded, and that what follows looks at the deadline.
+
+        Raises
+        ------
+        DeadlinePassedError
+            When the deadline has passed before.
+        """
+        self.watch.lap("decode")
+        if self.deadline.passed and not self.deadline.cancelled:
+            raise DeadlinePassedError
+        self.searching.set()
 
     def done(self, answer: dict[str, Any], **noted: object) -> Done:
         """Return an answer as JSON, with the request's id and its times.

@@ -15,7 +15,6 @@ from linefix.map_answers import update_json
 from map_quality import NOT_SHARPENED, MapUpdate, Replacement, Sharpened, VisitScan, apply_changes, updating
 from registration import InputError, Segments
 
-from ..admission.errors import DeadlinePassedError
 from ..maps.lookup import FoundMap, MapLookup, outline_of
 from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
@@ -65,10 +64,7 @@ def begin_update(lookup: MapLookup, on: FoundMap, asked: UpdateRequest, job: Job
     scans = [
         _scan_of(asked, number, place) for number, one in enumerate(asked.visits) for place in range(len(one.scans))
     ]
-    job.watch.lap("decode")
-    if job.deadline.passed and not job.deadline.cancelled:
-        raise DeadlinePassedError
-    job.searching.set()
+    job.begin_search()
     steps = updating(cached.index, scans, job.deadline, accept=asked.accept, refuse=asked.refuse)
     document: dict[str, Any] = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
     return Progress(steps, document, reference_to(on))

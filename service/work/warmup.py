@@ -32,6 +32,7 @@ from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from map_quality.analyze.standing import is_free
 from registration import (
+    IDENTITY,
     Beams,
     Correspondences,
     MeasuredSegments,
@@ -113,7 +114,7 @@ def warm_up_analyzing() -> None:
 
 def warm_up_simulating() -> None:
     """Take a scan of a map, from where a robot can stand."""
-    room, pose, robot = Segments.from_array(ROOM), RigidTransform(0.0, 0.0, 0.0), Robot(beams=360)
+    room, pose, robot = Segments.from_array(ROOM), IDENTITY, Robot(beams=360)
     assert is_free(room, pose, robot.range_max, oriented=True)
     scan(room, pose, robot.scanner, np.random.default_rng(0))
 
@@ -126,7 +127,7 @@ def warm_up_registering() -> None:
         RegistrationOptions(),
         RegistrationOptions(weighting="uniform"),
         RegistrationOptions(estimator="one_step", rotation="mitsuta", oriented=False),
-        RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
+        RegistrationOptions(estimator="one_step", evaluate_at=IDENTITY),
     ):
         register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
     # No request needs it, but kernels count as compiled once something of each module is cached.

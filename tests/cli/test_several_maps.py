@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import Writer
 
+from cli.inputs import FILES
+from formats import MAP_SUFFIXES
 from service.schemas import examples
 from tests.formats.recorded import GRID, TYPES, grid_bytes
 from tests.map_quality.check.drawn import faces
@@ -115,3 +117,8 @@ def test_a_log_is_replayed_on_several_maps(linefix: Linefix, files: Path, mode: 
     assert int(row.split()[-1]) == len(usable)
     assert (files.parent / "way-floor.png").exists()
     assert not (files.parent / "way-hall.png").exists()
+
+
+def test_every_suffix_of_a_map_file_is_never_meant_as_an_id() -> None:
+    """The command line has a list of its own: the readers of `formats` need its extra."""
+    assert sorted(FILES) == sorted(MAP_SUFFIXES)

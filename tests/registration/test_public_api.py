@@ -24,7 +24,7 @@ def test_exported_members_are_documented(name: str) -> None:
 
 
 def test_exports_are_sorted_and_complete() -> None:
-    assert registration.__all__ == sorted(registration.__all__)
+    assert registration.__all__ == sorted(registration.__all__, key=lambda name: (not name.isupper(), name))
     public = {
         name for name, member in vars(registration).items() if not name.startswith("_") and not inspect.ismodule(member)
     }

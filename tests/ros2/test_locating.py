@@ -9,10 +9,11 @@ import pytest
 from linefix_client import Pose, base_from_laser
 
 import linefix
+from registration import IDENTITY
 from ros2 import messages
 from ros2.frames import Frames
 from ros2.locating import Located, locate
-from ros2.looking import HERE, look_of
+from ros2.looking import look_of
 from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
 from ros2.transforms import Mount
@@ -40,7 +41,7 @@ def message(ranges: list[float], first: float, step: float, *, range_max: float)
 
 
 def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> Located:
-    return locate(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), HERE, motion=True)])
+    return locate(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)])
 
 
 @pytest.mark.parametrize("flipped", [False, True])
@@ -54,7 +55,7 @@ def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
 
 def test_its_covariance_is_that_of_the_client() -> None:
     located = located_in(WALLS, seen(), Mount(MOUNT))
-    alone = located_in(WALLS, seen(), Mount(HERE))  # of the laser
+    alone = located_in(WALLS, seen(), Mount(IDENTITY))  # of the laser
     pose, covariance = alone.pose, alone.covariance
     assert pose is not None
     assert covariance is not None

@@ -11,7 +11,7 @@ from association import AssociationResult, Deadline, HardPrior, Status, associat
 from association.verdict import reasons
 from association.verdict.features import Features
 from association.verdict.models import USUAL, as_model
-from association.verdict.reasons import FEATURES_OF, SENTENCES, Doubts, reasons_of
+from association.verdict.reasons import FEATURES_OF, REASON_MESSAGES, Doubts, reasons_of
 from association.verdict.tuning import NO_ALTERNATIVE, TELLING_REASON
 from association.verdict.vetoes import Findings, applied, counted
 
@@ -53,7 +53,7 @@ def codes_of(
     standing = Doubts(status, vetoes, not_on_map=strange, similar_place=twin)
     features = USUAL_ONE._replace(**{ONE_OF[code]: nats for code, nats in taken.items()})
     told = reasons_of(standing, features, MODEL)
-    assert all(reason.message == SENTENCES[reason.code] for reason in told)
+    assert all(reason.message == REASON_MESSAGES[reason.code] for reason in told)
     return [reason.code for reason in told]
 
 
@@ -207,6 +207,6 @@ def test_a_prior_that_the_scan_contradicts_is_told() -> None:
 
 
 def test_every_reason_has_a_sentence_of_its_own() -> None:
-    assert set(FEATURES_OF) <= set(SENTENCES)
-    assert len(set(SENTENCES.values())) == len(SENTENCES)
-    assert all(sentence.endswith((".", "?")) for sentence in SENTENCES.values())
+    assert set(FEATURES_OF) <= set(REASON_MESSAGES)
+    assert len(set(REASON_MESSAGES.values())) == len(REASON_MESSAGES)
+    assert all(sentence.endswith((".", "?")) for sentence in REASON_MESSAGES.values())

@@ -10,7 +10,7 @@ import pytest
 
 from association import Status
 from association.consensus.tuning import CONTRADICTION
-from association.verdict.reasons import ORDER, SENTENCES
+from association.verdict.reasons import ORDER, REASON_MESSAGES
 from association.verdict.tuning import FAR_FROM_PRIOR, LEAST_IN_STEP, MIRRORED_BETTER, MOST_BEYOND, MOST_DISPLACED
 from association.verdict.verdict import judge
 from association.verdict.vetoes import VETOES, Findings, Origin, applied, contradict_prior, counted
@@ -104,7 +104,7 @@ def test_with_another_status_the_status_is_the_reason() -> None:
 def test_a_veto_gives_reasons_that_have_messages() -> None:
     for veto in VETOES:
         assert veto.reasons
-        assert set(veto.reasons) <= set(SENTENCES) & set(ORDER)
+        assert set(veto.reasons) <= set(REASON_MESSAGES) & set(ORDER)
     assert {veto.name for veto in VETOES if contradict_prior((veto,))} == {
         "better_elsewhere",
         "far_from_prior",

@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from association import Status, WarningCode
-from association.verdict.reasons import SENTENCES
+from association.verdict.reasons import REASON_MESSAGES
 from map_quality import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
@@ -179,11 +179,11 @@ def test_every_option_has_a_description(document: dict[str, Any]) -> None:
 
 def test_codes_and_statuses_are_enumerations(document: dict[str, Any]) -> None:
     schemas = document["components"]["schemas"]
-    known = {"ReasonAnswer": SENTENCES, "Problem": KINDS, "WarningAnswer": get_args(WarningCode)}
+    known = {"ReasonAnswer": REASON_MESSAGES, "Problem": KINDS, "WarningAnswer": get_args(WarningCode)}
     known |= {"FindingAnswer": get_args(FindingCode)}
     for name, codes in known.items():
         assert set(schemas[name]["properties"]["code"]["enum"]) == set(codes), name
-    assert set(schemas["AnalyzedPlaceAnswer"]["properties"]["reasons"]["items"]["enum"]) == set(SENTENCES)
+    assert set(schemas["AnalyzedPlaceAnswer"]["properties"]["reasons"]["items"]["enum"]) == set(REASON_MESSAGES)
     for name in ("FoundAnswer", "AssociateAnswer", "AnalyzedPlaceAnswer", "WithLandmarkAnswer"):
         assert set(schemas[name]["properties"]["status"]["enum"]) == set(Status), name
 
