@@ -28,8 +28,7 @@ from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server, grouped
 from .printing import plain, print_json, print_rows, print_table
 from .several import documents_of, read_target
-from .stays import Stays
-from .tracking import Tracker
+from .tracking import Stays, Tracker
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, StampedPose

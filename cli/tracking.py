@@ -1,9 +1,9 @@
-"""The prior of the next scan: the last usable pose and the odometry since."""
+"""A robot along a log: the prior of the next scan by odometry, and the maps that it was on."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -61,3 +61,30 @@ class Tracker:
         elif found.usable:
             self._pose, self._odometry, self.map_id = found.pose, odometry, found.map_id
             self._driven = self._turned = 0.0
+
+
+@dataclass(slots=True)
+class Stay:
+    """A part of a log with usable poses on one map; `first` and `last` are stamps of scans, seconds."""
+
+    map_id: str
+    first: float
+    last: float
+    scans: int = 1
+
+
+@dataclass(slots=True)
+class Stays:
+    """The stays so far, in the order of the log; none where a single map is searched."""
+
+    found: list[Stay] = field(default_factory=list)
+
+    def take(self, stamp_ns: int, found: Found) -> None:
+        """Add an answer; one that is not usable begins no stay and ends none."""
+        if not found.usable or found.map_id is None:
+            return
+        stamp, last = 1e-9 * stamp_ns, self.found[-1] if self.found else None
+        if last is None or last.map_id != found.map_id:
+            self.found.append(Stay(found.map_id, stamp, stamp))
+        else:
+            last.last, last.scans = stamp, last.scans + 1

@@ -11,8 +11,7 @@ from .errors import (
     UprightFrameError,
 )
 from .line_map import GridPicture, ImportedMap, LineMap
-from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions
-from .logs.sending import scan_json
+from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions, scan_json
 from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .chi_square import chi_square_quantile
 from .kernels.observability import FIXED, FREE, PARALLEL
 from .layout import Floats, Records
+from .observability import chi_square_quantile
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .transform import RigidTransform

@@ -1,4 +1,4 @@
-"""The limit up to which lines count as parallel, by noise alone."""
+"""Quantiles of chi-square, and the limit up to which lines count as parallel, by noise alone."""
 
 from __future__ import annotations
 
@@ -6,11 +6,17 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from scipy.special import chdtri
 
-from .chi_square import chi_square_quantile
 from .layout import Floats
 
 THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
+
+
+@lru_cache(maxsize=4096)
+def chi_square_quantile(dof: int, tail: float) -> float:
+    """Return what chi-square of `dof` degrees of freedom exceeds with the probability `tail`."""
+    return float(chdtri(dof, tail))
 
 
 def most_parallel(count: int) -> float:

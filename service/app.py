@@ -52,7 +52,7 @@ from .part import WHOLE, Part
 from .settings import Settings
 from .telemetry.metrics import Metrics, RefusalTally
 from .telemetry.traces import traces_of_environment
-from .threads import Threads
+from .thread_pool import Threads
 from .version import VERSION
 from .work.association import Associator
 from .work.compiling import compile_kernels

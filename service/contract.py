@@ -15,7 +15,7 @@ from .schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, V
 from .work.inputs import association_options_of, fault_of, included_of, prior_of, scanned_of, scans_of
 from .work.job import Stopwatch
 from .work.registration import KnownPairs
-from .work.vectorization import vectorization_of
+from .work.scans import vectorization_of
 
 __all__ = [
     "AssociateRequest",

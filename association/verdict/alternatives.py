@@ -29,7 +29,7 @@ from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
-from .absences import absences
+from .inconsistencies import absences
 from .kernels import alternatives as kernels
 from .tuning import (
     ABSENCE,

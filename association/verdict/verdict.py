@@ -12,12 +12,11 @@ from ..consensus.ranking import with_lines_of_sight
 from ..context import SearchContext
 from ..explanations import Answer, Explanations
 from ..result import Reason, Status
-from .displaced_walls import displaced_walls
 from .features import Description, describe_answer
+from .inconsistencies import displaced_walls, turn_during_scan
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import REASON_MESSAGES, Doubts, reasons_of
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
-from .turning import turn_during_scan
 from .unobservable import beyond_tolerance, choose_along_direction
 from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 

@@ -1,11 +1,13 @@
-"""A scan as a log has it, and what one may say of a log."""
+"""A scan as a log has it and as requests have it, and what one may say of a log."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
-from registration import RigidTransform
+from registration import IDENTITY, RigidTransform
 from vectorization import LaserScan
 
 from ..errors import MalformedFileError
@@ -13,6 +15,8 @@ from ..report import ImportReport, Notes
 
 UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan", "upright_frame")
 """Codes of the notes that count scans which cannot be used."""
+
+FARTHEST = 1e4  # m; where a log names no greatest range
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +128,28 @@ def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
     count = sum(notes.dropped[code].count for code in UNUSABLE if code in notes.dropped)
     why = f"; the first of them: {reason}" if reason else ", because none can be decoded"
     return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)
+
+
+def scan_json(one: LoggedScan) -> dict[str, Any]:
+    """Return the `scan` of a request: one view, with the mount, and the motion where it is known."""
+    laser, mount = one.laser, one.mount or IDENTITY
+    most = laser.range_max if math.isfinite(laser.range_max) else FARTHEST
+    view: dict[str, Any] = {
+        "laser": {
+            "angle_min": laser.angle_min,
+            "angle_increment": laser.angle_increment,
+            "ranges": _ranges(laser, most),
+            "range_max": most,
+            "time_increment": one.time_increment,
+        },
+        "pose": {"x": mount.x, "y": mount.y, "theta": mount.theta},
+        "flipped": one.flipped,
+    }
+    if laser.motion is not None:
+        view["twist"] = {"vx": laser.motion.vx, "vy": laser.motion.vy, "omega": laser.motion.omega}
+    return {"views": [view], "stamp": one.stamp}
+
+
+def _ranges(laser: LaserScan, most: float) -> list[float | None]:
+    """Return ranges as JSON has them: null where nothing is known, and beyond the greatest where nothing came back."""
+    return [None if math.isnan(r) else 2.0 * most if math.isinf(r) else r for r in laser.cleaned.tolist()]

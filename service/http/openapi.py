@@ -13,7 +13,7 @@ from pydantic.json_schema import models_json_schema
 from ..admission.grants import GUARDED
 from ..schemas import analysis, parts, replies, requests, updates
 from ..schemas.encoding import encode
-from ..threads import Threads
+from ..thread_pool import Threads
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`

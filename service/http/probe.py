@@ -7,7 +7,7 @@ import asyncio
 from ..admission.errors import NotReadyError
 from ..maps import MapStore
 from ..maps.errors import BusyStoreError, ReadOnlyStoreError, StoreAwayError, StoreError
-from ..threads import Threads
+from ..thread_pool import Threads
 
 ANSWERS_WITHIN = 2.0  # s
 

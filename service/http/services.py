@@ -18,7 +18,7 @@ from ..parsing.parser_process import ParserProcess
 from ..settings import Settings
 from ..telemetry.metrics import Metrics, RefusalTally
 from ..telemetry.traces import Traces
-from ..threads import Threads
+from ..thread_pool import Threads
 from ..work.association import Associator
 from .bodies import BodyReceiver
 from .probe import StoreProbe

@@ -1,4 +1,4 @@
-"""Ranges and points of a request to scans: the one place of the service that calls `vectorization`."""
+"""Ranges and points of a request to scans, or to segments: the one place of the service that calls `vectorization`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from association import AssociationWarning, Scan, View
 from linefix import view_of
-from linefix.ranges import RangeScan
+from linefix.answers import Json, vectorization_json
+from linefix.ranges import RangeScan, motion_warning
 from registration import RigidTransform
 from vectorization import (
     LaserScan,
@@ -26,12 +27,15 @@ from vectorization import (
 
 from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.parts import Laser, Twist
+from ..schemas.requests import VectorizeRequest
+from .job import Done, Job
 
 Floats = NDArray[np.float64]
 Viewpoint = tuple[float, float] | None
 
 MOST_NULLS = 1.0 / 3.0  # fraction of a scan's ranges
 _OPTIONS = frozenset(("sigma", "min_points", "min_length", "max_gap"))
+_PLACES = ("", "/options")  # where scan and options stand in a request to vectorize
 
 
 def viewpoint_of(place: list[float] | None) -> Viewpoint:
@@ -143,3 +147,28 @@ def _placed(form: str, places: tuple[str, str]) -> Iterator[None]:
         place = f"{beside.get(error.argument, form)}/{error.argument}"
         row = "" if error.index is None else f"/{error.index}"
         raise InvalidRequestError([Fault(place + row, error.message)]) from error
+
+
+def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
+    """Cut a scan into directed segments; raises `InvalidRequestError` where the library refuses it."""
+    job.watch.lap("decode")
+    answer = vectorization_of(asked)
+    job.watch.lap("search")
+    return job.done(answer)
+
+
+def vectorization_of(asked: VectorizeRequest) -> Json:
+    """Return the segments of a scan, and the warnings about it.
+
+    Raises
+    ------
+    InvalidRequestError
+        When the library rejects it.
+    """
+    how = asked.options
+    options = VectorizationOptions(how.sigma, how.min_points, how.min_length, how.max_gap)
+    if asked.laser is None:
+        assert asked.points is not None  # the model takes exactly one of the two
+        return vectorization_json(vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES))
+    seen = range_scan(asked.laser, asked.twist, _PLACES[0])
+    return vectorization_json(vectorize_laser(seen, options, _PLACES), motion_warning(seen))

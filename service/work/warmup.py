@@ -26,8 +26,8 @@ from association.explain import NOT_SEARCHED, explain_at
 from association.layout import FOUND
 from association.search.branch_and_bound import add_point_matches
 from association.search.candidates import Candidates
-from association.verdict.absences import absences
 from association.verdict.chance import symmetry_of
+from association.verdict.inconsistencies import absences
 from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from map_quality.analyze.standing import is_free

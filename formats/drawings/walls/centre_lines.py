@@ -1,7 +1,8 @@
-"""Detection of walls that are drawn by centre lines, and their thickness."""
+"""Detection of walls that are drawn by centre lines, and their thickness; positions of lines relative to each other."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...options import ImportOptions
 from ..drawing import Drawing
-from .meeting import AT_ONCE, MEETS, in_frame, parallel_to
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -21,6 +21,9 @@ MOST_MEET = 0.5  # of the length; of lines that take part in a T or a crossing t
 THINNEST, THICKEST = 0.03, 1.5  # m; a width that a wall may have, and no pen
 # Between partitions and outer walls. `python -m benchmarks imports` measures the result for 0.1 to 0.3 m.
 USUAL = 0.2  # m
+AT_ONCE = 200  # lines that are compared with all others at a time; memory
+PARALLEL = math.sin(math.radians(3.0))
+MEETS = 0.05  # m; an end as near to another line meets it
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,3 +121,16 @@ def _arms(places: Floats, begins: Floats, d: Floats, lengths: Floats) -> NDArray
     on = (off < MEETS) & (along > -MEETS) & (along < lengths + MEETS)
     middle = (along > MEETS) & (along < lengths - MEETS)
     return np.where(on, np.where(middle, 2, 1), 0)
+
+
+def in_frame(points: Floats, origins: Floats, d: Floats) -> tuple[Floats, Floats]:
+    """Return where n points lie along and to the left of k lines, ``(k, n)`` each, metres."""
+    x = points[None, :, 0] - origins[:, None, 0]
+    y = points[None, :, 1] - origins[:, None, 1]
+    return d[:, :1] * x + d[:, 1:] * y, d[:, :1] * y - d[:, 1:] * x
+
+
+def parallel_to(some: Floats, others: Floats) -> Flags:
+    """Tell which of n directions are those of k lines, either way round, ``(k, n)``."""
+    found: Flags = np.abs(some[:, :1] * others[None, :, 1] - some[:, 1:] * others[None, :, 0]) < PARALLEL
+    return found

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .meeting import AT_ONCE, MEETS, in_frame, parallel_to
+from .centre_lines import AT_ONCE, MEETS, in_frame, parallel_to
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

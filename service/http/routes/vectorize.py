@@ -10,7 +10,7 @@ from ...parsing.reading import read_model
 from ...schemas import examples
 from ...schemas.replies import VectorizeAnswer
 from ...schemas.requests import VectorizeRequest
-from ...work.vectorization import answer_vectorization
+from ...work.scans import answer_vectorization
 from ..body_stage import read
 from ..exchange import begin_search
 from ..search_stage import in_slot

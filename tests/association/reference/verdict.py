@@ -15,9 +15,9 @@ from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.tuning import RIVAL_SHARE
 from association.verdict import tuning
-from association.verdict.absences import absences
 from association.verdict.alternatives import probability_with_loose_walls
 from association.verdict.chance import NullScore, find_null_score
+from association.verdict.inconsistencies import absences
 from registration.kernels import MAX_DEVIATION
 
 Numbers = dict[str, float]

@@ -7,7 +7,7 @@ import pytest
 
 from association import Scan
 from association.explain import explain_at
-from association.verdict.displaced_walls import displaced_walls
+from association.verdict.inconsistencies import displaced_walls
 from registration import RigidTransform
 
 from ..scenes import INSIDE, ROOM, answer_of, context_of, index_of, scan_of, seen

@@ -10,7 +10,7 @@ import pytest
 
 from association import MapIndex, Scan, associate
 from association.explain import explain_at
-from association.verdict.turning import turn_during_scan
+from association.verdict.inconsistencies import turn_during_scan
 from registration import RigidTransform, Segments
 from simulation import Scanner
 from simulation import scan as simulate

@@ -17,7 +17,7 @@ from map_quality import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
 from service.schemas import examples
-from service.threads import Threads
+from service.thread_pool import Threads
 
 
 @pytest.fixture(scope="module")
