@@ -142,8 +142,8 @@ class Intake:
 
 def _is_gzip(request: Request, *, form: bool) -> bool:
     """Return whether a body is gzip; refuse media types and encodings that are not supported."""
-    told = request.headers.get("content-type", FORM if form else JSON)
-    media_type = told.split(";")[0].strip().lower()
+    content_type = request.headers.get("content-type", FORM if form else JSON)
+    media_type = content_type.split(";")[0].strip().lower()
     if media_type != FORM if form else not _is_json(media_type):
         raise MediaTypeError(FORM if form else JSON)
     encodings = [part.strip().lower() for part in request.headers.get("content-encoding", "").split(",")]

@@ -27,7 +27,7 @@ STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others f
 
 
 @asynccontextmanager
-async def looking_up(
+async def looking_up_map(
     exchange: Exchange, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
 ) -> AsyncIterator[InlineMap | FoundMap]:
     """Look a stored map up before its slot at the gate: a database server that hangs delays no other request.
@@ -68,13 +68,13 @@ async def looking_up(
 
 
 @asynccontextmanager
-async def looking_up_any(
+async def looking_up_maps(
     exchange: Exchange, asked: AssociateRequest | BatchRequest, deadline: Deadline
 ) -> AsyncIterator[InlineMap | FoundMap | FoundMaps]:
-    """Look up the map of a request, or its maps; raises as `looking_up`, and `InvalidRequestError` for a prefix."""
+    """Look up the map of a request, or its maps; raises as `looking_up_map`, and `InvalidRequestError` for a prefix."""
     if asked.map is not None:
-        async with looking_up(exchange, asked.map, deadline, oriented=asked.options.oriented) as on:
-            yield on
+        async with looking_up_map(exchange, asked.map, deadline, oriented=asked.options.oriented) as source:
+            yield source
         return
     assert asked.maps is not None
     services, prefix = exchange.services, exchange.ticket.maps
@@ -92,7 +92,7 @@ async def looking_up_any(
 
 
 async def index_map(
-    exchange: Exchange, on: InlineMap | FoundMap | FoundMaps, deadline: Deadline, *, oriented: bool | None
+    exchange: Exchange, source: InlineMap | FoundMap | FoundMaps, deadline: Deadline, *, oriented: bool | None
 ) -> CachedMap | CachedMaps | None:
     """Index a map for which that takes long, or several, in a slot of another gate: its threads go behind all searches.
 
@@ -100,12 +100,12 @@ async def index_map(
     """
     services = exchange.services
     call: Callable[[], CachedMap | CachedMaps]
-    if isinstance(on, FoundMaps):
-        if services.lookup.are_cached(on, oriented=oriented):
+    if isinstance(source, FoundMaps):
+        if services.lookup.are_cached(source, oriented=oriented):
             return None
-        call = partial(services.lookup.indexed_together, on, oriented=oriented, deadline=deadline)
-    elif services.lookup.takes_long(on):
-        call = partial(services.lookup.indexed, on, oriented=oriented, deadline=deadline)
+        call = partial(services.lookup.indexed_together, source, oriented=oriented, deadline=deadline)
+    elif services.lookup.takes_long(source):
+        call = partial(services.lookup.indexed, source, oriented=oriented, deadline=deadline)
     else:
         return None
     return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)

@@ -23,7 +23,7 @@ class HangUpError(Exception):
     """The client hung up; no answer can be sent."""
 
 
-async def in_slot(
+async def in_search_slot(
     exchange: Exchange, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True
 ) -> T:
     """Run a part of this request in a slot of the gate; an admitted request is not refused later.

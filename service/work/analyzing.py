@@ -69,7 +69,7 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     )
 
 
-def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
+def begin_analysis(lookup: MapLookup, source: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
     """Index a map and lay the grid over it.
 
     Raises
@@ -83,10 +83,10 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
     DeadlinePassedError
         When the deadline has passed before.
     """
-    cached = lookup.indexed(on, oriented=None, deadline=job.deadline)
+    cached = lookup.indexed(source, oriented=None, deadline=job.deadline)
     analysis = analysis_of(cached, asked)
     job.begin_search()
-    return Tally(analysis, reference_to(on), iter(analysis.standing.order.tolist()))
+    return Tally(analysis, reference_to(source), iter(analysis.standing.order.tolist()))
 
 
 def take_looks(tally: Tally, deadline: Deadline) -> bool:

@@ -88,12 +88,12 @@ class Associator:
     def answer(
         self,
         asked: AssociateRequest,
-        on: InlineMap | FoundMap | FoundMaps,
+        source: InlineMap | FoundMap | FoundMaps,
         job: Job,
         ready: CachedMap | CachedMaps | None = None,
     ) -> Done:
         """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
-        target = self.target(asked, on, job.deadline, ready)
+        target = self.target(asked, source, job.deadline, ready)
         job.watch.lap("decode")
         job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline)
@@ -105,7 +105,7 @@ class Associator:
     def target(
         self,
         asked: AssociateRequest | BatchRequest,
-        on: InlineMap | FoundMap | FoundMaps,
+        source: InlineMap | FoundMap | FoundMaps,
         deadline: Deadline,
         ready: CachedMap | CachedMaps | None = None,
     ) -> Target:
@@ -122,11 +122,11 @@ class Associator:
         """
         oriented = asked.options.oriented
         with stage("index"):
-            if isinstance(on, FoundMaps):
-                together = ready or self.lookup.indexed_together(on, oriented=oriented, deadline=deadline)
-                return Target(together, None, on, asked.map_weights)
-            cached = ready or self.lookup.indexed(on, oriented=oriented, deadline=deadline)
-        return Target(cached, reference_to(on))
+            if isinstance(source, FoundMaps):
+                together = ready or self.lookup.indexed_together(source, oriented=oriented, deadline=deadline)
+                return Target(together, None, source, asked.map_weights)
+            cached = ready or self.lookup.indexed(source, oriented=oriented, deadline=deadline)
+        return Target(cached, reference_to(source))
 
     def find(
         self, target: Target, sought: AssociateRequest | BatchItem, options: SearchOptions, deadline: Deadline
@@ -158,8 +158,8 @@ class Associator:
         if maps is None:
             return answer
         verdicts = [{**one, **maps.reference_to(one["map_id"])} for one in answer["maps"]]
-        on = None if result.map_id is None else maps.reference_to(result.map_id)
-        return {**answer, "maps": verdicts, "map": on}
+        reference = None if result.map_id is None else maps.reference_to(result.map_id)
+        return {**answer, "maps": verdicts, "map": reference}
 
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
@@ -178,16 +178,16 @@ def _search(
     target: Target, scan: Scan, sent: SoftPriorFields | HardPriorFields | None, options: SearchOptions, until: Deadline
 ) -> AssociationResult:
     """Search a map, or several."""
-    cached, prior, on = target.cached, prior_of(sent), None if sent is None else sent.map_id
-    how = association_options_of(options, oriented=cached.oriented)
+    cached, prior, prior_map = target.cached, prior_of(sent), None if sent is None else sent.map_id
+    search = association_options_of(options, oriented=cached.oriented)
     if not isinstance(cached, CachedMaps):
-        if on is not None:
+        if prior_map is not None:
             raise InvalidSearchError(
                 "found it with a single map, expected it with several; omit it", argument="prior.map_id"
             )
-        return associate(cached.index, scan, prior, how, until)
+        return associate(cached.index, scan, prior, search, until)
     try:
-        return associate_on_maps(cached.maps, scan, KnownOfMaps(prior, on, target.map_weights), how, until)
+        return associate_on_maps(cached.maps, scan, KnownOfMaps(prior, prior_map, target.map_weights), search, until)
     except IndexingEndedError:
         raise DeadlinePassedError from None
 
@@ -200,6 +200,8 @@ def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResul
     return job.done(answer, map=target.reference, verdicts=noted)
 
 
-def reference_to(on: InlineMap | FoundMap) -> Json | None:
+def reference_to(source: InlineMap | FoundMap) -> Json | None:
     """Return id and revision of a stored map."""
-    return {"map_id": on.record.map_id, "revision": on.record.revision} if isinstance(on, FoundMap) else None
+    return (
+        {"map_id": source.record.map_id, "revision": source.record.revision} if isinstance(source, FoundMap) else None
+    )

@@ -25,7 +25,7 @@ class Begun:
 
     Attributes
     ----------
-    on : FoundMap or InlineMap
+    source : FoundMap or InlineMap
     cached : CachedMap
         With its directions, whatever they mean.
     oriented : bool
@@ -35,14 +35,14 @@ class Begun:
     found : MapCheck
     """
 
-    on: InlineMap | FoundMap
+    source: InlineMap | FoundMap
     cached: CachedMap
     oriented: bool
     scans: Sequence[Scan]
     found: MapCheck
 
 
-def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | None, job: Job) -> Begun:
+def check(lookup: MapLookup, source: InlineMap | FoundMap, asked: CheckRequest | None, job: Job) -> Begun:
     """Index a map and check it; read the samples, where there are some.
 
     Raises
@@ -58,14 +58,14 @@ def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | Non
     CancelledError
         When the client has gone.
     """
-    cached = lookup.indexed(on, oriented=True, deadline=job.deadline)
+    cached = lookup.indexed(source, oriented=True, deadline=job.deadline)
     scans = [] if asked is None else scans_of(asked)
     job.begin_search()
-    oriented = is_oriented(None, on.record.oriented if isinstance(on, FoundMap) else on.oriented)
+    oriented = is_oriented(None, source.record.oriented if isinstance(source, FoundMap) else source.oriented)
     # Of its own: an index without directions, which a check may add to it, goes with the check, for the cache does not
     # count it.
     cached = replace(cached, index=replace(cached.index))
-    return Begun(on, cached, oriented, scans, check_map(cached.index, job.deadline, oriented=oriented))
+    return Begun(source, cached, oriented, scans, check_map(cached.index, job.deadline, oriented=oriented))
 
 
 def sample(begun: Begun, asked: CheckRequest, number: int, job: Job) -> Sample | None:
@@ -83,7 +83,7 @@ def conclude(begun: Begun, samples: Sequence[Sample | None], job: Job) -> Checke
 def check_done(begun: Begun, checked: CheckedMap, asked: CheckRequest | None, job: Job) -> Done:
     """Return the answer of a check."""
     job.watch.lap("search")
-    reference = reference_to(begun.on)
+    reference = reference_to(begun.source)
     sealed = {"map": reference, "client_ref": None if asked is None else asked.client_ref}
     codes = [one.code for one in checked.all.findings]
     return job.done({**checked_json(checked), **sealed}, map=reference, findings=codes)

@@ -192,14 +192,14 @@ def scans_of(asked: CheckRequest) -> list[Scan]:
     """
     found = []
     for number, one in enumerate(asked.scans):
-        with placed(f"/scans/{number}"):
+        with naming_scan(f"/scans/{number}"):
             # A motion that is not known would only loosen the fit.
             found.append(scanned_of(one, timed=False).scan)
     return found
 
 
 @contextmanager
-def placed(place: str) -> Iterator[None]:
+def naming_scan(place: str) -> Iterator[None]:
     """Name the place of a scan in the request, where the libraries refuse the scan.
 
     Raises

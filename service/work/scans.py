@@ -84,7 +84,7 @@ def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = T
     motion = None
     if twist is not None and laser.time_increment:
         motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
-    with _placed(f"{place}/laser", (place, place)):
+    with _naming_argument(f"{place}/laser", (place, place)):
         if laser.angle_max is not None and len(laser.ranges):
             require_angle_max(laser.angle_min, laser.angle_max, laser.angle_increment, len(laser.ranges))
         scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **bounds)
@@ -93,7 +93,7 @@ def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = T
 
 def vectorize_laser(seen: RangeScan, options: VectorizationOptions, places: tuple[str, str]) -> Vectorization:
     """Return the segments in the ranges of a scanner; `places` are the pointers of scan and options."""
-    with _placed(f"{places[0]}/laser", places):
+    with _naming_argument(f"{places[0]}/laser", places):
         return vectorize(seen.laser, options)
 
 
@@ -101,7 +101,7 @@ def vectorize_points(
     points: Floats, options: VectorizationOptions, viewpoint: Viewpoint, places: tuple[str, str]
 ) -> Vectorization:
     """Return the segments in ordered points; `places` are the pointers of scan and options."""
-    with _placed(places[0], places):
+    with _naming_argument(places[0], places):
         return vectorize(points, options, viewpoint)
 
 
@@ -109,7 +109,7 @@ def view_laser(
     seen: RangeScan, at: RigidTransform, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan"
 ) -> View:
     """Return a scanner's view; the single beams stay evidence. `at` is the pose of the frame it is mounted on."""
-    with _placed(f"{place}/laser", (place, place)):
+    with _naming_argument(f"{place}/laser", (place, place)):
         view = view_of(seen, at, sigma)
     nulls = _nulls_warning(seen.laser)
     if nulls is not None:
@@ -137,7 +137,7 @@ def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
 
 
 @contextmanager
-def _placed(form: str, places: tuple[str, str]) -> Iterator[None]:
+def _naming_argument(form: str, places: tuple[str, str]) -> Iterator[None]:
     """Name the place in the request of an argument that the vectorizer rejects."""
     try:
         yield
@@ -165,8 +165,8 @@ def vectorization_of(asked: VectorizeRequest) -> Json:
     InvalidRequestError
         When the library rejects it.
     """
-    how = asked.options
-    options = VectorizationOptions(how.sigma, how.min_points, how.min_length, how.max_gap)
+    sent = asked.options
+    options = VectorizationOptions(sent.sigma, sent.min_points, sent.min_length, sent.max_gap)
     if asked.laser is None:
         assert asked.points is not None  # the model takes exactly one of the two
         return vectorization_json(vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES))

@@ -19,7 +19,7 @@ from ..maps.lookup import FoundMap, MapLookup, outline_of
 from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
 from .association import reference_to
-from .inputs import placed, scanned_of, transform_of
+from .inputs import naming_scan, scanned_of, transform_of
 from .job import Done, Job
 
 TURN_SECONDS = 0.1  # of the gate, before others have theirs
@@ -46,7 +46,7 @@ class Progress:
     update: MapUpdate | None = None
 
 
-def begin_update(lookup: MapLookup, on: FoundMap, asked: UpdateRequest, job: Job) -> Progress:
+def begin_update(lookup: MapLookup, source: FoundMap, asked: UpdateRequest, job: Job) -> Progress:
     """Index a map and read the scans.
 
     Raises
@@ -60,20 +60,20 @@ def begin_update(lookup: MapLookup, on: FoundMap, asked: UpdateRequest, job: Job
     DeadlinePassedError
         When the deadline has passed before.
     """
-    cached, old = lookup.indexed(on, oriented=None, deadline=job.deadline), lookup.document(on)
+    cached, old = lookup.indexed(source, oriented=None, deadline=job.deadline), lookup.document(source)
     scans = [
         _scan_of(asked, number, place) for number, one in enumerate(asked.visits) for place in range(len(one.scans))
     ]
     job.begin_search()
     steps = updating(cached.index, scans, job.deadline, accept=asked.accept, refuse=asked.refuse)
     document: dict[str, Any] = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
-    return Progress(steps, document, reference_to(on))
+    return Progress(steps, document, reference_to(source))
 
 
 def _scan_of(asked: UpdateRequest, visit: int, number: int) -> VisitScan:
     """Return a scan of a visit; an error names its place in the request."""
     one = asked.visits[visit].scans[number]
-    with placed(f"/visits/{visit}/scans/{number}"):
+    with naming_scan(f"/visits/{visit}/scans/{number}"):
         pose = None if one.pose is None else transform_of(one.pose)
         odometry = None if one.odometry is None else transform_of(one.odometry)
         return VisitScan(scanned_of(one).scan, asked.visits[visit].visit, pose, one.covariance, odometry)

@@ -152,8 +152,8 @@ def warm_up_indexing() -> None:
 def warm_up_explaining() -> None:
     """Compute the answer to scans at a given pose, without a search, and the results that are derived from it."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for asked, prior, how in _asked():
-        context = SearchContext.of(index, asked, prior, how, Deadline())
+    for seen, prior, options in _asked():
+        context = SearchContext.of(index, seen, prior, options, Deadline())
         answer = explain_at(context, RigidTransform(0, 0, 0)).answer
         assert answer is not None
         missing_segments(context, answer.best)
@@ -167,8 +167,8 @@ def warm_up_explaining() -> None:
 def warm_up_searching() -> None:
     """Associate once in each way that has kernels of its own."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for asked, prior, how in _asked():
-        associate(index, asked, prior, how, Deadline())
+    for seen, prior, options in _asked():
+        associate(index, seen, prior, options, Deadline())
     context = SearchContext.of(index, _with_beams(), None, AssociationOptions(), Deadline())
     answer = explain_at(context, RigidTransform(0, 0, 0)).answer
     assert answer is not None

@@ -16,8 +16,8 @@ from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
 from ...work.job import Done, Job
 from ..body_stage import read
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up
-from ..search_stage import in_slot
+from ..map_stage import index_map, looking_up_map
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -57,18 +57,18 @@ async def post_analyze_inline(request: Request) -> Response:
     return await _answer(exchange, asked.map, asked)
 
 
-async def _answer(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
+async def _answer(exchange: Exchange, source: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
     job = exchange.job(asked.deadline_ms)
-    return await answer(exchange, _work(exchange, on, asked, job), job.deadline)
+    return await answer(exchange, _work(exchange, source, asked, job), job.deadline)
 
 
 async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: AnalyzeRequest, job: Job) -> Done:
     """Index the map in one slot at the gate, and try its places in as many short ones as it takes."""
     lookup = exchange.services.lookup
-    async with looking_up(exchange, named, job.deadline, oriented=None) as on:
-        await index_map(exchange, on, job.deadline, oriented=None)
-        work = partial(begin_analysis, lookup, on, asked, job)
-        tally = await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    async with looking_up_map(exchange, named, job.deadline, oriented=None) as source:
+        await index_map(exchange, source, job.deadline, oriented=None)
+        work = partial(begin_analysis, lookup, source, asked, job)
+        tally = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
     await _take_looks(exchange, tally, job)
     return await exchange.services.parse_threads.run(partial(analysis_done, tally, asked, job))
 
@@ -78,7 +78,7 @@ async def _take_looks(exchange: Exchange, tally: Tally, job: Job) -> None:
     more = not tally.done
     while more:
         try:
-            more = await in_slot(exchange, partial(take_looks, tally, job.deadline), job.deadline)
+            more = await in_search_slot(exchange, partial(take_looks, tally, job.deadline), job.deadline)
         except DeadlinePassedError:
             return
         await asyncio.sleep(0)

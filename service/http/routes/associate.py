@@ -13,8 +13,8 @@ from ...schemas.requests import AssociateRequest
 from ...work.job import Done, Job
 from ..body_stage import read
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up_any
-from ..search_stage import in_slot
+from ..map_stage import index_map, looking_up_maps
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
@@ -47,7 +47,7 @@ async def post_associate(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
     """Search in one slot at the gate, in which a small map is indexed, too."""
     oriented = asked.options.oriented
-    async with looking_up_any(exchange, asked, job.deadline) as on:
-        ready = await index_map(exchange, on, job.deadline, oriented=oriented)
-        work = partial(exchange.services.associator.answer, asked, on, job, ready)
-        return await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    async with looking_up_maps(exchange, asked, job.deadline) as source:
+        ready = await index_map(exchange, source, job.deadline, oriented=oriented)
+        work = partial(exchange.services.associator.answer, asked, source, job, ready)
+        return await in_search_slot(exchange, work, job.deadline, job.searching.is_set)

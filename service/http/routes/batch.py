@@ -21,9 +21,9 @@ from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..body_stage import read
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up_any
+from ..map_stage import index_map, looking_up_maps
 from ..problems import INTERNAL, problem_of
-from ..search_stage import in_slot
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
@@ -50,10 +50,10 @@ async def post_batch(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
     """Index the map in one slot, and search for each scan in another."""
     associator, oriented = exchange.services.associator, asked.options.oriented
-    async with looking_up_any(exchange, asked, job.deadline) as on:
-        ready = await index_map(exchange, on, job.deadline, oriented=oriented)
-        index = partial(associator.target, asked, on, job.deadline, ready)
-        target = await in_slot(exchange, index, job.deadline, heeds=lambda: False)
+    async with looking_up_maps(exchange, asked, job.deadline) as source:
+        ready = await index_map(exchange, source, job.deadline, oriented=oriented)
+        index = partial(associator.target, asked, source, job.deadline, ready)
+        target = await in_search_slot(exchange, index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [
         partial(associator.find_for_batch, target, index, item, asked.options, job.deadline)
@@ -78,7 +78,7 @@ async def _answer_all(
     async def work_through() -> None:
         for index, call in todo:
             try:
-                found = await in_slot(exchange, call, job.deadline)
+                found = await in_search_slot(exchange, call, job.deadline)
             except CancelledError:
                 raise
             except Exception as error:

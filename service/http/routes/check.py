@@ -22,8 +22,8 @@ from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
 from ..body_stage import read
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up
-from ..search_stage import in_slot
+from ..map_stage import index_map, looking_up_map
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -72,15 +72,15 @@ async def post_check(request: Request, map_id: MapIdPath) -> Response:
 async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Done:
     """Check the map in one slot at the gate, and try each sample in another."""
     lookup = exchange.services.lookup
-    async with looking_up(exchange, StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
-        assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
-        await index_map(exchange, on, job.deadline, oriented=True)
-        work = partial(check, lookup, on, asked, job)
-        begun = await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    async with looking_up_map(exchange, StoredMap(map_id=map_id), job.deadline, oriented=True) as source:
+        assert isinstance(source, FoundMap)  # what is stored is found, or else an exception
+        await index_map(exchange, source, job.deadline, oriented=True)
+        work = partial(check, lookup, source, asked, job)
+        begun = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
     calls = [] if asked is None else [partial(sample, begun, asked, number, job) for number in range(len(asked.scans))]
     concluding = partial(conclude, begun, await _try_all(exchange, calls, job), job)
     try:
-        checked = await in_slot(exchange, concluding, job.deadline) if calls else concluding()
+        checked = await in_search_slot(exchange, concluding, job.deadline) if calls else concluding()
     except DeadlinePassedError:  # no slot is left: it then concludes from what it has, and searches nothing
         checked = await exchange.services.parse_threads.run(concluding)
     return await exchange.services.parse_threads.run(partial(check_done, begun, checked, asked, job))
@@ -94,7 +94,7 @@ async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | Non
     async def work_through() -> None:
         for index, call in todo:
             try:
-                found[index] = await in_slot(exchange, call, job.deadline)
+                found[index] = await in_search_slot(exchange, call, job.deadline)
             except DeadlinePassedError:
                 return
 

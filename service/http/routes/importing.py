@@ -18,7 +18,7 @@ from ...work.job import Done, Job
 from ..bodies import FORM
 from ..body_stage import parse, receive
 from ..exchange import Exchange, begin_search
-from ..search_stage import in_slot, in_slot_of
+from ..search_stage import in_search_slot, in_slot_of
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
 
@@ -60,7 +60,7 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     line_map = await parse(exchange, partial(read_model, InlineMap), read.map, deadline)
     indexing = partial(index_import, services.lookup, line_map, deadline)
     index = await in_slot_of(services.indexing, exchange, indexing, deadline)
-    return await in_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
+    return await in_search_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
 
 
 @router.post(
@@ -85,4 +85,4 @@ async def post_scans(request: Request) -> Response:
 async def _scans(exchange: Exchange, reading: Callable[[], ReadScans], job: Job) -> Done:
     """Read scans in a slot of imports, and write them in one of searches."""
     read = await in_slot_of(exchange.services.importing, exchange, reading, job.deadline)
-    return await in_slot(exchange, partial(answer_scans, read, job), job.deadline)
+    return await in_search_slot(exchange, partial(answer_scans, read, job), job.deadline)

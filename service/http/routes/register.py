@@ -13,7 +13,7 @@ from ...schemas.requests import RegisterRequest
 from ...work.registration import answer_registration
 from ..body_stage import read
 from ..exchange import begin_search
-from ..search_stage import in_slot
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
@@ -34,5 +34,5 @@ async def post_register(request: Request) -> Response:
     asked = await read(exchange, partial(read_model, RegisterRequest))
     job = exchange.job()
     return await answer(
-        exchange, in_slot(exchange, partial(answer_registration, asked, job), job.deadline), job.deadline
+        exchange, in_search_slot(exchange, partial(answer_registration, asked, job), job.deadline), job.deadline
     )

@@ -17,8 +17,8 @@ from ...work.job import Done, Job
 from ...work.updating import Progress, answer_apply, begin_update, take_steps, update_done
 from ..body_stage import read
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up
-from ..search_stage import in_slot
+from ..map_stage import index_map, looking_up_map
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -56,17 +56,19 @@ async def post_apply(request: Request) -> Response:
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, ApplyRequest))
     job = exchange.job()
-    return await answer(exchange, in_slot(exchange, partial(answer_apply, asked, job), job.deadline), job.deadline)
+    return await answer(
+        exchange, in_search_slot(exchange, partial(answer_apply, asked, job), job.deadline), job.deadline
+    )
 
 
 async def _work(exchange: Exchange, map_id: str, asked: UpdateRequest, job: Job) -> Done:
     """Index the map in one slot at the gate, and go through the scans in as many short ones as it takes."""
     lookup = exchange.services.lookup
-    async with looking_up(exchange, StoredMap(map_id=map_id), job.deadline, oriented=None) as on:
-        assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
-        await index_map(exchange, on, job.deadline, oriented=None)
-        work = partial(begin_update, lookup, on, asked, job)
-        progress = await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    async with looking_up_map(exchange, StoredMap(map_id=map_id), job.deadline, oriented=None) as source:
+        assert isinstance(source, FoundMap)  # what is stored is found, or else an exception
+        await index_map(exchange, source, job.deadline, oriented=None)
+        work = partial(begin_update, lookup, source, asked, job)
+        progress = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
     await _take_steps(exchange, progress, job)
     return await exchange.services.parse_threads.run(partial(update_done, progress, asked, job))
 
@@ -75,7 +77,7 @@ async def _take_steps(exchange: Exchange, progress: Progress, job: Job) -> None:
     """Go on on one core, so that an update leaves the others to searches that robots wait for."""
     work = partial(take_steps, progress, job.deadline)
     try:
-        while await in_slot(exchange, work, job.deadline):
+        while await in_search_slot(exchange, work, job.deadline):
             await asyncio.sleep(0)
     except DeadlinePassedError:  # no slot is left: it then ends without a proposal, and searches nothing
         while await exchange.services.parse_threads.run(work):

@@ -13,7 +13,7 @@ from ...schemas.requests import VectorizeRequest
 from ...work.scans import answer_vectorization
 from ..body_stage import read
 from ..exchange import begin_search
-from ..search_stage import in_slot
+from ..search_stage import in_search_slot
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
@@ -34,5 +34,5 @@ async def post_vectorize(request: Request) -> Response:
     asked = await read(exchange, partial(read_model, VectorizeRequest))
     job = exchange.job()
     return await answer(
-        exchange, in_slot(exchange, partial(answer_vectorization, asked, job), job.deadline), job.deadline
+        exchange, in_search_slot(exchange, partial(answer_vectorization, asked, job), job.deadline), job.deadline
     )
