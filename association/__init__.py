@@ -3,16 +3,6 @@
 from registration import Beams
 
 from .associating import associate
-from .auditing import (
-    AnswerExplanation,
-    Contribution,
-    ExplainedModel,
-    ExplainedNull,
-    VerdictExplanation,
-    VetoOutcome,
-    WeighedAlternative,
-    explain_verdict,
-)
 from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.joint import MapPart
@@ -36,6 +26,16 @@ from .result import (
 from .scan.scan import Scan, Views, mirrored
 from .scan.views import MAX_VIEWS, View, assemble
 from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
+from .verdict_explanation import (
+    AnswerExplanation,
+    Contribution,
+    ExplainedModel,
+    ExplainedNull,
+    VerdictExplanation,
+    VetoOutcome,
+    WeighedAlternative,
+    explain_verdict,
+)
 
 __all__ = [
     "AS_WELL",

@@ -9,11 +9,11 @@ from registration.values import value
 from .causes import find_causes
 from .context import SearchContext
 from .deadline import Deadline
-from .explain import explain
 from .explanations import Explanations
 from .index.map_index import MapIndex
 from .last_view import LastView, search_last_view
 from .options import AssociationOptions, Prior
+from .rank_and_estimate import rank_and_estimate
 from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan
@@ -99,7 +99,7 @@ def associate(
 
 
 def run_stages(context: SearchContext, began: float) -> Stages:
-    """Search, explain and judge as `associate` describes; `began` is when that started, `time.monotonic()` seconds.
+    """Search, rank, estimate and judge as `associate` describes; `began` is when that started, `time.monotonic()` seconds.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def run_stages(context: SearchContext, began: float) -> Stages:
         When the deadline was cancelled.
     """
     candidates = find_candidates(context)
-    explanations = explain(context, candidates)
+    explanations = rank_and_estimate(context, candidates)
     found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     if not verdict.usable:
@@ -134,7 +134,7 @@ def _search_by_points(
     more = add_point_matches(context, candidates)
     if more is candidates:
         return found, verdict
-    by_points = found if context.deadline.passed else put_to_scale(context, explain(context, more))
+    by_points = found if context.deadline.passed else put_to_scale(context, rank_and_estimate(context, more))
     if by_points.score > found.score:
         return by_points, judge(by_points.context, by_points.explanations, off_scale=by_points.off_scale)
     return (found.cut_short(), verdict.cut_short()) if context.deadline.passed else (found, verdict)

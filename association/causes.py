@@ -11,10 +11,10 @@ from typing import Literal
 from registration import Segments
 
 from .context import SearchContext
-from .explain import search_and_explain
 from .explanations import Explanations
 from .index.joint import JointIndex
 from .index.map_index import MapIndex
+from .rank_and_estimate import search_and_rank
 from .scan.scan import Scan, mirrored, turned_round
 from .search.candidates import Effort, allowed_by
 from .to_scale import at_scale, estimate_factor
@@ -156,7 +156,7 @@ def _tried(changed: SearchContext, mistake: Mistake, factor: float, known: float
     """Search without a mistake; None where that fits no better."""
     options = changed.options
     effort = Effort(FEW_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), known)
-    explanations = search_and_explain(changed, effort)
+    explanations = search_and_rank(changed, effort)
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None
     best, verdict = explanations.answer.best, judge(changed, explanations)

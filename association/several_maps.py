@@ -136,7 +136,7 @@ def associate_on_maps(
     """Find on which of several maps, and where on it, a scan was taken.
 
     1. Put the maps into one index, far from one another.
-    2. Search, explain and judge there, so that a pose on another map is an alternative as any other.
+    2. Search, rank, estimate and judge there, so that a pose on another map is an alternative as any other.
     3. Return poses and indices in the frames of their maps, and the best pose of each map.
 
     Parameters

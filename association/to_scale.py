@@ -21,9 +21,9 @@ from .consensus.consensus_set import ConsensusSet
 from .consensus.ranking import rank_candidates
 from .consensus.similarity import Similarity, fit_similarity, fit_trimmed_similarity
 from .context import SearchContext
-from .explain import search_and_explain
 from .explanations import Answer, Explanations, add_alternatives
 from .options import AssociationOptions
+from .rank_and_estimate import search_and_rank
 from .scan.scan import Scan, scaled
 from .search.candidates import Effort, allowed_by, find_candidates
 from .tuning import (
@@ -108,7 +108,7 @@ def search_to_scale(context: SearchContext) -> ScaledSearch:
     CancelledError
         When the deadline was cancelled.
     """
-    return put_to_scale(context, search_and_explain(context))
+    return put_to_scale(context, search_and_rank(context))
 
 
 def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
@@ -191,7 +191,7 @@ def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> S
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
         again = at_scale(first.context, factor)
-        explanations = search_and_explain(again, _effort_beyond(again, found))
+        explanations = search_and_rank(again, _effort_beyond(again, found))
         stretched = ScaledSearch(again, explanations, first.explanations, Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.

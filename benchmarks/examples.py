@@ -1,4 +1,4 @@
-"""Answers with what is known of them, for fitting the verdict: as far as `association.explain` goes, and the truth."""
+"""Answers with what is known of them, for fitting the verdict: the ranked poses and the truth."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from association import AnswerExplanation, AssociationOptions, Deadline, MapIndex, Prior, Scan, explain_verdict
-from association.auditing import ExplainedModel, VerdictExplanation
+from association.verdict_explanation import ExplainedModel, VerdictExplanation
 from registration import Segments
 from vectorization import LaserScan
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.context import SearchContext
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from registration import Segments
 
 from .judging import judge_samples
@@ -154,7 +154,7 @@ def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
     index = MapIndex.build(faces, THICKNESS_SIGMA, deadline=deadline)
     options = AssociationOptions()
     # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
-    found = (search_and_explain(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
+    found = (search_and_rank(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
     return sum(max(0.0, one.best.score) for one in found if one is not None)
 
 

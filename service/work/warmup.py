@@ -22,8 +22,8 @@ from association import (
 from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
-from association.explain import NOT_SEARCHED, explain_at
 from association.layout import FOUND
+from association.rank_and_estimate import NOT_SEARCHED, estimate_at
 from association.search.branch_and_bound import add_point_matches
 from association.search.candidates import Candidates
 from association.verdict.chance import symmetry_of
@@ -154,14 +154,14 @@ def warm_up_explaining() -> None:
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
     for seen, prior, options in _asked():
         context = SearchContext.of(index, seen, prior, options, Deadline())
-        answer = explain_at(context, RigidTransform(0, 0, 0)).answer
+        answer = estimate_at(context, RigidTransform(0, 0, 0)).answer
         assert answer is not None
         missing_segments(context, answer.best)
         symmetry_of(context, answer.best, answer.best)
         fit_similarity(context, answer.best)
     # It is nothing that would have to stand up to a null, which costs a search.
     context = SearchContext.of(index, _one_wall(), None, AssociationOptions(), Deadline())
-    assert not judge(context, explain_at(context, RigidTransform(0, 0, 0))).usable
+    assert not judge(context, estimate_at(context, RigidTransform(0, 0, 0))).usable
 
 
 def warm_up_searching() -> None:
@@ -170,7 +170,7 @@ def warm_up_searching() -> None:
     for seen, prior, options in _asked():
         associate(index, seen, prior, options, Deadline())
     context = SearchContext.of(index, _with_beams(), None, AssociationOptions(), Deadline())
-    answer = explain_at(context, RigidTransform(0, 0, 0)).answer
+    answer = estimate_at(context, RigidTransform(0, 0, 0)).answer
     assert answer is not None
     absences(context, answer.best, [answer.best])
     add_point_matches(context, Candidates(np.zeros(0, FOUND), NOT_SEARCHED))

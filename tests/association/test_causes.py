@@ -12,7 +12,7 @@ import pytest
 
 from association import AssociationOptions, Beams, Deadline, MapIndex, Scan, associate
 from association.causes import find_causes
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from association.scan.scan import mirrored, scaled, turned_round
 from association.to_scale import estimate_factor
 from association.units import UNITS
@@ -28,7 +28,7 @@ SCAN = scan_of(seen(ROOM, INSIDE)[0])
 def told(scan: Scan, index: MapIndex = INDEX, **options: Any) -> dict[str, str]:
     """Return the warnings of mistakes by their codes."""
     context = context_of(index, scan, causes=True, **options)
-    explanations = search_and_explain(context)
+    explanations = search_and_rank(context)
     verdict = judge(context, explanations)
     causes = find_causes(context, explanations, verdict, time.monotonic() - 60.0)  # time enough
     return {one.code: one.message for one in warnings_of_causes(causes)}

@@ -10,8 +10,8 @@ import pytest
 
 from association import AssociationOptions, AssociationResult, Deadline, HardPrior, Scan, View, assemble, associate
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
+from association.rank_and_estimate import search_and_rank
 from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
@@ -41,7 +41,7 @@ def drive(clutter: int = 12, count: int = 4, *, with_beams: bool = False) -> lis
 def judged(views: list[View]) -> tuple[SearchContext, Verdict]:
     """Return what the drive as a whole comes to."""
     context = context_of(INDEX, assemble(views))
-    return context, judge(context, search_and_explain(context))
+    return context, judge(context, search_and_rank(context))
 
 
 def codes(result: AssociationResult) -> list[str]:
@@ -149,7 +149,7 @@ def test_nothing_else_is_searched_where_there_is_no_last_view() -> None:
         own = last_view(scan)[1]
         assert len(own) == 0
         context = context_of(INDEX, scan)
-        verdict = replace(judge(context, search_and_explain(context)), usable=False)
+        verdict = replace(judge(context, search_and_rank(context)), usable=False)
         late = replace(context, deadline=Deadline(time.monotonic() - 1.0))
         assert (search_last_view(late, verdict).result, search_last_view(late, verdict).complete) == (None, True)
 

@@ -10,8 +10,8 @@ import pytest
 
 from association import AssociationResult, MapIndex, Reason, Status, View, assemble, message_of
 from association.consensus.acceptance import Accepted
-from association.explain import search_and_explain
 from association.explanations import Answer
+from association.rank_and_estimate import search_and_rank
 from association.report import report
 from association.verdict.verdict import Verdict, judge
 from association.verdict.vetoes import BETTER_ELSEWHERE, INCOMPLETE
@@ -121,7 +121,7 @@ def test_parts_that_are_not_deciding_place_are_empty_and_change_nothing_else(ask
     """Of an answer that is usable, with another pose, and a wall through which it sees."""
     index = index_of(np.vstack([equal_rooms(2)[:-2], [[4.0, 3.3, 5.0, 3.4]]]))
     sent = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0], viewpoint=(0.0, 0.0))
-    explanations = search_and_explain(context_of(index, sent))
+    explanations = search_and_rank(context_of(index, sent))
 
     def reported(**options: Any) -> AssociationResult:
         return report(context_of(index, sent, **options), explanations, SURE)
@@ -304,7 +304,7 @@ def test_no_match() -> None:
     """All that was found is an alternative, also what would have been the answer."""
     nothing = Verdict(Status.NO_MATCH, 0.01, False, pose(), None, None, WHY)
     context = context_of(ROOMS, SCAN)
-    explanations = search_and_explain(context)
+    explanations = search_and_rank(context)
     for answer, status in ((explanations.answer, Status.NO_MATCH), (None, Status.OK)):
         result = report(context, replace(explanations, answer=answer), replace(nothing, status=status))
         assert (result.status, result.usable, result.probability) == (Status.NO_MATCH, False, 0.0)
@@ -320,7 +320,7 @@ def test_walls_that_are_matched_are_not_missing() -> None:
     """Two screens stand before a wall that was seen; a segment on one of them is matched, and the other is missing."""
     screens = [[4.5, 0.5, 4.5, 2.2], [4.5, 2.4, 4.5, 3.6]]
     context = context_of(index_of(np.vstack([ROOM, screens])), SCAN)
-    explanations = search_and_explain(context)
+    explanations = search_and_rank(context)
     answer = explanations.answer
     assert answer is not None
     verdict = judge(context, explanations)

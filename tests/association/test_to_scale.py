@@ -22,8 +22,8 @@ from association import (
 from association.consensus.consensus_set import ConsensusSet
 from association.consensus.similarity import Similarity, fit_similarity
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.explanations import Explanations, add_alternatives
+from association.rank_and_estimate import search_and_rank
 from association.search.candidates import Effort
 from association.to_scale import search_to_scale
 from registration import RigidTransform, Segments
@@ -220,7 +220,7 @@ def test_a_window_holds_the_pose_in_the_map_as_it_is() -> None:
 
 
 def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.MonkeyPatch) -> None:
-    index, searched = index_of(1.02 * WALLS), search_and_explain
+    index, searched = index_of(1.02 * WALLS), search_and_rank
     in_time = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
     assert in_time.usable
 
@@ -229,7 +229,7 @@ def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.M
             context.deadline.at = 0.0
         return searched(context, effort)
 
-    monkeypatch.setattr(to_scale, "search_and_explain", late)
+    monkeypatch.setattr(to_scale, "search_and_rank", late)
     got = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
     assert not got.usable
     assert not got.search.complete

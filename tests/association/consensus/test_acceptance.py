@@ -10,7 +10,7 @@ import pytest
 
 from association import MapIndex, Scan
 from association.consensus.acceptance import Accepted, accept, register_accepted
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from association.tables import Lines
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
@@ -24,7 +24,7 @@ from ..scenes import INSIDE, ROOM, context_of, index_of, local, maze, pose, same
 def accepted(index: MapIndex, scan: Scan, **options: Any) -> tuple[Accepted, MapIndex]:
     """Return the consensus set of a search, and the index that was searched."""
     context = context_of(index, scan, **options)
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     return accept(context, answer.best), context.index
 
@@ -34,7 +34,7 @@ def test_the_pieces_that_scan_segments_lie_on() -> None:
     index, at = in_pieces(np.random.default_rng(1)), pose(15.0, 14.0, 0.5)
     scan = scan_of(seen(maze(1), at, noise=0.02, cut=0.4, clutter=4, radius=9.0)[0])
     context = context_of(index, scan)
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     best, ends = answer.best, scan.measured.segments.endpoints
     lines = Lines(context.lines.rows, context.lines.row_of, 0.5)

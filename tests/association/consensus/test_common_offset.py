@@ -10,7 +10,7 @@ import pytest
 from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, associate
 from association.consensus.common_offset import CommonOffset, fit_common_offset
 from association.context import SearchContext
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from registration import RigidTransform, Segments
 
 from ...map_quality.check.drawn import faces, sampled
@@ -26,7 +26,7 @@ def index_with(distance: float, sigma: float | None = SIGMA, *, oriented: bool =
 
 def fitted(index: MapIndex, scan: Scan, *, oriented: bool = True) -> CommonOffset | None:
     context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented), Deadline())
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     return fit_common_offset(context, answer.best, answer.estimated.wall_sigma)
 

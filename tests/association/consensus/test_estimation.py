@@ -10,7 +10,7 @@ import pytest
 from association import MapIndex
 from association.consensus.estimation import EstimatedPose
 from association.consensus.tuning import LEAST_KNOWN_VARIANCE
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 
@@ -20,7 +20,7 @@ PLACE = pose(15.0, 14.0, 0.5)
 
 
 def estimated(index: MapIndex, ends: Floats) -> EstimatedPose:
-    answer = search_and_explain(context_of(index, scan_of(ends))).answer
+    answer = search_and_rank(context_of(index, scan_of(ends))).answer
     assert answer is not None
     return answer.estimated
 

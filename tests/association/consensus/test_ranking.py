@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Prior, SoftPrior, associate
-from association import explain as explaining
+from association import rank_and_estimate as stage
 from association.consensus import beams as single_beams
 from association.consensus import ranking
 from association.consensus.beams import beam_evidence_at
@@ -27,8 +27,8 @@ from association.consensus.tuning import (
     MOST_BEAMS,
 )
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.layout import ESTIMATE, FOUND, record
+from association.rank_and_estimate import search_and_rank
 from association.search.candidates import find_candidates
 from association.tables import Place, Rays
 from association.tuning import FEW_KEPT
@@ -299,15 +299,15 @@ def test_no_rays_are_followed_through_a_crowd_when_the_deadline_has_passed() -> 
 
 def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     context = replace(context_of(index_of(equal_rooms(3)), ROOM_SCAN), deadline=Deadline(at=time.monotonic() + 1e3))
-    assert search_and_explain(context).search.complete
+    assert search_and_rank(context).search.complete
     # It passes after the last base and before the first pose is ranked: there is an answer all the same.
     candidates = find_candidates(context)
     late = replace(context, deadline=Deadline(at=0.0))
     assert candidates.report.complete
     assert len(rank_candidates(late, candidates.poses)) == len(rank_candidates(context, candidates.poses)) > 0
-    monkeypatch.setattr(explaining, "find_candidates", lambda context, effort: candidates)
-    assert search_and_explain(context).search.complete
-    assert not search_and_explain(late).search.complete
+    monkeypatch.setattr(stage, "find_candidates", lambda context, effort: candidates)
+    assert search_and_rank(context).search.complete
+    assert not search_and_rank(late).search.complete
 
 
 @pytest.mark.parametrize("beams", [True, False])

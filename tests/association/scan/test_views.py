@@ -11,8 +11,8 @@ import pytest
 from association import Deadline, InvalidSearchError, Scan, Status, View, assemble, mirrored
 from association.consensus.tuning import ROUGH_FRACTION, SPRING
 from association.consensus.view_estimation import SeenOnWalls
-from association.explain import search_and_explain
 from association.layout import SIGHTING, WALL
+from association.rank_and_estimate import search_and_rank
 from association.scan.alignment import aligned
 from association.scan.scan import Views, scaled
 from association.scan.scan_lines import parts_of
@@ -233,7 +233,7 @@ def test_walls_are_as_far_off_as_one_view_shows_them_to_be() -> None:
     ends = seen(off, INSIDE, noise=0.005, seed=3)[0]
     exact = [View(scan_of(ends[:4])), View(scan_of(ends[4:]))]
     nearly = [exact[0], replace(exact[1], covariance=1e-12 * np.eye(3))]
-    one, other = (search_and_explain(context_of(INDEX, assemble(views))).answer for views in (exact, nearly))
+    one, other = (search_and_rank(context_of(INDEX, assemble(views))).answer for views in (exact, nearly))
     assert one is not None
     assert other is not None
     assert one.estimated.views is None
@@ -262,7 +262,7 @@ def test_the_errors_of_views_are_found_beside_the_pose() -> None:
     assert result.status is Status.OK
     assert same_pose(pose_in(result), INSIDE, 0.02, 0.004)
     assert max(abs(pair.offset) for pair in result.correspondences) < 0.03
-    answer = search_and_explain(context_of(INDEX, scan)).answer
+    answer = search_and_rank(context_of(INDEX, scan)).answer
     assert answer is not None
     assert answer.estimated.views is not None
     views = corrected(aligned(scan, Deadline()), answer.estimated.views.found, answer.estimated.views.spread).views
@@ -304,14 +304,14 @@ def test_a_drive_whose_last_view_does_not_fit_is_not_gone_by() -> None:
         return assemble(views)
 
     def shown(turned: float) -> float:
-        answer = search_and_explain(context_of(INDEX, drive(turned))).answer
+        answer = search_and_rank(context_of(INDEX, drive(turned))).answer
         assert answer is not None
         return answer.beams.in_step
 
     assert shown(0.0) == pytest.approx(1.0, abs=0.05)
     assert shown(0.12) < LEAST_IN_STEP
     context = context_of(INDEX, drive(0.0))
-    explained = search_and_explain(context)
+    explained = search_and_rank(context)
     assert judge(context, explained).usable
     answer = explained.answer
     assert answer is not None
@@ -333,7 +333,7 @@ def test_what_is_on_no_wall_counts_by_view_of_a_drive(
         scan = scan_of(np.vstack([ends, thing]), viewpoint=(0.0, 0.0))
         views.append(View(scan, at, covariance if k else None, k - 1 if k else None))
     context = context_of(INDEX, assemble(views))
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     features = features_of(context, answer)
     assert features.longest_unmatched == pytest.approx(longest, abs=0.01)

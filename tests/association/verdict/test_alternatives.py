@@ -12,8 +12,8 @@ from association import AssociationResult
 from association.consensus.consensus_set import ConsensusSet
 from association.consensus.tuning import BEAMS_READ
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.explanations import Answer
+from association.rank_and_estimate import search_and_rank
 from association.verdict.alternatives import (
     compare_alternatives,
     probability_among,
@@ -34,7 +34,7 @@ def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Ans
     errors = np.random.default_rng(seed).normal(0.0, 0.05, len(rooms))
     walls = rooms.endpoints + np.tile(errors[:, None] * rooms.normals, 2)
     context = context_of(index_of(walls, sigma), SCAN)
-    found = search_and_explain(context)
+    found = search_and_rank(context)
     assert found.answer is not None
     return context, found.answer, tuple(found.alternatives)
 

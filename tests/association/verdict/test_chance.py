@@ -11,8 +11,8 @@ from hypothesis import given, settings
 
 from association import Beams, HardPrior, Scan
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.explanations import Answer
+from association.rank_and_estimate import search_and_rank
 from association.report import report
 from association.scan.scan import mirrored
 from association.verdict.chance import NullScore, find_null_score
@@ -94,7 +94,7 @@ def test_a_mirrored_scan_is_what_is_seen_in_a_mirrored_building(with_beams: bool
 
 def best_of(walls: Floats, ends: Floats, prior: HardPrior | None = None) -> tuple[SearchContext, Answer]:
     context = context_of(index_of(walls), scan_of(ends), prior)
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     return context, answer
 
@@ -146,7 +146,7 @@ def test_the_null_is_the_same_each_time_and_leaves_the_search_as_it_was(sampling
 
     def told(prior: HardPrior | None, nulls: int) -> tuple[str, list[NullScore]]:
         context = context_of(index, scan, prior, sampling=sampling, seed=3)
-        explanations = search_and_explain(context)
+        explanations = search_and_rank(context)
         assert explanations.answer is not None
         found = [find_null_score(context, explanations.answer.best) for _ in range(nulls)]
         return repr(report(context, explanations, judge(context, explanations))), found

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from association import Scan
-from association.explain import explain_at
+from association.rank_and_estimate import estimate_at
 from association.verdict.inconsistencies import displaced_walls
 from registration import RigidTransform
 
@@ -32,7 +32,7 @@ def with_walls_off(by: float, turned: float = 0.0) -> Scan:
 
 def fraction(scan: Scan) -> float:
     context = context_of(index_of(ROOM), scan)
-    answer = explain_at(context, INSIDE).answer
+    answer = estimate_at(context, INSIDE).answer
     assert answer is not None
     return displaced_walls(context, answer.best)
 

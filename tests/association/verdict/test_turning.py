@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association import MapIndex, Scan, associate
-from association.explain import explain_at
+from association.rank_and_estimate import estimate_at
 from association.verdict.inconsistencies import turn_during_scan
 from registration import RigidTransform, Segments
 from simulation import Scanner
@@ -35,7 +35,7 @@ def sent(turn: float) -> Scan:
 
 def turned(scan: Scan) -> float:
     context = context_of(index_of(ROOM), scan)
-    answer = explain_at(context, INSIDE).answer
+    answer = estimate_at(context, INSIDE).answer
     assert answer is not None
     return turn_during_scan(context, answer.best)
 
@@ -55,7 +55,7 @@ def test_rounding_is_no_turn() -> None:
         here = RigidTransform(INSIDE.x, INSIDE.y, math.radians(degrees))
         index = index_of(ROOM)
         context = context_of(index, scan_of(seen(ROOM, here)[0], viewpoint=(0.0, 0.0), beams=beams_of(index, here)))
-        answer = explain_at(context, here).answer
+        answer = estimate_at(context, here).answer
         assert answer is not None
         assert turn_during_scan(context, answer.best) == 0.0
 
@@ -79,6 +79,6 @@ def test_a_pose_far_from_the_map_frame_changes_nothing() -> None:
     by = RigidTransform(3.0, -2.0, 2.9)
     walls = by.apply(ROOM.reshape(-1, 2, 2)).reshape(-1, 4)
     context = context_of(index_of(walls), sent(math.radians(6.0)))
-    answer = explain_at(context, by.compose(INSIDE)).answer
+    answer = estimate_at(context, by.compose(INSIDE)).answer
     assert answer is not None
     assert math.degrees(turn_during_scan(context, answer.best)) == pytest.approx(6.0, rel=0.25)

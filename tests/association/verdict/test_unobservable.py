@@ -10,7 +10,7 @@ import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
 from association.consensus.estimation import EstimatedPose
-from association.explain import search_and_explain
+from association.rank_and_estimate import search_and_rank
 from association.verdict.tuning import MOST_BEYOND
 from association.verdict.unobservable import beyond_tolerance, choose_along_direction
 from association.verdict.verdict import judge
@@ -33,7 +33,7 @@ def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, deg
 
 def estimated_on(walls: Floats, seen_walls: Floats) -> EstimatedPose:
     """Search, and return the answer worked out."""
-    answer = search_and_explain(context_of(index_of(walls), scan_of(seen_walls))).answer
+    answer = search_and_rank(context_of(index_of(walls), scan_of(seen_walls))).answer
     assert answer is not None
     return answer.estimated
 
@@ -68,7 +68,7 @@ def test_two_walls_that_are_nearly_parallel_fix_no_position(degrees: float, dege
 def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | None = None) -> RigidTransform:
     """Search, and return the member of the family that is answered."""
     context = context_of(index, scan_of(endpoints), prior)
-    answer = search_and_explain(context).answer
+    answer = search_and_rank(context).answer
     assert answer is not None
     assert answer.estimated.degenerate
     found = choose_along_direction(context, answer)

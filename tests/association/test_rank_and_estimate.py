@@ -8,7 +8,7 @@ import pytest
 from association import Deadline, HardPrior
 from association.consensus.estimation import estimate_poses
 from association.consensus.sight import agreement
-from association.explain import explain_at, search_and_explain
+from association.rank_and_estimate import estimate_at, search_and_rank
 from association.verdict.chance import significance
 
 from .answers import ROOM_INDEX, SCAN, answer_with, explanations_of, ranked
@@ -30,7 +30,7 @@ def test_alternatives_lie_within_the_window_and_others_anywhere() -> None:
 def test_the_answer_is_the_best_within_the_window() -> None:
     index = index_of(equal_rooms(2))
     context = context_of(index, SCAN, HardPrior(pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta), 0.5, 0.3))
-    explanations = search_and_explain(context)
+    explanations = search_and_rank(context)
     assert explanations.answer is not None
     assert explanations.answer.best is explanations.ranked[0]
     assert context.in_map(explanations.answer.best.pose).x == pytest.approx(INSIDE.x + 12.0)
@@ -41,7 +41,7 @@ def test_the_answer_is_the_best_within_the_window() -> None:
 
 def test_nothing_within_the_window_is_no_answer() -> None:
     """Poses outside of the prior are reported."""
-    explanations = search_and_explain(context_of(ROOM_INDEX, SCAN, HardPrior(pose(-30.0, 0.0), 0.5, 0.3)))
+    explanations = search_and_rank(context_of(ROOM_INDEX, SCAN, HardPrior(pose(-30.0, 0.0), 0.5, 0.3)))
     assert explanations.answer is None
     assert len(explanations.ranked) > 0
     assert not any(one.inside for one in explanations.ranked)
@@ -50,7 +50,7 @@ def test_nothing_within_the_window_is_no_answer() -> None:
 def test_what_is_worked_out_of_the_answer() -> None:
     """Significance is that of the score of the matches alone, not for what lines of sight speak against them."""
     context = context_of(index_of(np.vstack([ROOM, [[4.5, 0.5, 4.5, 3.5]]])), SCAN)
-    explanations = search_and_explain(context)
+    explanations = search_and_rank(context)
     answer = explanations.answer
     assert answer is not None
     score = float(answer.best.matches["score"].sum())
@@ -71,15 +71,15 @@ def test_what_is_worked_out_of_the_answer() -> None:
 
 
 def test_the_report_of_the_search_is_handed_on() -> None:
-    assert not search_and_explain(context_of(ROOM_INDEX, SCAN, deadline=Deadline(at=0.0))).search.complete
-    assert search_and_explain(context_of(ROOM_INDEX, scan_of(np.zeros((0, 4))), seed=9)).search.seed == 9
+    assert not search_and_rank(context_of(ROOM_INDEX, SCAN, deadline=Deadline(at=0.0))).search.complete
+    assert search_and_rank(context_of(ROOM_INDEX, scan_of(np.zeros((0, 4))), seed=9)).search.seed == 9
 
 
 def test_a_pose_that_is_given_is_explained_as_one_that_was_found() -> None:
     context = context_of(index_of(ROOM + 50.0), SCAN)
     found, given = (
-        search_and_explain(context).answer,
-        explain_at(context, pose(INSIDE.x + 50.0, INSIDE.y + 50.0, INSIDE.theta)),
+        search_and_rank(context).answer,
+        estimate_at(context, pose(INSIDE.x + 50.0, INSIDE.y + 50.0, INSIDE.theta)),
     )
     assert found is not None
     assert given.answer is not None

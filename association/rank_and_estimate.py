@@ -23,19 +23,19 @@ from .verdict.chance import significance
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
 
-def search_and_explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
-    """Search a scan and explain it by the poses found; by default with the effort that the context calls for.
+def search_and_rank(context: SearchContext, effort: Effort | None = None) -> Explanations:
+    """Search a scan, and rank the poses found; by default with the effort that the context calls for.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    return explain(context, find_candidates(context, effort))
+    return rank_and_estimate(context, find_candidates(context, effort))
 
 
-def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:
-    """Explain the scan from a pose in the map, m and radians, as if a search had found that alone.
+def estimate_at(context: SearchContext, pose: RigidTransform) -> Explanations:
+    """Rank and estimate a pose in the map, m and radians, as if a search had found that alone.
 
     Raises
     ------
@@ -43,10 +43,12 @@ def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:
         When the deadline was cancelled.
     """
     x, y = context.index.origin
-    return explain(context, Candidates(record(FOUND, x=pose.x - x, y=pose.y - y, theta=pose.theta), NOT_SEARCHED))
+    return rank_and_estimate(
+        context, Candidates(record(FOUND, x=pose.x - x, y=pose.y - y, theta=pose.theta), NOT_SEARCHED)
+    )
 
 
-def explain(context: SearchContext, candidates: Candidates) -> Explanations:
+def rank_and_estimate(context: SearchContext, candidates: Candidates) -> Explanations:
     """Rank the poses of a search as consensus sets, and estimate the pose of the best one.
 
     Raises
