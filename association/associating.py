@@ -99,7 +99,7 @@ def associate(
 
 
 def run_stages(context: SearchContext, began: float) -> Stages:
-    """Search, rank, estimate and judge as `associate` describes; `began` is when that started, `time.monotonic()` seconds.
+    """Search, rank, estimate and judge as `associate` describes; `began` is its start, `time.monotonic()` seconds.
 
     Raises
     ------

@@ -20,12 +20,11 @@ from .scan.scan import Scan
 from .verdict.features import Description, Features
 from .verdict.models import USUAL, Model
 from .verdict.probabilities import Probabilities
-from .verdict.reasons import FEATURES_OF, taken_by_reason
+from .verdict.reasons import taken_by_reason
+from .verdict.roles import ROLES
 from .verdict.tuning import ALTERNATIVE_TEMPERATURE, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
 from .verdict.verdict import Verdict
 from .verdict.vetoes import VETOES, Origin
-
-REASON_OF: Mapping[str, ReasonCode] = {name: code for code, names in FEATURES_OF.items() for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,7 +283,9 @@ def _with_numbers(
 def _evaluated(model: Model, features: Features, probability: float) -> ExplainedModel:
     terms, usual = model.terms(features), model.terms(USUAL)
     contributions = tuple(
-        Contribution(name, features._asdict().get(name), nats, usual[name], REASON_OF.get(name))
+        Contribution(
+            name, features._asdict().get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None
+        )
         for name, nats in terms.items()
     )
     return ExplainedModel(probability, sum(terms.values()), contributions)

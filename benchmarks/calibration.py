@@ -27,6 +27,7 @@ import numpy as np
 
 from association.verdict.features import Features
 from association.verdict.models import MODELS, USUAL, Model
+from association.verdict.roles import ROLES
 from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
 
 from .curves import Fitted, Task, fit, log_loss
@@ -46,7 +47,7 @@ KEPT = ("clean", "clutter_33", "clutter_66", "changed", "scaled_1", "walls_5cm",
 """Conditions of drawn worlds that are shown by themselves: of out-of-map scans, and of scans in the map."""
 
 
-BEAMS = ("read", "passed", "root_farther", "root_nearer")
+BEAMS = tuple(name for name, role in ROLES.items() if role.needs_beams)
 # Chosen one after the other by what each takes off the cross-validated log-loss, until none takes off 0.0002 more.
 LIKELY = (
     "constant", "deviation", "lead", "blocked", "agreement", "root_length", "inverse_count", "longest_unmatched",

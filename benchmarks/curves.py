@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from association.verdict.models import Curve, Model, Pair
+from association.verdict.roles import AGAINST, FOR, ROLES
 
 from .examples import DRAWN, DRAWN_STRANGERS, Example
 
@@ -28,22 +29,6 @@ LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
 # A scan of a real plan or log counts as that many of drawn buildings, of which there are as many as one cares to draw.
 REAL = 3.0
-FOR = ("lead", "solitude", "inlier_fraction", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
-AGAINST = (
-    "inverse_count", "longest_unmatched", "passed", "root_nearer", "log_significance", "null", "null_better", "blocked",
-    "root_unmatched",
-)  # fmt: skip
-# These say as much of how far the walls are off as of the place: a rough map is no sign of being elsewhere. And
-# what is matched in all goes, next to the share that is, with what is not.
-EITHER = (
-    "deviation",
-    "misfit",
-    "misfit_of_many",
-    "critical_displacement",
-    "critical_deviation",
-    "root_farther",
-    "root_length",
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +124,8 @@ def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
         values = np.array([getattr(e.features, name) for e in examples])
         bends[name] = knots(values, task.bends)
         columns.append(pieces(values, bends[name]))
-        bounds += [(-np.inf if name not in FOR else 0.0, np.inf if name not in AGAINST else 0.0)] * (
-            len(bends[name]) + 1
-        )
+        sign = ROLES[name].sign
+        bounds += [(0.0 if sign == FOR else -np.inf, 0.0 if sign == AGAINST else np.inf)] * (len(bends[name]) + 1)
     pairs = [_pair(examples, kind, one, other) for kind, one, other in task.pairs]
     for pair in pairs:
         alone = Model({}, (pair,))

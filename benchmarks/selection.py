@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from association.verdict.features import Features
+from association.verdict.roles import FEATURES_OF
 from association.verdict.tuning import ALTERNATIVE_TEMPERATURE
 
 from .calibration import BEAMS, TASKS, cross_validated, told_loss
@@ -22,7 +23,7 @@ from .curves import Task
 from .examples import SEGMENTS, Example, cases, collected
 
 LEAST = 0.0002  # by which a feature has to lower the loss
-OF_THE_NULL = ("null", "null_gap", "null_better")  # known only of answers that would be usable
+OF_THE_NULL = FEATURES_OF["not_on_map"]  # known only of answers that would be usable
 
 
 def candidates(form: str, task: Task) -> list[str]:

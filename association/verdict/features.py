@@ -1,7 +1,7 @@
 """The features that the verdict's probabilities depend on.
 
-A new feature is a field of `Features` with its meaning, and its computation in `kernels.features.describe`. Give it a
-reason in `reasons.FEATURES_OF`, name it in the lists of ``benchmarks.calibration``, and fit the models again.
+A new feature is a field of `Features` with its meaning, its computation in `kernels.features.describe`, and its row in
+`roles.ROLES`. Name it in the lists of ``benchmarks.calibration``, and fit the models again.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from registration.values import value
 from ..result import Reason, ReasonCode, Status
 from .features import Features
 from .models import USUAL, Model
+from .roles import FEATURES_OF
 from .tuning import NO_ALTERNATIVE, TELLING_REASON
 from .vetoes import Veto
 
@@ -59,18 +60,6 @@ ORDER: tuple[ReasonCode, ...] = (
     "prior_contradicted", "search_incomplete", "not_on_map", "unobservable_direction", "insufficient_evidence",
     "single_wall", "map_mismatch", "similar_place",
 )  # fmt: skip
-
-# The features of each reason. The decrease of a usual right answer's odds by a feature is attributed to its reason.
-FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
-    "similar_place": ("lead", "solitude", "squared_solitude"),
-    "single_wall": ("critical_displacement", "critical_deviation", "deviation"),
-    "map_mismatch": (
-        "inlier_fraction", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
-        "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
-    ),
-    "insufficient_evidence": ("root_count", "inverse_count", "root_length", "log_significance", "root_score", "walls"),
-    "not_on_map": ("null", "null_gap", "null_better"),
-}  # fmt: skip
 
 
 def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from association.verdict.models import MODELS, USUAL, Curve
-from benchmarks.curves import AGAINST, EITHER, FOR, Task, fit, knots, log_loss, pieces
+from association.verdict.roles import AGAINST, EITHER, FOR, ROLES
+from benchmarks.curves import Task, fit, knots, log_loss, pieces
 from benchmarks.examples import DRAWN_STRANGERS, SEGMENTS, Example
 
 NONE = np.zeros(0)
@@ -105,22 +106,17 @@ def test_no_bend_has_next_to_nothing_beside_it() -> None:
     assert knots(np.array([0.0] * 99 + [1.0]), (0.2, 0.5, 0.8, 0.99)) == ()
 
 
-def test_what_every_feature_that_is_fitted_speaks_for_is_said() -> None:
-    assert not set(FOR) & set(AGAINST) | set(EITHER) & {*FOR, *AGAINST}
-    fitted = {name for model in MODELS.values() for name in model.curves}
-    assert fitted <= {"constant", *FOR, *AGAINST, *EITHER}
-
-
 @pytest.mark.parametrize("name", ["cautious", "cautious_with_beams"])
 def test_the_models_in_use_never_go_the_wrong_way(name: str) -> None:
     for feature, curve in MODELS[name].curves.items():
-        if feature in (*FOR, *AGAINST):
-            sign = 1.0 if feature in FOR else -1.0
-            assert min(sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), feature
+        if feature != "constant" and ROLES[feature].sign != EITHER:
+            assert min(ROLES[feature].sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), (
+                feature
+            )
     for pair in MODELS[name].pairs:
         assert pair.nats >= 0.0
         for feature, (start, end) in zip((pair.first, pair.second), pair.from_to, strict=True):
-            assert (end > start) == (feature in FOR) or feature in EITHER
+            assert ROLES[feature].sign in (EITHER, FOR if end > start else AGAINST)
 
 
 def test_log_loss_counts_strangers_by_their_weight() -> None:

@@ -11,7 +11,8 @@ from association import AssociationResult, Deadline, HardPrior, Status, associat
 from association.verdict import reasons
 from association.verdict.features import Features
 from association.verdict.models import USUAL, as_model
-from association.verdict.reasons import FEATURES_OF, REASON_MESSAGES, Doubts, reasons_of
+from association.verdict.reasons import REASON_MESSAGES, Doubts, reasons_of
+from association.verdict.roles import FEATURES_OF, ROLES
 from association.verdict.tuning import NO_ALTERNATIVE, TELLING_REASON
 from association.verdict.vetoes import Findings, applied, counted
 
@@ -77,10 +78,8 @@ def test_the_weightiest_comes_first_and_what_weighs_little_is_not_told() -> None
 
 
 def test_several_features_of_a_reason_count_together() -> None:
-    """Each of the fitted features that is laid to a reason, and no feature is laid to two."""
-    names = [name for some in FEATURES_OF.values() for name in some]
-    assert len(set(names)) == len(names)
-    assert set(names) == set(Features._fields) - {"constant"}
+    """Each of the features has a role."""
+    assert set(ROLES) == set(Features._fields) - {"constant"}
     model = as_model({"lead": [-1.0], "solitude": [-1.0], "inlier_fraction": [-1.0]})
     features = USUAL_ONE._replace(lead=0.8, solitude=0.8, inlier_fraction=1.2)
     told = reasons_of(Doubts(Status.AMBIGUOUS), features, model)
