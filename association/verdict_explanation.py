@@ -281,11 +281,9 @@ def _with_numbers(
 
 
 def _evaluated(model: Model, features: Features, probability: float) -> ExplainedModel:
-    terms, usual = model.terms(features), model.terms(USUAL)
+    terms, usual, values = model.terms(features), model.terms(USUAL), features._asdict()
     contributions = tuple(
-        Contribution(
-            name, features._asdict().get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None
-        )
+        Contribution(name, values.get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None)
         for name, nats in terms.items()
     )
     return ExplainedModel(probability, sum(terms.values()), contributions)

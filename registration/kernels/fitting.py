@@ -64,7 +64,7 @@ def fit(
     reference = wahba_angle(local, used)
     sums = joint_sums_compensated(centred, used)
     theta, moves = transform(local, sums, used, reference, how[0], (map_x, map_y, scan_x, scan_y), out)
-    find_free(centred, sums, used, noise, theta, how[0].parallel, out)
+    find_free(centred, sums, noise, theta, how[0].parallel, out)
     pose = out.pose
     between = out.between
     if moves and (out.free == FREE or out.free == PARALLEL):
@@ -161,9 +161,7 @@ def paper_transform(local: Records, used: Floats, reference: float, wahba: bool,
 
 
 @kernel
-def find_free(
-    centred: Records, sums: Records, used: Floats, noise: Floats, theta: float, parallel: float, out: Record
-) -> None:
+def find_free(centred: Records, sums: Records, noise: Floats, theta: float, parallel: float, out: Record) -> None:
     """Write what the pairs leave free; `parallel` is the chi-square of their angles up to which lines are parallel.
 
     That is a question of noise, and not of how a caller weighs.

@@ -109,10 +109,9 @@ def test_no_bend_has_next_to_nothing_beside_it() -> None:
 @pytest.mark.parametrize("name", ["cautious", "cautious_with_beams"])
 def test_the_models_in_use_never_go_the_wrong_way(name: str) -> None:
     for feature, curve in MODELS[name].curves.items():
-        if feature != "constant" and ROLES[feature].sign != EITHER:
-            assert min(ROLES[feature].sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), (
-                feature
-            )
+        sign = EITHER if feature == "constant" else ROLES[feature].sign
+        if sign != EITHER:
+            assert min(sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), feature
     for pair in MODELS[name].pairs:
         assert pair.nats >= 0.0
         for feature, (start, end) in zip((pair.first, pair.second), pair.from_to, strict=True):

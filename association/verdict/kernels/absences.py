@@ -1,4 +1,4 @@
-"""Weigh what a scan does not show at an alternative; see `association.verdict.absences`."""
+"""Weigh what a scan does not show at an alternative; see `association.verdict.inconsistencies`."""
 
 import math
 
