@@ -1,4 +1,4 @@
-"""What the sums of both estimators have in common: they are added and subtracted without a loss of precision."""
+"""Sums over pairs that are added and subtracted without a loss of precision: the base of both estimators' sums."""
 
 from __future__ import annotations
 
