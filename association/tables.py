@@ -319,13 +319,11 @@ class KnownWalls(NamedTuple):
     ties : (m,) as of `Place`
     variance : float
         Of a wall's own error, m^2; negative where nothing is known of it.
-    parallel : (k,) the chi-square of the angles of n matches up to which they are parallel, by n, for all that may be
     """
 
     walls: Records
     ties: Floats
     variance: float
-    parallel: Floats
 
 
 class Blockers(NamedTuple):
