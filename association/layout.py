@@ -73,8 +73,8 @@ ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
-# matched segments; its fraction of the scan's; the paper's reliability, Eq. (28), and the one up to which errors of
-# angles explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of lines of sight, nats;
+# matched segments; its fraction of the scan's; its reliability, Eq. (28), by the information of its angles, and
+# the one up to which their errors explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of lines of sight, nats;
 # the fractions of the beams that read the wall they should, and that passed through one, 0 without beams; how many rows
 # are matched.
 SET_SCORE = fields(
@@ -203,12 +203,12 @@ BEND = fields((_F, "start more"))
 # the value from which it speaks for the answer, and that at which it does in full.
 TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
-# What the errors of angles add to the sums of pairs, for each the inverse of its spread, and the squares of these
-# (1/m^2, 1/m^4): see `consensus.kernels.reliability`.
-ANGLE_NOISE = fields((_F, "total squares"))
+# The sums of the outer products of the normals of pairs, weighted by the information of their angles, 1/rad^2: see
+# `consensus.kernels.reliability`.
+ANGLE_SUMS = fields((_F, "xx xy yy"))
 
 # Records that kernels write to while they look at one pose: the pose; the information of its consensus set; its sums,
-# without the walls' errors and with them; the noise of its angles; a line; other evidence
+# without the walls' errors and with them; the sums of its angles; a line; other evidence
 # of the error of walls that are tied; the terms of its score; the end of a beam; a ray; the evidence of the beams; the
 # geometry of a base. A record that a kernel takes from an array of its own would outlive the array, whose last use ends
 # it: hence these come from outside.
@@ -218,7 +218,7 @@ SCRATCH = np.dtype(
         ("information", SYMMETRIC3),
         ("sums", JOINT_SUMS),
         ("plain", JOINT_SUMS),
-        ("angle_noise", ANGLE_NOISE),
+        ("angles", ANGLE_SUMS),
         ("line", WALL),
         ("common", WALL_SUMS),
         ("terms", SCORE_TERMS),

@@ -40,7 +40,7 @@ class ConsensusSet:
     fraction : float
         Of the scan's length that is matched, 0 to 1.
     reliability : float
-        Eq. (28).
+        Eq. (28), by the information of the angles.
     least_reliability : float
         The reliability that parallel walls show by the errors of the angles: see `fixes_pose`.
     misfit : float

@@ -22,7 +22,6 @@ ROUNDS = 3  # tables; of matching and solving
 MAX_STEP = 1.0  # m, tables; a consensus set that moves its pose farther than that, or
 MAX_TURN = 0.2  # rad, tables; is not the one that the pose was proposed for
 SAME_SHIFT = 1e-6  # m, rounding
-LEAST_SPREAD = 1e-4  # m^2, rounding; of a segment of 3 cm, which has no angle
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
 START_VARIANCE = 1e-4  # m^2, tables; of a pose that comes without a covariance
 START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
@@ -51,7 +50,6 @@ LEAST_WALL_ERROR = 0.003  # m, tables
 ROUGH_FRACTION = 0.1  # of a wall's variance, tables; the part that differs along it
 ESTIMATION_ROUNDS = 4  # tables
 FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
-PARALLEL_QUANTILE = 2.782  # definition; what a normal variate exceeds as seldom as +-3 deviations
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------

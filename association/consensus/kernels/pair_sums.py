@@ -9,7 +9,8 @@ from registration.kernels import joint_add
 from registration.layout import Record, Records
 
 from ...tables import Workspace
-from ..tuning import LEAST_SPREAD, SAME_SHIFT
+from ..tuning import SAME_SHIFT
+from .reliability import add_angle, clear_angles
 
 
 @kernel
@@ -80,9 +81,7 @@ def update_pair(work: Workspace, wall: Record, seen: Record, i: int, w: int, sig
     line.offset = wall.offset + work.shifts_held[i]
     weight = work.weights_held[i]
     joint_add(scratch.plain, line, seen, weight, sign)
-    of_angle = 1.0 / max(seen.spread, LEAST_SPREAD)
-    scratch.angle_noise.total += sign * of_angle
-    scratch.angle_noise.squares += sign * of_angle * of_angle
+    add_angle(scratch.angles, line, sign * weight * seen.spread)
     own_sums = work.wall_sums[w]
     own_sums.count += sign
     if own_sums.count <= 0.0:
@@ -125,8 +124,7 @@ def empty_sums(work: Workspace) -> None:
     held = work.held
     wall_sums = work.wall_sums
     clear_sums(work.scratch[0].plain)
-    work.scratch[0].angle_noise.total = 0.0
-    work.scratch[0].angle_noise.squares = 0.0
+    clear_angles(work.scratch[0].angles)
     for i in range(len(held)):
         if held[i] >= 0:
             clear_wall(wall_sums[held[i]])

@@ -69,7 +69,7 @@ def estimate_pose(
     find_weakest_direction(scan, known_walls, matches, out, work)
     sum_pairs(scan, matches, known_walls, out.wall_variance, work)
     solve_pose(sums, pose, information, terms)
-    out.parallel = not fixes_pose(work.scratch[0].plain, work.scratch[0].angle_noise)
+    out.parallel = not fixes_pose(work)
     return of_wall
 
 

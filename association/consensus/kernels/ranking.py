@@ -63,7 +63,7 @@ def score_candidates(
         start_at(one)
         match_scan(scan, one, place, terms.gates, work.possible, 0.0, matches[k])
         out.score = refine(scan, one, place, terms, matches[k], work, 0.0)
-        measure_sums(work.scratch[0], one, out)
+        measure_sums(work, one, out)
         measure_matches(scan, matches[k], out)
         out.blocked = 0.0
         # The candidates come best first: a candidate far behind is no alternative, its score may stay too good.
@@ -86,12 +86,13 @@ def start_at(estimate: Record) -> None:
 
 
 @kernel
-def measure_sums(scratch: Record, estimate: Record, out: Record) -> None:
+def measure_sums(work: Workspace, estimate: Record, out: Record) -> None:
     """Write the chi-square of a refined set, that at the paper's estimate, and the reliability, Eq. (28)."""
+    scratch = work.scratch[0]
     out.chi_square = scratch.terms.chi_square if out.score > 0.0 else 0.0
     out.one_step_chi_square = one_step_chi_square(scratch.sums, estimate) if out.score > 0.0 else 0.0
-    out.reliability = reliability_of(scratch.plain)
-    out.least_reliability = least_reliability(scratch.plain, scratch.angle_noise)
+    out.reliability = reliability_of(scratch.angles)
+    out.least_reliability = least_reliability(scratch.angles, work.parallel[int(scratch.plain.count)])
 
 
 @kernel

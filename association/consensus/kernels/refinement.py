@@ -85,7 +85,7 @@ def solve_set(estimate: Record, work: Workspace) -> bool:
     x = estimate.x
     y = estimate.y
     moved = solve_pose(scratch.sums, estimate, scratch.information, scratch.terms)
-    if scratch.terms.chi_square < math.inf and not fixes_pose(scratch.plain, scratch.angle_noise):
+    if scratch.terms.chi_square < math.inf and not fixes_pose(work):
         hold_along_walls(scratch.sums, x, y, estimate, scratch.terms)
     return moved
 

@@ -1,13 +1,13 @@
 """Decide from the sums of a consensus set whether it fixes a pose, by the paper's reliability.
 
-The position of a set is fixed by ``A = sum w n n'`` over its pairs, with the normal n and the weight w of each. Its
-eigenvalues are ``W (1 +- sqrt(1 - R^2)) / 2``, with ``W = trace A`` and the paper's reliability R, Eq. (28). Walls that
-are parallel leave the smaller eigenvalue, and R, at 0. Measured angles have errors, so that parallel walls show a
-small one: each pair adds ``w v``, with the variance ``v = 1 / (w s)`` of its angle and the spread s of its points. That
-is ``1 / s``. The sums of these and of their squares, N and M, change in constant time when a pair comes or goes, as all
-sums do. By them the smaller eigenvalue of n parallel walls is about a chi-square, after Satterthwaite: its mean is
-``N (1 - 1 / n)``, with ``N^2 / M - 1`` degrees of freedom. Where it is not above what noise exceeds as seldom as three
-standard deviations, the set is parallel up to noise.
+With ``A = sum a n n'`` over the pairs, the normal n of each wall and a weight a, ``W = trace A`` and ``D = det A``, the
+paper's reliability is ``R = 2 sqrt(D) / W``, Eq. (28). The smaller eigenvalue of A is ``W (1 - sqrt(1 - R^2)) / 2``. It is
+0 where all walls are parallel. Measured angles have errors. With the information of each pair's angle as its weight,
+``a = w s``, with the weight w of the pair and the spread s of its points, the smaller eigenvalue is ``sum a sin^2`` of
+the angles to their common direction. Of parallel walls that is a chi-square with n - 1 degrees of freedom. Where noise
+explains it, by three standard deviations, the set is a family of poses along its walls, and fixes none of them.
+
+A changes in constant time when a pair comes or goes, as all sums do.
 """
 
 import math
@@ -16,45 +16,51 @@ from compiled import kernel
 from registration.kernels import joint_cost
 from registration.layout import Record
 
-from ..tuning import FREE_DEVIATION, PARALLEL_QUANTILE
+from ...tables import Workspace
+from ..tuning import FREE_DEVIATION
 
 
 @kernel
-def reliability_of(sums: Record) -> float:
-    """Return the paper's reliability of a set, Eq. (28): 0 for parallel walls, 1 for walls that fix all directions."""
-    det = sums.xx * sums.yy - sums.xy * sums.xy
-    weight = sums.xx + sums.yy
+def add_angle(angles: Record, line: Record, information: float) -> None:
+    """Add to the sums of angles a pair on a line of the map, with the information of its angle, 1/rad^2."""
+    angles.xx += information * line.dy * line.dy
+    angles.xy -= information * line.dx * line.dy
+    angles.yy += information * line.dx * line.dx
+
+
+@kernel
+def clear_angles(angles: Record) -> None:
+    """Set the sums of angles to those of no pair."""
+    angles.xx = 0.0
+    angles.xy = 0.0
+    angles.yy = 0.0
+
+
+@kernel
+def reliability_of(angles: Record) -> float:
+    """Return the reliability of a set, Eq. (28), by the information of its angles: 0 for parallel walls, to 1."""
+    det = angles.xx * angles.yy - angles.xy * angles.xy
+    weight = angles.xx + angles.yy
     return min(1.0, 2.0 * math.sqrt(max(det, 0.0)) / weight) if weight > 0.0 else 0.0
 
 
 @kernel
-def least_reliability(sums: Record, noise: Record) -> float:
-    """Return the reliability up to which a set is parallel by the errors of its angles; 1 for fewer than two pairs.
+def least_reliability(angles: Record, most_parallel: float) -> float:
+    """Return the reliability up to which walls are parallel, at most 1.
 
-    `sums` are those of the pairs, `noise` is their record of `ANGLE_NOISE`.
-
-    With the smaller eigenvalue l up to which it is, ``R^2 = 4 l (W - l) / W^2``.
+    `most_parallel` is the chi-square l of their angles up to which they are: ``R^2 = 4 l (W - l) / W^2``.
     """
-    weight = sums.xx + sums.yy
-    if sums.count < 2.0 or weight <= 0.0:
-        return 1.0
-    freedom = max(1.0, noise.total * noise.total / noise.squares - 1.0)
-    mean = noise.total * (1.0 - 1.0 / sums.count)
-    part = mean / freedom * parallel_chi_square(freedom) / weight
+    weight = angles.xx + angles.yy
+    part = most_parallel / weight if weight > 0.0 else 1.0
     return 2.0 * math.sqrt(part * (1.0 - part)) if part < 0.5 else 1.0
 
 
 @kernel
-def parallel_chi_square(freedom: float) -> float:
-    """Return the chi-square of angles that noise exceeds as seldom as three deviations, after Wilson and Hilferty."""
-    k = 2.0 / (9.0 * freedom)
-    return freedom * (1.0 - k + PARALLEL_QUANTILE * math.sqrt(k)) ** 3
-
-
-@kernel
-def fixes_pose(sums: Record, noise: Record) -> bool:
-    """Return whether the pairs of a set fix its pose: its reliability is more than parallel walls show by noise."""
-    return reliability_of(sums) > least_reliability(sums, noise)
+def fixes_pose(work: Workspace) -> bool:
+    """Return whether the pairs that are held fix a pose: their reliability is above that of parallel walls by noise."""
+    scratch = work.scratch[0]
+    most_parallel = work.parallel[int(scratch.plain.count)]
+    return reliability_of(scratch.angles) > least_reliability(scratch.angles, most_parallel)
 
 
 @kernel

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from association.consensus.tuning import LEAST_SPREAD, PARALLEL_QUANTILE
 from association.layout import Integers
 from registration.layout import Floats, Records
+from registration.observability import most_parallel
 
 
 def reliability(scan: Records, held: Integers, walls: Records) -> float:
@@ -19,24 +19,14 @@ def reliability(scan: Records, held: Integers, walls: Records) -> float:
 
 def least_reliability(scan: Records, held: Integers, walls: Records) -> float:
     """Return the reliability that the errors of the angles give parallel walls."""
-    on, weight = held >= 0, _eigenvalues(scan, held, walls).sum()
-    n = int(on.sum())
-    if n < 2:
-        return 1.0
-    noise = 1.0 / np.maximum(scan["spread"][on], LEAST_SPREAD)
-    freedom = max(1.0, noise.sum() ** 2 / (noise**2).sum() - 1.0)
-    smaller = noise.sum() * (1.0 - 1.0 / n) / freedom * quantile(freedom)
+    smaller, weight = most_parallel(int((held >= 0).sum())), _eigenvalues(scan, held, walls).sum()
     return 2.0 * math.sqrt(smaller * (weight - smaller)) / weight if smaller < 0.5 * weight else 1.0
-
-
-def quantile(freedom: float) -> float:
-    """Return that of a chi-square, after Wilson and Hilferty: its cube root is about normal."""
-    return float(freedom * (1.0 - 2.0 / (9.0 * freedom) + PARALLEL_QUANTILE * math.sqrt(2.0 / (9.0 * freedom))) ** 3)
 
 
 def _eigenvalues(scan: Records, held: Integers, walls: Records) -> Floats:
     on = held >= 0
     chosen = walls[held[on]]
     normals = np.stack([-chosen["dy"], chosen["dx"]], axis=1)
-    values: Floats = np.linalg.eigvalsh((scan["weight"][on][:, None] * normals).T @ normals)
+    information = (scan["weight"] * scan["spread"])[on]
+    values: Floats = np.linalg.eigvalsh((information[:, None] * normals).T @ normals)
     return values

@@ -7,19 +7,14 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from scipy.stats import chi2
 
 from association.consensus.kernels.pair_sums import empty_sums, update_pairs
-from association.consensus.kernels.reliability import (
-    fixes_pose,
-    least_reliability,
-    parallel_chi_square,
-    reliability_of,
-)
+from association.consensus.kernels.reliability import fixes_pose, least_reliability, reliability_of
 from association.consensus.tuning import FREE_DEVIATION
 from association.layout import MATCH, SCAN_LINE, WALL, Integers
 from association.tables import Workspace
 from registration.layout import Floats, Records
+from registration.observability import most_parallel
 
 from ...kernels.drawn import PLACE, SEEDS, SMALL, drawn, workspace_of
 from ...records import covariance_of, estimate_of, pose_of
@@ -44,19 +39,13 @@ def test_reliability_is_that_of_the_pairs_that_are_held(seed: int) -> None:
     """Whatever pairs came and went before."""
     d = drawn(seed, clutter=6)
     helds = d.rng.integers(-1, 6, (5, len(d.scan)))
-    scratch = sums_of(d.scan, PLACE.walls, *helds).scratch[0]
+    work = sums_of(d.scan, PLACE.walls, *helds)
+    angles, most = work.scratch[0]["angles"], most_parallel(int((helds[-1] >= 0).sum()))
     expected = twin.reliability(d.scan, helds[-1], PLACE.walls)
     least = twin.least_reliability(d.scan, helds[-1], PLACE.walls)
-    assert reliability_of(scratch["plain"]) == pytest.approx(expected, rel=1e-6, abs=1e-5)
-    assert least_reliability(scratch["plain"], scratch["angle_noise"]) == pytest.approx(least, rel=1e-9)
-    assert fixes_pose(scratch["plain"], scratch["angle_noise"]) == (expected > least)
-
-
-@pytest.mark.parametrize("freedom", [1, 2, 3, 10, 40, 200])
-def test_the_quantile_of_the_angles(freedom: int) -> None:
-    """Noise exceeds it as seldom as it exceeds three standard deviations."""
-    expected = chi2.isf(math.erfc(3.0 / math.sqrt(2.0)), freedom)
-    assert parallel_chi_square(float(freedom)) == pytest.approx(expected, rel=0.02)
+    assert reliability_of(angles) == pytest.approx(expected, rel=1e-6, abs=1e-5)
+    assert least_reliability(angles, most) == pytest.approx(least, rel=1e-9)
+    assert fixes_pose(work) == (expected > least)
 
 
 def walls_at(angles: Floats) -> Records:
@@ -82,8 +71,7 @@ def test_parallel_walls_seldom_seem_to_fix_a_pose() -> None:
         noise = rng.normal(0.0, 1.0 / np.sqrt(scan["weight"] * scan["spread"]))
         for turn in (0.0, math.radians(30.0)):
             angles = noise + turn * (np.arange(n) == 0)
-            scratch = sums_of(scan, walls_at(angles), np.arange(n)).scratch[0]
-            fixed = fixes_pose(scratch["plain"], scratch["angle_noise"])
+            fixed = fixes_pose(sums_of(scan, walls_at(angles), np.arange(n)))
             if turn:
                 across += fixed
             else:
@@ -95,8 +83,7 @@ def test_parallel_walls_seldom_seem_to_fix_a_pose() -> None:
 def test_one_wall_and_no_wall_fix_nothing() -> None:
     scan, walls = lines_of(np.array([1e4, 1e4]), np.ones(2)), walls_at(np.array([0.0, 1.5]))
     for held, fixed in (([-1, -1], False), ([0, -1], False), ([0, 1], True)):
-        scratch = sums_of(scan, walls, np.array(held)).scratch[0]
-        assert fixes_pose(scratch["plain"], scratch["angle_noise"]) == fixed
+        assert fixes_pose(sums_of(scan, walls, np.array(held))) == fixed
 
 
 def test_a_pose_is_not_moved_along_the_walls_that_leave_it_open() -> None:
