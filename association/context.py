@@ -9,7 +9,6 @@ import numpy as np
 
 from registration import RigidTransform
 from registration.layout import POSE, Records
-from registration.observability import most_parallel_up_to
 from registration.values import value
 
 from .deadline import Deadline
@@ -195,8 +194,7 @@ class SearchContext:
     def known_walls(self) -> KnownWalls:
         """The walls, and the uncertainty of their positions."""
         known = self.index.sigma
-        parallel = most_parallel_up_to(len(self.lines.rows))
-        return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2, parallel)
+        return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2)
 
     def question(self, rules: Records) -> Question:
         """Return the input of the kernels' search; `rules` (1,) define which poses are stored."""

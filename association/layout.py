@@ -73,11 +73,16 @@ ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
-# matched segments; its fraction of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
-# scan's sigmas alone expect; the penalty of lines of sight, nats; the fractions of the beams that read the wall they
-# should, and that passed through one, 0 without beams; how many rows are matched.
+# matched segments; its fraction of the scan's; its reliability, Eq. (28), by the information of its angles, and
+# the one up to which their errors explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of lines of sight, nats;
+# the fractions of the beams that read the wall they should, and that passed through one, 0 without beams; how many rows
+# are matched.
 SET_SCORE = fields(
-    (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),
+    (
+        _F,
+        "score chi_square one_step_chi_square length fraction reliability least_reliability misfit blocked read passed "
+        "count",
+    ),
 )
 
 # The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its
@@ -138,7 +143,7 @@ HYPOTHESIS = np.dtype(
 
 # An estimated pose, with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
 # m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit
-# direction; whether all walls are parallel within three standard deviations of their angles.
+# direction; whether they are parallel by their reliability.
 ESTIMATED = np.dtype([("pose", ESTIMATE), *fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
 
 # A pose among walls of which each has its own error, with that standard deviation, m.
@@ -198,16 +203,22 @@ BEND = fields((_F, "start more"))
 # the value from which it speaks for the answer, and that at which it does in full.
 TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
+# The sums of the outer products of the normals of pairs, weighted by the information of their angles, 1/rad^2: see
+# `consensus.kernels.reliability`.
+ANGLE_SUMS = fields((_F, "xx xy yy"))
+
 # Records that kernels write to while they look at one pose: the pose; the information of its consensus set; its sums,
-# without the walls' errors and with them; a line; the other evidence of the error of walls that are tied; the terms of
-# its score; the end of a beam; a ray; the evidence of the beams; the geometry of a base. A record that a kernel takes
-# from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
+# without the walls' errors and with them; the sums of its angles; a line; other evidence
+# of the error of walls that are tied; the terms of its score; the end of a beam; a ray; the evidence of the beams; the
+# geometry of a base. A record that a kernel takes from an array of its own would outlive the array, whose last use ends
+# it: hence these come from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),
         ("information", SYMMETRIC3),
         ("sums", JOINT_SUMS),
         ("plain", JOINT_SUMS),
+        ("angles", ANGLE_SUMS),
         ("line", WALL),
         ("common", WALL_SUMS),
         ("terms", SCORE_TERMS),

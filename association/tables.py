@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from registration.layout import Floats, Records
+from registration.observability import most_parallel_up_to
 
 from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SUMS, Indices, Integers, record
 from .tuning import AT_ONCE
@@ -319,13 +320,11 @@ class KnownWalls(NamedTuple):
     ties : (m,) as of `Place`
     variance : float
         Of a wall's own error, m^2; negative where nothing is known of it.
-    parallel : (k,) the chi-square of the angles of n matches up to which they are parallel, by n, for all that may be
     """
 
     walls: Records
     ties: Floats
     variance: float
-    parallel: Floats
 
 
 class Blockers(NamedTuple):
@@ -359,6 +358,7 @@ class Workspace(NamedTuple):
     listed : (n,) walls, for now
     wall_sums : (m,) of `WALL_SUMS`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
+    parallel : (k,) the chi-square of the angles of n pairs up to which they are parallel, by n from 0 on
     """
 
     matches: Records
@@ -374,6 +374,7 @@ class Workspace(NamedTuple):
     listed: Integers
     wall_sums: Records
     scratch: Records
+    parallel: Floats
 
     @classmethod
     def of(cls, count: int, walls: int) -> Workspace:
@@ -385,4 +386,4 @@ class Workspace(NamedTuple):
         hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
         matches, wall_sums, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SUMS), record(SCRATCH)
         arrays = matches, spreads, shifts, later, possible, hypotheses, near
-        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch)
+        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch, most_parallel_up_to(count))

@@ -45,7 +45,7 @@ class EstimatedPose:
     free : bool
         True if the pose itself is one of many along that direction: parallel walls, or a deviation of metres.
     parallel : bool
-        True if all walls are parallel within three standard deviations of their angles.
+        True if the reliability of the set is no more than that of parallel walls: see `kernels.reliability`.
     leverages : (k,) of `LEVERAGE`
         The pose as it would be without each of its walls.
     views : EstimatedViews or None

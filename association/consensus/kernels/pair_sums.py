@@ -10,6 +10,7 @@ from registration.layout import Record, Records
 
 from ...tables import Workspace
 from ..tuning import SAME_SHIFT
+from .reliability import add_angle, clear_angles
 
 
 @kernel
@@ -80,6 +81,7 @@ def update_pair(work: Workspace, wall: Record, seen: Record, i: int, w: int, sig
     line.offset = wall.offset + work.shifts_held[i]
     weight = work.weights_held[i]
     joint_add(scratch.plain, line, seen, weight, sign)
+    add_angle(scratch.angles, line, sign * weight * seen.spread)
     own_sums = work.wall_sums[w]
     own_sums.count += sign
     if own_sums.count <= 0.0:
@@ -122,6 +124,7 @@ def empty_sums(work: Workspace) -> None:
     held = work.held
     wall_sums = work.wall_sums
     clear_sums(work.scratch[0].plain)
+    clear_angles(work.scratch[0].angles)
     for i in range(len(held)):
         if held[i] >= 0:
             clear_wall(wall_sums[held[i]])

@@ -12,6 +12,7 @@ from ...layout import ESTIMATE, Integers
 from ...tables import KnownWalls, Question, Workspace
 from ..tuning import COMMON_WALL_ERROR, ESTIMATION_ROUNDS, FREE_DEVIATION, LEAST_KNOWN_VARIANCE, USUAL_WALL_ERROR
 from .pair_sums import empty_sums, update_pair
+from .reliability import fixes_pose
 from .scoring import solve_pose
 from .wall_variance import (
     distinct_walls,
@@ -19,7 +20,6 @@ from .wall_variance import (
     sum_pairs,
     sum_pairs_without,
     wall_variance_shown,
-    weight_on_wall,
 )
 
 
@@ -69,6 +69,7 @@ def estimate_pose(
     find_weakest_direction(scan, known_walls, matches, out, work)
     sum_pairs(scan, matches, known_walls, out.wall_variance, work)
     solve_pose(sums, pose, information, terms)
+    out.parallel = not fixes_pose(work)
     return of_wall
 
 
@@ -76,7 +77,7 @@ def estimate_pose(
 def find_weakest_direction(
     scan: Records, known_walls: KnownWalls, matches: Records, out: Record, work: Workspace
 ) -> None:
-    """Write to `out` how well the pose is fixed with walls off by centimetres, and whether all walls are parallel."""
+    """Write to `out` how well the pose is fixed with walls off by centimetres."""
     other = np.zeros(1, ESTIMATE)
     sum_pairs(scan, matches, known_walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
     copy_estimate(out.pose, other[0])
@@ -84,11 +85,6 @@ def find_weakest_direction(
     solve_pose(scratch.sums, other[0], scratch.information, scratch.terms)
     out.weakest, out.dx, out.dy = weakest_direction(other[0])
     keep_alive(other)
-    count = 0
-    for i in range(len(matches)):
-        count += 1 if matches[i].wall >= 0 else 0
-    unlike = parallel_chi_square(scan, matches, known_walls.walls, out.wall_variance)
-    out.parallel = unlike <= known_walls.parallel[count]
 
 
 @kernel
@@ -172,26 +168,6 @@ def weakest_direction(covariance: Record) -> tuple[float, float, float]:
     half = 0.5 * (covariance.xx - covariance.yy)
     angle = 0.5 * math.atan2(covariance.xy, half)
     return math.sqrt(max(0.0, middle + math.hypot(half, covariance.xy))), math.cos(angle), math.sin(angle)
-
-
-@kernel
-def parallel_chi_square(scan: Records, matches: Records, walls: Records, wall_variance: float) -> float:
-    """Return how far the directions of the matched walls are from parallel, as a chi-square of the pairs' angles.
-
-    With a_k the information of a pair's angle, that of the common direction from which ``sum a_k sin^2`` is least: the
-    smaller eigenvalue of ``sum a_k d d'``.
-    """
-    xx = 0.0
-    xy = 0.0
-    yy = 0.0
-    for i in range(len(scan)):
-        w = matches[i].wall
-        if w >= 0:
-            angle = weight_on_wall(scan[i], wall_variance) * scan[i].spread
-            xx += angle * walls[w].dx * walls[w].dx
-            xy += angle * walls[w].dx * walls[w].dy
-            yy += angle * walls[w].dy * walls[w].dy
-    return max(0.0, 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy))
 
 
 @kernel

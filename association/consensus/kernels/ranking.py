@@ -15,6 +15,7 @@ from ..tuning import FAR_BEHIND, LEAST_COUNT, START_ANGLE_VARIANCE, START_VARIAN
 from .geometry import wrap
 from .matching import allow_all, match_scan, part_of_match
 from .refinement import refine
+from .reliability import least_reliability, reliability_of
 from .scoring import one_step_chi_square
 from .sight import count_blockers, sight_penalty
 
@@ -62,7 +63,7 @@ def score_candidates(
         start_at(one)
         match_scan(scan, one, place, terms.gates, work.possible, 0.0, matches[k])
         out.score = refine(scan, one, place, terms, matches[k], work, 0.0)
-        measure_sums(work.scratch[0].sums, work.scratch[0].terms, one, out)
+        measure_sums(work, one, out)
         measure_matches(scan, matches[k], out)
         out.blocked = 0.0
         # The candidates come best first: a candidate far behind is no alternative, its score may stay too good.
@@ -85,13 +86,13 @@ def start_at(estimate: Record) -> None:
 
 
 @kernel
-def measure_sums(sums: Record, terms: Record, estimate: Record, out: Record) -> None:
+def measure_sums(work: Workspace, estimate: Record, out: Record) -> None:
     """Write the chi-square of a refined set, that at the paper's estimate, and the reliability, Eq. (28)."""
-    out.chi_square = terms.chi_square if out.score > 0.0 else 0.0
-    out.one_step_chi_square = one_step_chi_square(sums, estimate) if out.score > 0.0 else 0.0
-    det = sums.xx * sums.yy - sums.xy * sums.xy
-    weight = sums.xx + sums.yy
-    out.reliability = min(1.0, 2.0 * math.sqrt(max(det, 0.0)) / weight) if weight > 0.0 else 0.0
+    scratch = work.scratch[0]
+    out.chi_square = scratch.terms.chi_square if out.score > 0.0 else 0.0
+    out.one_step_chi_square = one_step_chi_square(scratch.sums, estimate) if out.score > 0.0 else 0.0
+    out.reliability = reliability_of(scratch.angles)
+    out.least_reliability = least_reliability(scratch.angles, work.parallel[int(scratch.plain.count)])
 
 
 @kernel

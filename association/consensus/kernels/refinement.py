@@ -10,6 +10,7 @@ from ...tables import Place, Workspace
 from ..tuning import ROUNDS
 from .matching import allow_all, match_scan
 from .pair_sums import clear_sums, empty_sums, update_pairs
+from .reliability import fixes_pose, hold_along_walls
 from .scoring import discount_steps, score_pairs, solve_pose
 from .wall_errors import eliminate_wall_errors
 
@@ -25,7 +26,8 @@ def refine(
     3. Match again at that pose; go on with 1 until no pair comes or goes, or `ROUNDS` are over.
     4. Drop the pairs that cost more than they gain, and score the others: see `score_set`.
 
-    A direction that no pair fixes is held where it is, and shows in the covariance.
+    A set whose reliability does not fix a pose is a family: its pose stays where it is along the walls, which shows in
+    the covariance. So does a direction that no pair fixes.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ def refine(
         eliminate_wall_errors(work, place.ties, terms.model.wall_variance)
         if sums.count == 0.0:
             return 0.0  # of pairs that came and went the sums keep rounding, which fixes nothing
-        moved = solve_pose(sums, estimate, scratch.information, scratch.terms)
+        moved = solve_set(estimate, work)
         rounds += 1
         last = rounds == ROUNDS or not moved
         least = floor if last else 0.0
@@ -71,6 +73,21 @@ def refine(
         if last:
             break
     return score_set(scan, estimate, place, terms.model, matches, work, floor, changed)
+
+
+@kernel
+def solve_set(estimate: Record, work: Workspace) -> bool:
+    """Move a pose to the least chi-square of the set that is held, but along its walls if they do not fix it.
+
+    Returns False where the pose would go too far, and stays.
+    """
+    scratch = work.scratch[0]
+    x = estimate.x
+    y = estimate.y
+    moved = solve_pose(scratch.sums, estimate, scratch.information, scratch.terms)
+    if scratch.terms.chi_square < math.inf and not fixes_pose(work):
+        hold_along_walls(scratch.sums, x, y, estimate, scratch.terms)
+    return moved
 
 
 @kernel
@@ -99,7 +116,7 @@ def score_set(
     if sums.count == 0.0 or terms.gain <= 0.0 or terms.gain < floor:
         return 0.0
     if changed or terms.chi_square == math.inf:
-        solve_pose(sums, estimate, scratch.information, terms)
+        solve_set(estimate, work)
     terms.log_determinant = log_determinant(scratch.information, model)
     return max(0.0, terms.gain - 0.5 * terms.chi_square - terms.log_determinant)
 

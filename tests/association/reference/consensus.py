@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from association.consensus.tuning import MAX_STEP, MAX_TURN, SAME_SHIFT, SPRING
+from association.consensus.tuning import FREE_DEVIATION, MAX_STEP, MAX_TURN, SAME_SHIFT, SPRING
 from association.layout import MATCH, MODEL, Integers
 from association.tables import Place
 from registration import RigidTransform
@@ -20,6 +20,7 @@ from registration.layout import Floats, Record, Records
 
 from .geometry import TURN, direction, normal, point, rotation, translation, wrap
 from .matching import match_scan
+from .reliability import least_reliability, reliability
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,13 @@ def refine(
         turn, step = wrap(solved.pose.theta - pose.theta), np.hypot(solved.pose.x - pose.x, solved.pose.y - pose.y)
         near = bool(abs(turn) <= MAX_TURN and step <= MAX_STEP)
         cost = solved.cost if near else pairs.cost(pose)
-        pose = solved.pose if near else pose
+        before, pose = pose, solved.pose if near else pose
+        if reliability(scan, held, place.walls) <= least_reliability(scan, held, place.walls):
+            along = np.linalg.eigh(information[:2, :2])[1][:, 0]
+            x, y = translation(pose) - along * (along @ (translation(pose) - translation(before)))
+            pose = RigidTransform(x, y, pose.theta)
+            covariance[:2, :2] += FREE_DEVIATION**2 * np.outer(along, along)
+            cost = pairs.cost(pose)
         return near
 
     for _ in range(rounds):

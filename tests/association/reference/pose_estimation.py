@@ -25,10 +25,10 @@ from association.tuning import ROUGHNESS
 from registration import RigidTransform
 from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
-from registration.observability import most_parallel
 
 from .consensus import Pairs, solve
 from .geometry import wrap
+from .reliability import least_reliability, reliability
 
 
 def reweighted(scan: Records, variance: float) -> Records:
@@ -98,7 +98,7 @@ class EstimatedPose:
     variance: float
     weakest: float
     direction: Floats
-    unlike: float
+    parallel: bool
     leverages: list[Hinge]
 
 
@@ -117,11 +117,12 @@ def estimate_poses(
             variance = estimated_variance(at, scan, held, walls, variance)
     weakest, along = moved(pairs_of(scan, held, walls, max(variance, COMMON_WALL_ERROR**2)), pose).weakest
     at = moved(pairs_of(scan, held, walls, variance), pose)
-    apart, without = unlike(scan, held, walls, variance), leverages(scan, held, walls, at, variance)
-    if apart > most_parallel(int((held >= 0).sum())) and weakest <= MAX_DEVIATION:
+    weighted, without = reweighted(scan, variance), leverages(scan, held, walls, at, variance)
+    parallel = reliability(weighted, held, walls) <= least_reliability(weighted, held, walls)
+    if not parallel and weakest <= MAX_DEVIATION:
         found = solve(Pairs.of(registering(scan, held, variance), held, walls, 0.0), at.pose, 0.0)
         at = Moved(found.pose, np.asarray(np.linalg.inv(found.information)), near=True)
-    return EstimatedPose(at, variance, weakest, along, apart, without)
+    return EstimatedPose(at, variance, weakest, along, parallel, without)
 
 
 def registering(scan: Records, held: Integers, variance: float) -> Records:
@@ -146,12 +147,3 @@ def leverages(scan: Records, held: Integers, walls: Records, at: Moved, variance
             along = step / moves
         out.append(Hinge(w, moves, deviation, along))
     return out
-
-
-def unlike(scan: Records, held: Integers, walls: Records, variance: float) -> float:
-    """Return the chi-square of the walls' angles to the direction that they have in common, the best of many."""
-    on = held >= 0
-    weights = (reweighted(scan, variance)["weight"] * scan["spread"])[on]
-    angles = np.arctan2(walls["dy"], walls["dx"])[held[on]]
-    turns = np.linspace(0.0, math.pi, 20_001)
-    return float((weights * np.sin(angles - turns[:, None]) ** 2).sum(axis=1).min())

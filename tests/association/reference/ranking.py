@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from registration.layout import Floats, Records
 
 from .consensus import Pairs, refine
 from .geometry import Vector, wrap
+from .reliability import least_reliability, reliability
 from .sight import count_blockers, sight_penalty
 
 START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
@@ -42,7 +42,8 @@ def rank(
         pairs = Pairs.of(scan, matches["wall"], place.walls, float(model["wall_variance"][0]))
         if score > 0.0:
             scored["one_step_chi_square"] = pairs.one_step_cost(found.pose)
-        scored["reliability"] = reliability(pairs.information(found.pose.theta)[:2, :2])
+        scored["reliability"] = reliability(scan, matches["wall"], place.walls)
+        scored["least_reliability"] = least_reliability(scan, matches["wall"], place.walls)
         scored["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
         scored["count"] = on.sum()
         if viewpoint is not None and score > best - FAR_BEHIND:
@@ -52,18 +53,6 @@ def rank(
         scored["score"] = score
         ranked.append((found.pose, found.covariance, scored, matches))
     return ranked
-
-
-def reliability(information: Floats) -> float:
-    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E, which add up to 1.
-
-    E, the mean of v v' by weight, is turned by a right angle from the information of the place, (2, 2); that has the
-    walls' own errors in it.
-    """
-    if not information.any():
-        return 0.0
-    e = information / np.trace(information)
-    return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))
 
 
 def distinct(
