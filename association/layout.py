@@ -73,10 +73,10 @@ ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
-# matched segments; its fraction of the scan's; its reliability, Eq. (28), by the information of its angles, and
-# the one up to which their errors explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of lines of sight, nats;
-# the fractions of the beams that read the wall they should, and that passed through one, 0 without beams; how many rows
-# are matched.
+# matched segments; its fraction of the scan's; its reliability, Eq. (28), by the information of its angles, and the one
+# up to which their errors explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of
+# lines of sight, nats; the fractions of the beams that read the wall they should, and that passed through one, 0
+# without beams; how many rows are matched.
 SET_SCORE = fields(
     (
         _F,

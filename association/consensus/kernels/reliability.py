@@ -1,11 +1,13 @@
 """Decide from the sums of a consensus set whether it fixes a pose, by the paper's reliability.
 
 With ``A = sum a n n'`` over the pairs, the normal n of each wall and a weight a, ``W = trace A`` and ``D = det A``, the
-paper's reliability is ``R = 2 sqrt(D) / W``, Eq. (28). The smaller eigenvalue of A is ``W (1 - sqrt(1 - R^2)) / 2``. It is
-0 where all walls are parallel. Measured angles have errors. With the information of each pair's angle as its weight,
-``a = w s``, with the weight w of the pair and the spread s of its points, the smaller eigenvalue is ``sum a sin^2`` of
-the angles to their common direction. Of parallel walls that is a chi-square with n - 1 degrees of freedom. Where noise
-explains it, by three standard deviations, the set is a family of poses along its walls, and fixes none of them.
+paper's reliability is ``R = 2 sqrt(D) / W``, Eq. (28). The smaller eigenvalue of A is ``W (1 - sqrt(1 - R^2)) / 2``,
+which is 0 where all walls are parallel.
+
+Measured angles have errors. The weights are therefore the information of each pair's angle, ``a = w s``, with the
+weight w of the pair and the spread s of its points. The smaller eigenvalue is then ``sum a sin^2`` of the angles to
+their common direction. Of parallel walls that is a chi-square with n - 1 degrees of freedom. Where noise explains it,
+by three standard deviations, the set is a family of poses along its walls, and fixes none of them.
 
 A changes in constant time when a pair comes or goes, as all sums do.
 """
