@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import linefix
-from association import KnownOfMaps, Prior, associate_on_maps, explain_verdict
+from association import IndexingEndedError, KnownOfMaps, Prior, associate_on_maps, explain_verdict
 from linefix.answers import Included, association_json, registration_json
 from linefix.explaining import explanation_json
 from linefix.map_answers import checked_json, import_json, map_json, update_json
@@ -37,6 +37,8 @@ from .contract import Json, Question, id_of
 from .errors import Asked, NoServerError
 from .inputs import needing_formats, refusing
 from .stored import FoundMap, map_here, require_storable, settings_here
+
+TOO_LATE = "the deadline passed before the search started; extend deadline_ms, or send the request again later"
 
 if TYPE_CHECKING:
     from formats import ImportOptions, LoggedScan
@@ -128,7 +130,10 @@ def _associate_on_maps(body: Json) -> Json:
     require_time(deadline)
     prior_map = None if asked.prior is None else asked.prior.map_id
     known = KnownOfMaps(prior_of(asked.prior), prior_map, asked.map_weights)
-    result = associate_on_maps(index, scanned.scan, known, search, deadline)
+    try:
+        result = associate_on_maps(index, scanned.scan, known, search, deadline)
+    except IndexingEndedError:
+        raise NoServerError(TOO_LATE) from None
     watch.lap("search")
     frame_id = found[result.map_id or next(iter(found))].document.get("frame_id", "map")
     answer = association_json(result, included_of(asked.scan, options, scanned, frame_id))
@@ -257,9 +262,7 @@ def import_map(file: Path, options: ImportOptions) -> Json:
 def require_time(deadline: linefix.Deadline) -> None:
     """Raise `NoServerError` where the deadline has passed before the search."""
     if deadline.passed:
-        raise NoServerError(
-            "the deadline passed before the search started; extend deadline_ms, or send the request again later"
-        )
+        raise NoServerError(TOO_LATE)
 
 
 def _sealed(answer: Json, watch: Stopwatch) -> Json:

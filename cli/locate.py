@@ -84,6 +84,8 @@ def request_body(on: Sequence[str], scan: str, window: NearOptions, search: Sear
         body["prior"] = pose | {"radius": window.radius, "angle": window.angle}
         if window.near_map is not None:
             body["prior"]["map_id"] = window.near_map
+    elif window.near_map is not None:
+        raise WrongUseError("--near-map: found no --near, expected the pose on that map; add --near X Y THETA")
     if search.weight:
         body["map_weights"] = dict(map(_weight, search.weight))
     if search.undirected:

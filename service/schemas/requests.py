@@ -8,7 +8,7 @@ from pydantic import Field, SkipValidation, ValidationInfo, field_validator, mod
 from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
-from .errors import TooManyError
+from .errors import Fault, InvalidRequestError, TooManyError
 from .limits import Limits
 from .parts import (
     AnyMap,
@@ -94,6 +94,13 @@ class AssociateRequest(OnMaps):
     prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="returned as it was sent")
+
+    @model_validator(mode="after")
+    def _map_of_prior(self) -> Self:
+        if self.maps is None and self.prior is not None and self.prior.map_id is not None:
+            message = "found it with a single map, expected it with maps; omit it"
+            raise InvalidRequestError([Fault("/prior/map_id", message)])
+        return self
 
 
 class BatchRequest(OnMaps):

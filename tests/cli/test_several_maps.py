@@ -75,6 +75,12 @@ def test_weights_and_the_map_of_a_window_are_taken(linefix: Linefix, files: Path
     assert "/prior/map_id" in refused(linefix("locate", *both, "--near", "1", "0.5", "1.57"), 3)
 
 
+def test_the_map_of_a_window_needs_a_window_and_several_maps(linefix: Linefix, files: Path) -> None:
+    one, both = ("floors/room.json", "scan.json"), ("floors/room.json", "floors/hall.json", "scan.json")
+    assert "/prior/map_id" in refused(linefix("locate", *one, "--near", "1", "0.5", "1.57", "--near-map", "room"), 3)
+    assert "--near" in refused(linefix("locate", *both, "--near-map", "room"), 2)
+
+
 def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None:
     (files.parent / "other").mkdir()
     (files.parent / "other" / "room.json").write_text(json.dumps({"segments": HALL}))
