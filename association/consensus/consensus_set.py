@@ -77,7 +77,9 @@ class ConsensusSet:
         cls, estimate: Records, scores: tuple[float, ...], matches: Records, *, posterior: float, inside: bool
     ) -> ConsensusSet:
         """Return the set of a record of `SET_SCORE`, given as a tuple, and of the other arguments by name."""
-        return cls(estimate, scores[0], posterior, inside, *scores[1:], matches)
+        score, chi_square, one_step, length, fraction, reliable, least, misfit, blocked, read, passed, count = scores
+        sums, seen = (chi_square, one_step), (length, fraction, reliable, least, misfit, blocked)
+        return cls(estimate, score, posterior, inside, *sums, *seen, read, passed, count, matches)
 
     @property
     def pose(self) -> RigidTransform:
@@ -94,7 +96,7 @@ class ConsensusSet:
 
     @property
     def fixes_pose(self) -> bool:
-        """Whether the walls fix the pose; else the set is a family of poses along them, and this is one of many."""
+        """True if the walls fix the pose. Else the set is a family of poses along them."""
         return self.reliability > self.least_reliability
 
     @property

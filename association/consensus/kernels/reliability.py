@@ -6,8 +6,8 @@ which is 0 where all walls are parallel.
 
 Measured angles have errors. The weights are therefore the information of each pair's angle, ``a = w s``, with the
 weight w of the pair and the spread s of its points. The smaller eigenvalue is then ``sum a sin^2`` of the angles to
-their common direction. Of parallel walls that is a chi-square with n - 1 degrees of freedom. Where noise explains it,
-by three standard deviations, the set is a family of poses along its walls, and fixes none of them.
+their common direction. For parallel walls that is a chi-square with n - 1 degrees of freedom. If noise explains it, by
+three standard deviations, the set is a family of poses along its walls, and fixes none of them.
 
 A changes in constant time when a pair comes or goes, as all sums do.
 """
@@ -69,7 +69,7 @@ def fixes_pose(work: Workspace) -> bool:
 def hold_along_walls(sums: Record, x: float, y: float, estimate: Record, terms: Record) -> None:
     """Move a pose back to where it was along the direction that its walls leave open, and widen its covariance there.
 
-    Of a set that fixes no pose. What it shows of that direction is noise, which would move the pose by metres.
+    The set fixes no pose. Its position along that direction is noise, which would move the pose by metres.
     """
     across = 0.5 * math.atan2(2.0 * sums.xy, sums.xx - sums.yy)
     ux = -math.sin(across)

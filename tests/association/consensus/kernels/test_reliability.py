@@ -1,4 +1,4 @@
-"""Whether a consensus set fixes its pose is decided from its sums, by the paper's reliability."""
+"""The sums of a consensus set decide whether it fixes its pose, by the paper's reliability."""
 
 from __future__ import annotations
 
