@@ -2,18 +2,46 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import Any
 
 from .errors import IncompleteFileError, MalformedFileError, TooLargeError
 from .report import shown
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
+MANY = 10**100  # YAML has integers that no float can hold
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 
 
 def name_of(path: Path) -> str:
     """Return what errors and reports call a file."""
     return shown(path.name)
+
+
+def ending_of(path: Path) -> str:
+    """Return what the ending of a name is, for errors."""
+    return shown(path.suffix) if path.suffix else "a folder" if path.is_dir() else "no ending"
+
+
+def kind_of(value: Any) -> str:
+    """Return what a value of JSON or YAML is, for errors; of a number the number."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true or false"
+        case int() if abs(value) >= MANY:
+            return "a number that is too large"
+        case int() | float():
+            return f"{value:.6g}"
+        case str():
+            return "text"
+        case list():
+            return f"a list of {len(value)}"
+        case dict():
+            return "an object"
+    return f"a {type(value).__name__}"
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
@@ -37,12 +65,17 @@ def read_bounded(path: Path, limit: int) -> bytes:
     try:
         with path.open("rb") as file:
             content = file.read(limit + 1)
+            size = max(len(content), os.fstat(file.fileno()).st_size)
     except FileNotFoundError as error:
-        raise IncompleteFileError("there is no such file", argument=name_of(path)) from error
+        raise IncompleteFileError(
+            "there is no such file; check the path and the working folder", argument=name_of(path)
+        ) from error
     except OSError as error:
         raise MalformedFileError(f"cannot be read: {error.strerror}", argument=name_of(path)) from error
     if len(content) > limit:
-        raise TooLargeError(f"expected at most {limit} bytes", argument=name_of(path))
+        raise TooLargeError(
+            f"expected at most {limit} bytes, found {size}; simplify the file, or divide it", argument=name_of(path)
+        )
     return content
 
 

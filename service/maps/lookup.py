@@ -259,9 +259,10 @@ def outline_of(document: MapDocument) -> MapOutline:
     if len(segments) == 0:
         raise InvalidMapError("expected at least one segment, found none", argument="segments")
     corners = segments.endpoints.reshape(-1, 2)
-    if np.ptp(corners, axis=0).max() > MAX_EXTENT:
+    extent = float(np.ptp(corners, axis=0).max())
+    if extent > MAX_EXTENT:
         raise InvalidMapError(
-            f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="segments"
+            f"expected an extent of at most {MAX_EXTENT:g} m, found {extent:.4g} m; check the unit", argument="segments"
         )
     # No negative zeros: not every database keeps them.
     low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
