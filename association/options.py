@@ -43,16 +43,28 @@ class SoftPrior:
 
     def __post_init__(self) -> None:
         c = np.asarray(self.covariance, dtype=np.float64)
-        good = c.shape == (3, 3) and bool(np.isfinite(c).all()) and bool(np.allclose(c, c.T, rtol=1e-6, atol=0.0))
-        if good:
-            scale = np.sqrt(np.abs(np.diag(c)))
-            good = bool(scale.min() >= 1e-6 and scale.max() <= 1e6)
-            good = good and bool(np.linalg.eigvalsh(c / np.outer(scale, scale)).min() > 1e-9)
-        if not good:
+        found = _fault_of_covariance(c)
+        if found is not None:
             raise InvalidSearchError(
-                "expected a symmetric positive definite 3 x 3 matrix with deviations from 1e-6 to 1e6",
+                f"expected a symmetric positive definite 3 x 3 matrix with deviations from 1e-6 to 1e6, found {found}",
                 argument="prior.covariance",
             )
+
+
+def _fault_of_covariance(c: NDArray[np.float64]) -> str | None:
+    """Return what is found in place of a covariance, or None."""
+    if c.shape != (3, 3):
+        return f"an array of shape {c.shape}"
+    if not np.isfinite(c).all():
+        return "a number that is not finite"
+    if not np.allclose(c, c.T, rtol=1e-6, atol=0.0):
+        return "a matrix that is not symmetric"
+    scale = np.sqrt(np.abs(np.diag(c)))
+    if not (scale.min() >= 1e-6 and scale.max() <= 1e6):
+        return f"deviations from {scale.min():.3g} to {scale.max():.3g}"
+    if not np.linalg.eigvalsh(c / np.outer(scale, scale)).min() > 1e-9:
+        return "a matrix that is not positive definite"
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +78,9 @@ class HardPrior:
     def __post_init__(self) -> None:
         for name, value, high in (("radius", self.radius, 1e6), ("angle", self.angle, 4.0)):
             if not 0.0 < value <= high:
-                raise InvalidSearchError(f"expected a number above 0 and at most {high:g}", argument=f"prior.{name}")
+                raise InvalidSearchError(
+                    f"expected a number above 0 and at most {high:g}, found {value:g}", argument=f"prior.{name}"
+                )
 
     def contains(self, pose: RigidTransform) -> bool:
         """Return whether a pose lies within the window."""
@@ -157,7 +171,11 @@ class AssociationOptions:
             ("min_overlap", self.min_overlap, 0.0, 1.0),
         ]
         if unknown := set(self.parts).difference(PARTS):
-            raise InvalidSearchError(f"unknown parts {sorted(unknown)}", argument="options.parts")
+            raise InvalidSearchError(
+                f"expected some of {', '.join(PARTS)}, found {sorted(unknown)}", argument="options.parts"
+            )
         for name, value, low, high in ranges:
             if value is not None and not low <= value <= high:
-                raise InvalidSearchError(f"expected a number from {low:g} to {high:g}", argument=f"options.{name}")
+                raise InvalidSearchError(
+                    f"expected a number from {low:g} to {high:g}, found {value:g}", argument=f"options.{name}"
+                )

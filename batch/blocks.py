@@ -89,7 +89,7 @@ class Row:
             return self._laser()
         if self.values.get("segments") is not None:
             return self._segments()
-        raise UnreadableScansError("expected ranges or segments, got neither", argument="scan")
+        raise UnreadableScansError("expected ranges or segments, found neither", argument="scan")
 
     def _laser(self) -> Scan:
         angle_min, increment = self._number("angle_min"), self._number("angle_increment")

@@ -120,7 +120,7 @@ def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
     """
     path = Path(log)
     if not path.exists():
-        raise UnreadableScansError("there is no such file", argument=log)
+        raise UnreadableScansError("there is no such file; check the path and the working folder", argument=log)
     if path.suffix.lower() in PARQUET:
         metadata = _checked(path)
         groups = [metadata.row_group(group).num_rows for group in range(metadata.num_row_groups)]
@@ -225,7 +225,7 @@ def _checked(path: Path) -> pq.FileMetaData:
 
 def _faults(schema: pa.Schema) -> Iterator[str]:
     if not any(name in schema.names for name in FORMS):
-        yield f"expected a column {' or '.join(FORMS)}, got {', '.join(schema.names) or 'none'}"
+        yield f"expected a column {' or '.join(FORMS)}, found {', '.join(schema.names) or 'none'}"
     if "ranges" in schema.names:
         yield from (f"expected a column {name} in addition to ranges" for name in LASER if name not in schema.names)
     for field in schema:
@@ -233,17 +233,17 @@ def _faults(schema: pa.Schema) -> Iterator[str]:
         listed = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
         number = pa.types.is_floating(kind) or pa.types.is_integer(kind)
         if field.name == "ranges" and not (listed and _is_number(kind.value_type)):
-            yield f"expected a list of numbers in ranges, got {kind}"
+            yield f"expected a list of numbers in ranges, found {kind}"
         elif field.name == "segments" and not listed:
-            yield f"expected lists of four numbers in segments, got {kind}"
+            yield f"expected lists of four numbers in segments, found {kind}"
         elif field.name == "stamp" and not (pa.types.is_integer(kind) or pa.types.is_timestamp(kind)):
-            yield f"expected nanoseconds or points in time in stamp, got {kind}"
+            yield f"expected nanoseconds or points in time in stamp, found {kind}"
         elif field.name in WORDS and not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-            yield f"expected text in {field.name}, got {kind}"
+            yield f"expected text in {field.name}, found {kind}"
         elif field.name == "flipped" and not pa.types.is_boolean(kind):
-            yield f"expected true or false in flipped, got {kind}"
+            yield f"expected true or false in flipped, found {kind}"
         elif field.name in (*LASER[:2], *MOTION, "range_min", "range_max", "sigma") and not number:
-            yield f"expected numbers in {field.name}, got {kind}"
+            yield f"expected numbers in {field.name}, found {kind}"
 
 
 def _is_number(kind: pa.DataType) -> bool:

@@ -48,7 +48,9 @@ class MapShelf:
                 raise UnreadableMapsError("has two maps of one name", argument=str(file.with_suffix("")))
             files[file.stem] = str(file)
         if not files:
-            raise UnreadableMapsError("holds no map that is read here", argument=str(place))
+            raise UnreadableMapsError(
+                f"holds no map: expected a file that ends in one of {', '.join(sorted(SUFFIXES))}", argument=str(place)
+            )
         shelf = cls(files)
         if len(files) == 1:
             read_index(next(iter(files.values())))  # an error in the only map spoils everything

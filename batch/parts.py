@@ -113,7 +113,9 @@ def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        raise OtherRunError("another run is at work on it", argument=str(out)) from None
+        raise OtherRunError(
+            "another run writes to it; wait until that run ends, or name another output", argument=str(out)
+        ) from None
     try:
         for folder in (parts.scans, parts.poses):
             folder.mkdir(parents=True, exist_ok=True)

@@ -126,7 +126,10 @@ def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], 
     missing = [layout for layout in layouts if not layout.done]
     for done, (layout, outcome) in enumerate(engine.run(lay_out, missing), start=1):
         if isinstance(outcome, Lost):
-            raise UnreadableScansError("reading it ended each worker early", argument=layout.log)
+            raise UnreadableScansError(
+                "each worker that read it has ended; the log is damaged or needs more memory: check it, or omit it",
+                argument=layout.log,
+            )
         watch(Progress("reading", len(layouts) - len(missing) + done, len(layouts)))
 
 

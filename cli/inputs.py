@@ -100,7 +100,7 @@ def read_map_file(name: str) -> Json:
     """
     path = Path(name)
     if not path.exists():
-        raise WrongUseError(f"{name}: there is no such file")
+        raise WrongUseError(f"{name}: there is no such file; check the path and the working folder")
     if path.suffix.lower() != ".json":
         with needing_formats(f"reading {path.name}"):
             from formats import read_map

@@ -36,8 +36,8 @@ def key(
         parse_keys("\n".join(lines))
     except ValueError:
         raise WrongUseError(
-            "the name or the prefix is not valid: expected 1 to 64 letters for "
-            "NAME, and letters, digits, dots or dashes for --maps"
+            f"the name {name!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for NAME, and letters, "
+            "digits, dots or dashes for --maps"
         ) from None
     for line in lines:
         print(line)

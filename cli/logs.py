@@ -46,7 +46,7 @@ def opened(path: Path, options: LogOptions) -> Log:
         When it cannot be read.
     """
     if not path.exists():
-        raise WrongUseError(f"{path}: there is no such file")
+        raise WrongUseError(f"{path}: there is no such file; check the path and the working folder")
     with needing_formats(f"reading {path.name}"):
         from formats import read_log
 
@@ -61,7 +61,7 @@ def options_of(
 
     if mount is not None and not all(map(math.isfinite, mount)):
         raise WrongUseError(
-            "--mount: found a value that is not finite, expected x and y in metres, and theta in radians"
+            f"--mount: found {' '.join(map(str, mount))}, expected finite numbers: x and y in metres, theta in radians"
         )
     with needing_formats("reading a log"):
         from formats import LogOptions

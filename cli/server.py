@@ -42,7 +42,8 @@ class Server:
         except ValueError:
             named = False
         if not named or not _HEADER.fullmatch(url):
-            raise WrongUseError("--server: expected a URL such as http://127.0.0.1:8000")
+            found = "one with a name or a password" if "@" in url else repr(url)
+            raise WrongUseError(f"--server: expected a URL such as http://127.0.0.1:8000, found {found}")
         if key is not None and not _HEADER.fullmatch(key):
             raise WrongUseError(
                 f"{KEY} in the environment: found a space or a character that a header "

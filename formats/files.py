@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,38 @@ from .limits import MAX_JSON_VALUES
 from .report import shown
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
+MANY = 10**100  # YAML has integers that no float can hold
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 
 
 def name_of(path: Path) -> str:
     """Return what errors and reports call a file."""
     return shown(path.name)
+
+
+def ending_of(path: Path) -> str:
+    """Return what the ending of a name is, for errors."""
+    return shown(path.suffix) if path.suffix else "a folder" if path.is_dir() else "no ending"
+
+
+def kind_of(value: Any) -> str:
+    """Return what a value of JSON or YAML is, for errors; of a number the number."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true or false"
+        case int() if abs(value) >= MANY:
+            return "a number that is too large"
+        case int() | float():
+            return f"{value:.6g}"
+        case str():
+            return "text"
+        case list():
+            return f"a list of {len(value)}"
+        case dict():
+            return "an object"
+    return f"a {type(value).__name__}"
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
@@ -41,12 +68,17 @@ def read_bounded(path: Path, limit: int) -> bytes:
     try:
         with path.open("rb") as file:
             content = file.read(limit + 1)
+            size = max(len(content), os.fstat(file.fileno()).st_size)
     except FileNotFoundError as error:
-        raise IncompleteFileError("there is no such file", argument=name_of(path)) from error
+        raise IncompleteFileError(
+            "there is no such file; check the path and the working folder", argument=name_of(path)
+        ) from error
     except OSError as error:
         raise MalformedFileError(f"cannot be read: {error.strerror}", argument=name_of(path)) from error
     if len(content) > limit:
-        raise TooLargeError(f"expected at most {limit} bytes", argument=name_of(path))
+        raise TooLargeError(
+            f"expected at most {limit} bytes, found {size}; simplify the file, or divide it", argument=name_of(path)
+        )
     return content
 
 
@@ -76,9 +108,15 @@ def load_json(content: bytes, name: str) -> Any:
     TooLargeError
         When it has so many values that they take much more memory than the file.
     """
-    if sum(content.count(sign) for sign in (b",", b"[", b"{")) > MAX_JSON_VALUES:
-        raise TooLargeError(f"expected at most {MAX_JSON_VALUES} values, lists and objects", argument=name)
+    count = sum(content.count(sign) for sign in (b",", b"[", b"{"))
+    if count > MAX_JSON_VALUES:
+        raise TooLargeError(
+            f"expected at most {MAX_JSON_VALUES} values, lists and objects, found {count}; divide the file",
+            argument=name,
+        )
     try:
         return orjson.loads(text_of(content, name))
     except orjson.JSONDecodeError as error:
-        raise MalformedFileError("is not JSON", argument=name) from error
+        raise MalformedFileError(
+            f"is not JSON: line {error.lineno}, column {error.colno} cannot be read; export it again", argument=name
+        ) from error

@@ -14,7 +14,7 @@ from .drawings.geojson import read_geojson
 from .drawings.svg import read_svg
 from .drawings.walls.to_map import to_map
 from .errors import MalformedFileError, UnsupportedFormatError
-from .files import name_of
+from .files import ending_of, name_of
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
@@ -76,7 +76,8 @@ def read_map(
         line_map = to_map(drawing, options)
         return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
     raise UnsupportedFormatError(
-        f"expected a file that ends in one of {', '.join(MAP_SUFFIXES)}", argument=name_of(file)
+        f"expected a file that ends in one of {', '.join(MAP_SUFFIXES)}, found {ending_of(file)}",
+        argument=name_of(file),
     )
 
 

@@ -71,22 +71,27 @@ class ImportOptions:
 
     def __post_init__(self) -> None:
         if isinstance(self.units, str) and self.units not in UNITS:
-            raise InvalidOptionError(f"expected one of {', '.join(UNITS)}, or metres per unit", argument="units")
+            raise InvalidOptionError(
+                f"expected one of {', '.join(UNITS)}, or metres per unit, found another name", argument="units"
+            )
         if isinstance(self.units, int | float) and not 1e-6 <= self.units <= 1e4:
-            raise InvalidOptionError(f"expected 1e-6 to 1e4 metres per unit, got {self.units!r}", argument="units")
+            raise InvalidOptionError(f"expected 1e-6 to 1e4 metres per unit, found {self.units!r}", argument="units")
         if self.drawn not in (None, "faces", "centres"):
-            raise InvalidOptionError("expected faces or centres", argument="drawn")
+            raise InvalidOptionError("expected faces or centres, found another word", argument="drawn")
         if self.directions not in (None, "drawn", "none"):
-            raise InvalidOptionError("expected drawn or none", argument="directions")
+            raise InvalidOptionError("expected drawn or none, found another word", argument="directions")
         if self.thickness is not None and not 0.0 <= self.thickness <= 10.0:
-            raise InvalidOptionError(f"expected from 0 to 10 m, got {self.thickness!r}", argument="thickness")
+            raise InvalidOptionError(f"expected from 0 to 10 m, found {self.thickness!r}", argument="thickness")
         if self.unknown not in (None, "none") and not (type(self.unknown) is int and 0 <= self.unknown <= 255):
             raise InvalidOptionError(
-                f"expected none, or a grey value from 0 to 255, got {self.unknown!r}", argument="unknown"
+                f"expected none, or a grey value from 0 to 255, found {self.unknown!r}", argument="unknown"
             )
         for place in self.inside:
             if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
-                raise InvalidOptionError("expected two numbers, metres", argument="inside")
+                found = "one that is too large or not finite" if len(place) == 2 else f"{len(place)} numbers"
+                raise InvalidOptionError(
+                    f"expected two numbers up to {MAX_COORDINATE:g} m, found {found}", argument="inside"
+                )
 
     @property
     def metres(self) -> float | None:

@@ -9,6 +9,7 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from registration import RigidTransform
 
 from .colours import INK, MATCHED, POINT, USABLE, VERDICTS, WALL, rgb
 from .errors import UnsupportedFormatError
+from .files import ending_of
 from .line_map import LineMap
 
 SIZE = 1600  # pixels of the longer edge
@@ -81,7 +83,9 @@ def draw_map(
         When the name ends in anything else.
     """
     if not os.fspath(path).lower().endswith(".png"):
-        raise UnsupportedFormatError("expected a name that ends in .png", argument="picture")
+        raise UnsupportedFormatError(
+            f"expected a name that ends in .png, found {ending_of(Path(path))}", argument="picture"
+        )
     corners = map.segments.endpoints.reshape(-1, 2) if len(map.segments) else np.zeros((1, 2))
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)

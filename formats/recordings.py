@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from .errors import UnsupportedFormatError
-from .files import name_of
+from .files import ending_of, name_of
 from .logs.carmen import read_carmen
 from .logs.folders import SUFFIXES, is_bag
 from .logs.ros import read_bag
@@ -44,5 +44,6 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_OPTIONS
         return read_carmen(file, options)
     known = ", ".join(LOG_SUFFIXES)
     raise UnsupportedFormatError(
-        f"expected the folder of a bag, or a file that ends in one of {known}", argument=name_of(file)
+        f"expected the folder of a bag, or a file that ends in one of {known}, found {ending_of(file)}",
+        argument=name_of(file),
     )

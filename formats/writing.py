@@ -18,7 +18,7 @@ from .drawings.dxf import FREE_LEFT
 from .drawings.geojson import OWN
 from .drawings.svg import METRES, NAMESPACE, ORIENTED
 from .errors import UnsupportedFormatError
-from .files import name_of
+from .files import ending_of, name_of
 from .line_map import LineMap
 
 UNDIRECTED = "WALLS"  # the layer of lines in a DXF whose directions mean nothing
@@ -44,7 +44,7 @@ def write_map(map: LineMap, path: str | os.PathLike[str]) -> None:
     writer = WRITERS.get(file.suffix.lower())
     if writer is None:
         raise UnsupportedFormatError(
-            f"expected a name that ends in one of {', '.join(WRITERS)}", argument=name_of(file)
+            f"expected a name that ends in one of {', '.join(WRITERS)}, found {ending_of(file)}", argument=name_of(file)
         )
     file.write_bytes(writer(map))
 

@@ -108,9 +108,10 @@ def locate(
         how, known = options or AssociationOptions(), KnownOfMaps(prior, prior_map, map_weights)
         return associate_on_maps(maps, scan_of(scan, angles), known, how, deadline)
     if prior_map is not None or map_weights is not None:
+        name = "map_weights" if prior_map is None else "prior_map"
         raise InvalidArgumentError(
-            "found it with a single map, expected it with several; use `index_maps`, or omit it",
-            argument="map_weights" if prior_map is None else "prior_map",
+            f"found `{name}` with a single map, expected it with several; use `index_maps`, or omit `{name}`",
+            argument=name,
         )
     index, how = prepared(map, options)  # type: ignore[arg-type]
     return associate(index, scan_of(scan, angles), prior, how, deadline)

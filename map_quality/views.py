@@ -59,7 +59,7 @@ class Robot:
         ]
         for argument, good, what in checks:
             if not good:
-                raise AnalysisError(f"expected {what}, got {getattr(self, argument)!r}", argument=f"laser.{argument}")
+                raise AnalysisError(f"expected {what}, found {getattr(self, argument)!r}", argument=f"laser.{argument}")
 
     @property
     def scanner(self) -> Scanner:

@@ -56,7 +56,7 @@ class Correspondences:
         if row >= 0:
             count, what = (len(s), "scan") if column == kernels.SCAN else (len(m), "map")
             raise InvalidArgumentError(
-                f"expected a {what} index from 0 to {count - 1}, got {chosen[row, column]}"
+                f"expected a {what} index from 0 to {count - 1}, found {chosen[row, column]}"
                 if count
                 else f"the {what} has no segments",
                 argument="correspondences",
@@ -167,9 +167,9 @@ def _as_pairs(pairs: ArrayLike) -> Indices:
     if rows.size == 0:
         return np.zeros((0, 2), dtype=np.intp)
     if rows.ndim != 2 or rows.shape[1] != 2:
-        raise InvalidArgumentError(f"expected shape (n, 2), got {rows.shape}", argument="correspondences")
+        raise InvalidArgumentError(f"expected shape (n, 2), found {rows.shape}", argument="correspondences")
     if rows.dtype.kind not in "iu":
         broken = rows.dtype.kind == "f" and (rows != np.floor(rows)).any(axis=1)
         index = int(np.argmax(broken)) if np.any(broken) else None
-        raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
+        raise InvalidArgumentError(f"expected integers, found {rows.dtype}", argument="correspondences", index=index)
     return np.ascontiguousarray(rows, dtype=np.intp)

@@ -65,18 +65,19 @@ class RegistrationOptions:
             value = getattr(self, name)
             if not (math.isfinite(value) and 0.0 <= value <= MAX_COEFFICIENT):
                 raise InvalidArgumentError(
-                    f"expected a number from 0 to {MAX_COEFFICIENT:g}, got {value!r}", argument=f"options.{name}"
+                    f"expected a number from 0 to {MAX_COEFFICIENT:g}, found {value!r}", argument=f"options.{name}"
                 )
         at = self.evaluate_at
         if at is not None and max(abs(at.x), abs(at.y)) > MAX_TRANSLATION:
             raise InvalidArgumentError(
-                f"expected x and y within {MAX_TRANSLATION:g} m of 0", argument="options.evaluate_at"
+                f"expected x and y within {MAX_TRANSLATION:g} m of 0, found ({at.x:g}, {at.y:g})",
+                argument="options.evaluate_at",
             )
 
 
 def _require_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise InvalidArgumentError(
-            f"expected one of {', '.join(choices)}, got {str(value)[:40]!r}",
+            f"expected one of {', '.join(choices)}, found {str(value)[:40]!r}",
             argument=name if name == "weighting" else f"options.{name}",
         )

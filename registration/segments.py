@@ -76,7 +76,7 @@ class Segments:
             raw = np.zeros((0, 4))
         if raw.dtype.kind not in "fiu" or raw.ndim != 2 or raw.shape[1] != 4:
             raise InvalidArgumentError(
-                f"expected numbers of shape (n, 4), got {raw.dtype} of shape {raw.shape}", argument=argument
+                f"expected numbers of shape (n, 4), found {raw.dtype} of shape {raw.shape}", argument=argument
             )
         e = np.array(raw, dtype=np.float64, order="C")
         if not are_within(e.reshape(-1), -MAX_COORDINATE, MAX_COORDINATE):
@@ -221,9 +221,11 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
     if array.size == 0 and shape[0] == 0:
         array = array.reshape(shape)
     if array.shape != shape:
-        raise InvalidArgumentError(f"expected shape {shape}, got {array.shape}", argument=argument)
+        raise InvalidArgumentError(f"expected shape {shape}, found {array.shape}", argument=argument)
     if not are_within(array.reshape(-1), low, high):
         bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
         index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
-        raise InvalidArgumentError(f"expected a number from {low:g} to {high:g}", argument=argument, index=index)
+        raise InvalidArgumentError(
+            f"expected a number from {low:g} to {high:g}, found {array[bad][0]:g}", argument=argument, index=index
+        )
     return _frozen(array)

@@ -41,7 +41,7 @@ class RigidTransform:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.theta)):
-            raise ValueError("expected finite x, y and theta")
+            raise ValueError(f"expected finite x, y and theta, found ({self.x:g}, {self.y:g}, {self.theta:g})")
         if not -math.pi < self.theta <= math.pi:
             object.__setattr__(self, "theta", wrap_angle(self.theta))
 

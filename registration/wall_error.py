@@ -11,7 +11,7 @@ from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .solve import DEFAULT_OPTIONS, register
 
-# The error of walls before any residual, and the number of walls that it counts as; as `association.tuning` has them.
+# The error of walls before any residual, and the number of walls that it counts as: see `association.consensus.tuning`.
 USUAL_WALL_ERROR = 0.02  # m
 USUAL_WALLS = 2.0
 LEAST_WALL_ERROR = 0.003  # m

@@ -48,7 +48,9 @@ def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions
         zero; ``scan.sigma`` when information weighting meets a pair without any noise.
     """
     if not (math.isfinite(map_sigma) and 0.0 <= map_sigma <= MAX_SIGMA):
-        raise InvalidArgumentError(f"expected a number from 0 to {MAX_SIGMA:g}", argument="map.sigma")
+        raise InvalidArgumentError(
+            f"expected a number from 0 to {MAX_SIGMA:g}, found {map_sigma:g}", argument="map.sigma"
+        )
     floored = max(float(map_sigma), MIN_SIGMA) if map_sigma > 0.0 else 0.0
     inverses, known = inverse_variances(pairs.rows, floored**2)
     noise = inverses if known else None
@@ -74,17 +76,18 @@ def _checked_weights(weights: ArrayLike, count: int) -> Floats:
     except (ValueError, OverflowError) as error:
         raise InvalidArgumentError("expected one number per correspondence", argument="weights") from error
     if array.shape != (count,):
-        raise InvalidArgumentError(f"expected shape ({count},), got {array.shape}", argument="weights")
+        raise InvalidArgumentError(f"expected shape ({count},), found {array.shape}", argument="weights")
     if count and array.dtype.kind not in "fiu":
-        raise InvalidArgumentError(f"expected numbers, got {array.dtype}", argument="weights")
+        raise InvalidArgumentError(f"expected numbers, found {array.dtype}", argument="weights")
     array = array.astype(np.float64)
     # Written so that NaN is bad.
     bad = ~((array == 0.0) | ((array >= MIN_WEIGHT) & (array <= MAX_WEIGHT)))
     if bad.any():
+        index = int(np.argmax(bad))
         raise InvalidArgumentError(
-            f"expected 0 or a number from {MIN_WEIGHT:g} to {MAX_WEIGHT:g}",
+            f"expected 0 or a number from {MIN_WEIGHT:g} to {MAX_WEIGHT:g}, found {array[index]:g}",
             argument="weights",
-            index=int(np.argmax(bad)),
+            index=index,
         )
     if count and not array.any():
         raise InvalidArgumentError("all weights are 0, expected at least one above 0", argument="weights")

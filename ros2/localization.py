@@ -107,7 +107,7 @@ class Localization:
         self._correction.take(event, scan)
         if event is Event.CONTRADICTED:
             self._pending = None
-            self._health.note("the agreed pose is contradicted by a scan")
+            self._health.note("a scan contradicts the agreed pose; drive on until a new pose is agreed")
         if event not in (Event.AGREED, Event.CONFIRMED):
             return
         self._follow(scan.map_id)

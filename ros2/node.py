@@ -225,7 +225,11 @@ class Node:
         stamp = scans[0].header.stamp
         if self._maps is None:
             converting = self._converter is not None and self._converter.busy
-            problem = "the map is being converted" if converting else "no usable map has been received"
+            problem = (
+                "the map is being converted; scans are searched afterwards"
+                if converting
+                else "no usable map has been received; start map_server, or set --map"
+            )
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
             return
         looks, missing = looks_of(scans, self._frames, self._options, self._odometry)

@@ -22,7 +22,7 @@ from .messages import (
     TFMessage,
 )
 from .options import NodeOptions
-from .wire import LATCHED, NEWEST, RELIABLE, SENSOR, STREAM, Publisher, Subscription
+from .wire import LATCHED, NEWEST, RELIABLE, SENSOR, STREAM, Publisher, Subscription, undecodable
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,7 @@ class Transforms:
                 try:
                     found.append(TFMessage.deserialize(message.serialized))
                 except Exception as error:  # whatever decoding raises for bytes that are no such message
-                    self.subscription.problem(
-                        f"{self.subscription.name}: a message cannot be decoded and is ignored: {error}"
-                    )
+                    self.subscription.problem(f"{self.subscription.name}: {undecodable(TFMessage, error)}")
         return found
 
 

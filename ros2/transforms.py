@@ -109,12 +109,13 @@ def matrix_of(x: float, y: float, z: float, quaternion: tuple[float, float, floa
     """
     if not all(abs(one) <= MAX_COORDINATE for one in (x, y, z)):
         raise FrameError(
-            f"found the translation ({x:.4g}, {y:.4g}, {z:.4g}), expected metres, at most {MAX_COORDINATE:g} m"
+            f"found the translation ({x:.4g}, {y:.4g}, {z:.4g}), expected metres, at most {MAX_COORDINATE:g} m; "
+            "correct the publisher"
         )
     length = math.hypot(*quaternion) if all(map(math.isfinite, quaternion)) else math.nan
     if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
         found = ", ".join(f"{one:.4g}" for one in quaternion)
-        raise FrameError(f"found the quaternion ({found}), expected one of length 1")
+        raise FrameError(f"found the quaternion ({found}), expected one of length 1; correct the publisher")
     a, b, c, w = (one / length for one in quaternion)
     matrix = np.eye(4)
     matrix[:3, :3] = [
@@ -137,13 +138,15 @@ def matrix_of_message(transform: TransformStamped) -> Floats:
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     named = f"the transform from {quoted(child)} to {quoted(parent)}"
     if not parent or not child:
-        raise FrameError(f"{named} has an empty frame, expected two names")
+        raise FrameError(f"{named} has an empty frame, expected two names; correct the publisher")
     if max(len(parent), len(child)) > MAX_NAME:
         raise FrameError(
-            f"{named} has a name of {max(len(parent), len(child))} characters, expected at most {MAX_NAME}"
+            f"{named} has a name of {max(len(parent), len(child))} characters, expected at most {MAX_NAME}; shorten it"
         )
     if parent == child:
-        raise FrameError(f"{named} makes the frame its own parent, expected two different frames")
+        raise FrameError(
+            f"{named} makes the frame its own parent, expected two different frames; correct the publisher"
+        )
     place, turn = transform.transform.translation, transform.transform.rotation
     try:
         return matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w))

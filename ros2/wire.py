@@ -43,6 +43,14 @@ def topic_name(name: str) -> str:
     return f"rt/{name.strip('/')}"
 
 
+def undecodable(kind: type[IdlStruct], error: Exception) -> str:
+    """Return the problem of a message whose bytes are not those of its type."""
+    return (
+        f"a message cannot be decoded and is ignored: {error}; expected a {kind.__name__}. Check the type that is "
+        "published"
+    )
+
+
 def _ignore(problem: str) -> None:
     pass
 
@@ -74,7 +82,7 @@ class Subscription(Generic[Message]):
         problem: Callable[[str], None] = _ignore,
     ) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
-        self.name, self.problem = name, problem
+        self.name, self.problem, self._kind = name, problem, kind
         self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
         self._writers = Endpoints(participant, topic_name(name), profiles, writers=True)
 
@@ -101,7 +109,7 @@ class Subscription(Generic[Message]):
                 self.problem(f"{self.name}: reading failed: {error}")
                 break
             except Exception as error:  # whatever decoding raises for bytes that are no such message
-                self.problem(f"{self.name}: a message cannot be decoded and is ignored: {error}")
+                self.problem(f"{self.name}: {undecodable(self._kind, error)}")
                 continue
             if not samples:
                 break

@@ -229,7 +229,11 @@ async def _prepare(services: Services) -> None:
     except StoreError as error:
         # readyz goes on trying; meanwhile it reports the error.
         where = services.settings.url.render_as_string(hide_password=True)
-        logger.error("the store does not open: %s", error, extra={"store": where})
+        logger.error(
+            "the store does not open: %s; /readyz returns 503 until it does. Check the database, or the data folder",
+            error,
+            extra={"store": where},
+        )
     threads, parser = services.parse_threads, services.parser
     await threads.run(remove_abandoned)
     if not is_complete():

@@ -26,12 +26,14 @@ def database_url(text: str) -> URL:
     try:
         url = make_url(text)
     except (ArgumentError, ValueError):
-        raise ValueError("expected a URL such as postgresql://user@host/database") from None
+        raise ValueError("expected a URL such as postgresql://user@host/database, found other text") from None
     if url.drivername in _POSTGRESQL:
         return url.set(drivername="postgresql+psycopg")
     if url.drivername in _SQLITE:
         return url
-    raise ValueError("expected a URL that begins with sqlite:// or postgresql://")
+    raise ValueError(
+        f"expected a URL that begins with sqlite:// or postgresql://, found one that begins with {url.drivername}://"
+    )
 
 
 def file_of(url: URL) -> Path | None:

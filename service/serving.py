@@ -62,7 +62,12 @@ def run(settings: Settings) -> int:
     try:
         return serve_settings(settings)
     except OSError as error:
-        logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
+        logger.error(
+            "cannot listen on %s port %d: %s; choose another port with --port, or another address with --host",
+            settings.host,
+            settings.port,
+            error.strerror,
+        )
         return 1
 
 

@@ -292,19 +292,26 @@ def _require_usable_keys(settings: Settings) -> None:
             raise SettingsError(f"keys_file: {error}") from None
     said = [value is not None for value in (settings.jwt_issuer, settings.jwt_audience, settings.jwt_keys)]
     if any(said) and not all(said):
-        raise SettingsError("jwt_issuer, jwt_audience, jwt_keys: expected all three or none; set the missing ones")
+        raise SettingsError(
+            f"jwt_issuer, jwt_audience, jwt_keys: expected all three or none, found {sum(said)}; set the missing ones"
+        )
     unknown = set(settings.jwt_algorithms) - set(ALGORITHMS)
     if unknown or not settings.jwt_algorithms:
-        raise SettingsError(f"jwt_algorithms: expected some of {', '.join(ALGORITHMS)}")
+        raise SettingsError(
+            f"jwt_algorithms: expected some of {', '.join(ALGORITHMS)}, found {', '.join(sorted(unknown)) or 'none'}"
+        )
     where = urlsplit(settings.jwt_keys or "")
     if where.scheme and where.scheme != "https" and not (where.scheme == "http" and is_loopback(where.hostname or "")):
-        raise SettingsError("jwt_keys: expected a path, or a URL that begins with https")
+        raise SettingsError(
+            f"jwt_keys: expected a path, or a URL that begins with https, found one that begins with {where.scheme}"
+        )
 
 
 def _require_usable_certificate(settings: Settings) -> None:
     """Refuse a certificate that cannot be loaded with its key."""
     if (settings.tls_cert is None) != (settings.tls_key is None):
-        raise SettingsError("tls_cert, tls_key: expected both or neither")
+        one = "tls_key" if settings.tls_cert is None else "tls_cert"
+        raise SettingsError(f"tls_cert, tls_key: expected both or neither, found {one} only; set the other one, too")
     if settings.tls_cert is not None:
         try:
             # Without a callback the start would wait for a password to be typed.

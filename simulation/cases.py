@@ -117,7 +117,7 @@ def draw_case(world: str, condition: str, number: int) -> Case:
     """
     for argument, name, known in (("world", world, FAMILIES), ("condition", condition, CONDITIONS)):
         if name not in known:
-            raise SimulationError(f"expected one of {', '.join(known)}; got {name!r}", argument=argument)
+            raise SimulationError(f"expected one of {', '.join(known)}; found {name!r}", argument=argument)
     rng = np.random.default_rng([zlib.crc32(world.encode()), zlib.crc32(condition.encode()), number])
     for _ in range(DRAWS):
         case = _attempt(world, condition, number, rng)

@@ -54,7 +54,7 @@ class OfficePlan:
         ]
         for argument, good, what in checks:
             if not good:
-                raise SimulationError(f"expected {what}, got {getattr(self, argument)!r}", argument=argument)
+                raise SimulationError(f"expected {what}, found {getattr(self, argument)!r}", argument=argument)
 
 
 def offices(rng: np.random.Generator, plan: OfficePlan | None = None) -> World:

@@ -79,7 +79,7 @@ class Scanner:
         ]  # fmt: skip
         for argument, good, what in checks:
             if not good:
-                raise SimulationError(f"expected a number {what}, got {getattr(self, argument)!r}", argument=argument)
+                raise SimulationError(f"expected a number {what}, found {getattr(self, argument)!r}", argument=argument)
 
     @classmethod
     def over(cls, field_of_view: float, beams: int, **others: float) -> Scanner:

@@ -86,7 +86,7 @@ def l_room(width: float = 8.0, height: float = 6.0, notch: float = 3.0) -> World
     _positive("width", width)
     _positive("height", height)
     if not 0.0 < notch < min(width, height):
-        raise SimulationError(f"expected above 0 and below width and height, got {notch!r}", argument="notch")
+        raise SimulationError(f"expected above 0 and below width and height, found {notch!r}", argument="notch")
     x, y = width - notch, height - notch
     corners = [(0.0, 0.0), (width, 0.0), (width, y), (x, y), (x, height), (0.0, height)]
     poses = [(0.5 * x, 0.5 * y, 0.0), (0.6 * x, y + 0.4 * notch, 2.0), (x + 0.5 * notch, 0.4 * y, -1.0)]
@@ -155,9 +155,9 @@ def with_obstacles(world: World, boxes: int, rng: np.random.Generator, size: tup
         Least and greatest length of their sides, metres.
     """
     if boxes < 0:
-        raise SimulationError(f"expected 0 or more, got {boxes!r}", argument="boxes")
+        raise SimulationError(f"expected 0 or more, found {boxes!r}", argument="boxes")
     if not 0.0 < size[0] <= size[1]:
-        raise SimulationError(f"expected two lengths above 0, the lesser first, got {size!r}", argument="size")
+        raise SimulationError(f"expected two lengths above 0, the lesser first, found {size!r}", argument="size")
     points = world.segments.endpoints.reshape(-1, 2)
     places = np.array([[p.x, p.y] for p in world.poses]).reshape(-1, 2)
     pieces = [world.segments.endpoints]
@@ -191,4 +191,4 @@ def _path(corners: Sequence[Corner], count: int) -> list[tuple[float, float, flo
 
 def _positive(argument: str, value: float) -> None:
     if not 0.0 < value < math.inf:
-        raise SimulationError(f"expected above 0, got {value!r}", argument=argument)
+        raise SimulationError(f"expected above 0, found {value!r}", argument=argument)

@@ -100,22 +100,24 @@ class LaserScan:
         m = len(values)
         if not abs(angle_min) <= MAX_ANGLE:
             raise InvalidScanError(
-                f"expected -{MAX_ANGLE:g} to {MAX_ANGLE:g} rad, got {angle_min!r}", argument="angle_min"
+                f"expected -{MAX_ANGLE:g} to {MAX_ANGLE:g} rad, found {angle_min!r}", argument="angle_min"
             )
         turn = abs(angle_increment) * max(1, m - 1)
         if not (abs(angle_increment) >= MIN_INCREMENT and turn <= math.tau * (1.0 + 1e-3)):
             raise InvalidScanError(
                 f"expected radians, at least {MIN_INCREMENT:g} and at most one turn over {m} beams; "
-                f"got {angle_increment!r}",
+                f"found {angle_increment!r}",
                 argument="angle_increment",
             )
         if not 0.0 <= range_min < math.inf:
-            raise InvalidScanError(f"expected at least 0 m, got {range_min!r}", argument="range_min")
+            raise InvalidScanError(f"expected at least 0 m, found {range_min!r}", argument="range_min")
         if not range_max > range_min:
-            raise InvalidScanError(f"expected more than range_min, got {range_max!r}", argument="range_max")
-        if motion is not None and abs(motion.omega * motion.time_increment) > MOST_TURN * abs(angle_increment):
+            raise InvalidScanError(f"expected more than range_min, found {range_max!r}", argument="range_max")
+        moved = 0.0 if motion is None else abs(motion.omega * motion.time_increment)
+        if moved > MOST_TURN * abs(angle_increment):
             raise InvalidScanError(
-                "expected a sensor that rotates much slower than its beams; check omega (rad/s) and time_increment (s)",
+                f"expected a sensor that rotates much slower than its beams, found {moved:.3g} rad from beam to beam; "
+                "check omega (rad/s) and time_increment (s)",
                 argument="twist",
             )
         object.__setattr__(self, "motion", motion)
@@ -194,9 +196,9 @@ def _numbers(ranges: ArrayLike) -> Floats:
     strange = raw.dtype.kind == "O" and any(v is not None and type(v) not in (int, float) for v in raw.flat)
     if raw.dtype.kind not in "fiuO" or strange or values.ndim != 1:
         raise InvalidScanError(
-            f"expected numbers of shape (m,), got {raw.dtype} of shape {raw.shape}", argument="ranges"
+            f"expected numbers of shape (m,), found {raw.dtype} of shape {raw.shape}", argument="ranges"
         )
     if len(values) > MAX_BEAMS:
-        raise InvalidScanError(f"expected at most {MAX_BEAMS} beams, got {len(values)}", argument="ranges")
+        raise InvalidScanError(f"expected at most {MAX_BEAMS} beams, found {len(values)}", argument="ranges")
     values.setflags(write=False)
     return values

@@ -38,10 +38,10 @@ class VectorizationOptions:
 
     def __post_init__(self) -> None:
         if self.sigma is not None and not 0.0 < self.sigma <= 10.0:
-            raise InvalidOptionError(f"expected more than 0 and at most 10 m, got {self.sigma!r}", argument="sigma")
+            raise InvalidOptionError(f"expected more than 0 and at most 10 m, found {self.sigma!r}", argument="sigma")
         if not 3 <= self.min_points <= 1000:
-            raise InvalidOptionError(f"expected 3 to 1000, got {self.min_points!r}", argument="min_points")
+            raise InvalidOptionError(f"expected 3 to 1000, found {self.min_points!r}", argument="min_points")
         if not 1e-3 <= self.min_length <= 1e3:
-            raise InvalidOptionError(f"expected 0.001 to 1000 m, got {self.min_length!r}", argument="min_length")
+            raise InvalidOptionError(f"expected 0.001 to 1000 m, found {self.min_length!r}", argument="min_length")
         if self.max_gap is not None and not (self.max_gap > 0.0 and math.isfinite(self.max_gap)):
-            raise InvalidOptionError(f"expected more than 0 m, got {self.max_gap!r}", argument="max_gap")
+            raise InvalidOptionError(f"expected more than 0 m, found {self.max_gap!r}", argument="max_gap")

@@ -231,19 +231,22 @@ def _checked_points(points: ArrayLike) -> Floats:
         raw = np.zeros((0, 2))
     if raw.dtype.kind not in "fiu" or raw.ndim != 2 or raw.shape[1] != 2:
         raise InvalidScanError(
-            f"expected numbers of shape (m, 2), got {raw.dtype} of shape {raw.shape}", argument="points"
+            f"expected numbers of shape (m, 2), found {raw.dtype} of shape {raw.shape}", argument="points"
         )
     if len(raw) > MAX_BEAMS:
-        raise InvalidScanError(f"expected at most {MAX_BEAMS} points, got {len(raw)}", argument="points")
+        raise InvalidScanError(f"expected at most {MAX_BEAMS} points, found {len(raw)}", argument="points")
     values = np.array(raw, dtype=np.float64)
     bad = ~np.isfinite(values).all(axis=1)
     if len(values) and not bad.any():
         bad = (np.abs(values - values[0]) > MAX_LENGTH).any(axis=1) | (np.abs(values) > MAX_COORDINATE).any(axis=1)
     if bad.any():
+        index = int(np.argmax(bad))
+        x, y = values[index]
         raise InvalidScanError(
-            f"expected finite numbers within {MAX_LENGTH:g} m of the first",
+            f"expected finite numbers within {MAX_LENGTH:g} m of the first, found ({x:g}, {y:g}); leave out beams "
+            "without a return",
             argument="points",
-            index=int(np.argmax(bad)),
+            index=index,
         )
     return values
 
@@ -251,10 +254,10 @@ def _checked_points(points: ArrayLike) -> Floats:
 def _checked_viewpoint(viewpoint: tuple[float, float], points: Floats) -> Floats:
     place = np.asarray(viewpoint, dtype=np.float64)
     if place.shape != (2,) or not np.isfinite(place).all():
-        raise InvalidScanError(f"expected two finite numbers, got {viewpoint!r}", argument="viewpoint")
+        raise InvalidScanError(f"expected two finite numbers, found {viewpoint!r}", argument="viewpoint")
     if (np.abs(points - place) > MAX_LENGTH).any():
         raise InvalidScanError(
-            f"expected a viewpoint within {MAX_LENGTH:g} m of all points, got {viewpoint!r}", argument="viewpoint"
+            f"expected a viewpoint within {MAX_LENGTH:g} m of all points, found {viewpoint!r}", argument="viewpoint"
         )
     return place
 

@@ -129,12 +129,15 @@ class MapIndex:
         if len(segments) == 0:
             raise InvalidMapError("expected at least one segment, found none", argument=f"{path}segments")
         if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
-            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument=f"{path}sigma")
+            raise InvalidMapError(
+                f"expected a number from 0 to {MAX_MAP_SIGMA:g} m, found {sigma:g}", argument=f"{path}sigma"
+            )
         corners = segments.endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
-        if (high - low).max() > MAX_EXTENT:
+        extent = float((high - low).max())
+        if extent > MAX_EXTENT:
             raise InvalidMapError(
-                f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit",
+                f"expected an extent of at most {MAX_EXTENT:g} m, found {extent:.4g} m; check the unit",
                 argument=f"{path}segments",
             )
         return low, high

@@ -61,11 +61,13 @@ def assemble(views: Sequence[View]) -> Scan:
         has a deviation beyond 10 m or rad.
     """
     if not 1 <= len(views) <= MAX_VIEWS:
-        raise InvalidSearchError(f"expected 1 to {MAX_VIEWS} views, got {len(views)}", argument="scan.views")
+        raise InvalidSearchError(f"expected 1 to {MAX_VIEWS} views, found {len(views)}", argument="scan.views")
     for v, view in enumerate(views):
-        if view.covariance is not None and not np.diag(view.covariance).max() <= MOST_VARIANCE:
+        variance = 0.0 if view.covariance is None else float(np.diag(view.covariance).max())
+        if not variance <= MOST_VARIANCE:
             raise InvalidSearchError(
-                f"expected variances of at most {MOST_VARIANCE:g}", argument=f"scan.views.{v}.covariance"
+                f"expected variances of at most {MOST_VARIANCE:g}, found {variance:.4g}; check the units",
+                argument=f"scan.views.{v}.covariance",
             )
     order = _outward(views)
     if len(views) == 1 and not _uncertain(views[0]) and views[0].motion is None and views[0].pose == IDENTITY:

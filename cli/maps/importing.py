@@ -175,7 +175,7 @@ def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
         When there is no such file.
     """
     if not file.exists():
-        raise WrongUseError(f"{file}: there is no such file")
+        raise WrongUseError(f"{file}: there is no such file; check the path and the working folder")
     if server is None:
         with needing_formats(f"reading {file.name}"), refusing(Asked(files=(file.name,))):
             options = said.options

@@ -78,5 +78,5 @@ def remove(map_id: MapId, server: Server = None) -> None:
 
 def _checked(map_id: str) -> str:
     if not MAP_ID.fullmatch(map_id):
-        raise WrongUseError("the id is not valid: expected 1 to 128 of A-Z a-z 0-9 . _ -")
+        raise WrongUseError(f"the id is not valid: expected 1 to 128 of A-Z a-z 0-9 . _ -, found {map_id[:200]!r}")
     return map_id

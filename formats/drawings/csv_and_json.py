@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import MalformedFileError, TooLargeError
-from ..files import load_json, name_of, read_bounded, text_of
+from ..files import kind_of, load_json, name_of, read_bounded, text_of
 from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES
 from ..options import ImportOptions
 from ..report import Notes, shown
@@ -32,10 +32,12 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
     told = {"segments": root} if isinstance(root, list) else root
     if not isinstance(told, dict) or not isinstance(told.get("segments"), list):
-        raise MalformedFileError('expected {"segments": [[x1, y1, x2, y2], ...]}', argument=name)
+        found = f"segments that are {kind_of(told.get('segments'))}" if isinstance(told, dict) else kind_of(told)
+        raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}', argument=name)
     rows = told["segments"]
-    if not all(isinstance(r, list) and len(r) == 4 and all(type(c) in (int, float) for c in r) for r in rows):
-        raise MalformedFileError("expected every segment to be [x1, y1, x2, y2]", argument=name)
+    wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_segment(k, row))), None)
+    if wrong is not None:
+        raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}", argument=name)
     drawing = Drawing(name, "json", options.layers, notes, 1.0)
     _take_properties(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
@@ -44,15 +46,28 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     return drawing
 
 
+def _fault_of_segment(k: int, row: Any) -> str | None:
+    if not isinstance(row, list) or len(row) != 4:
+        return f"{kind_of(row)} as segment {k}"
+    return next((f"{kind_of(c)} in segment {k}" for c in row if type(c) not in (int, float)), None)
+
+
 def _take_properties(told: dict[str, Any], drawing: Drawing) -> None:
     oriented, sigma = told.get("oriented", True), told.get("sigma")
     frame_id, meta = told.get("frame_id", "map"), told.get("meta") or {}
     if not isinstance(oriented, bool):
-        raise MalformedFileError("expected oriented to be true or false", argument=drawing.name)
+        raise MalformedFileError(
+            f"expected oriented to be true or false, found {kind_of(oriented)}", argument=drawing.name
+        )
     if sigma is not None and not (type(sigma) in (int, float) and 0.0 <= sigma <= 10.0):
-        raise MalformedFileError("expected sigma to be a number from 0 to 10, or null", argument=drawing.name)
+        raise MalformedFileError(
+            f"expected sigma to be a number from 0 to 10, or null, found {kind_of(sigma)}", argument=drawing.name
+        )
     if not isinstance(frame_id, str) or not isinstance(meta, dict):
-        raise MalformedFileError("expected frame_id to be text and meta an object", argument=drawing.name)
+        raise MalformedFileError(
+            f"expected frame_id to be text and meta an object, found {kind_of(frame_id)} and {kind_of(meta)}",
+            argument=drawing.name,
+        )
     drawing.oriented, drawing.sigma = oriented, None if sigma is None else float(sigma)
     drawing.frame_id = shown(frame_id)
     drawing.meta = {shown(str(k)): shown(v) for k, v in meta.items() if isinstance(v, str)}
@@ -71,24 +86,46 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """
     name = name_of(path)
     text = text_of(read_bounded(path, MAX_MAP_BYTES), name)
-    if sum(text.count(end) for end in ("\n", "\r")) > 2 * MAX_LINES:
-        raise TooLargeError(f"expected at most {MAX_LINES} lines", argument=name)
+    ends = sum(text.count(end) for end in ("\n", "\r"))
+    if ends > 2 * MAX_LINES:
+        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends", argument=name)
     lines = list(io.StringIO(text, newline=None))
-    if len(lines) > MAX_LINES or any(len(line) > MAX_CSV_LINE for line in lines):
-        raise TooLargeError(f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters", argument=name)
+    longest = max(map(len, lines), default=0)
+    if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
+        raise TooLargeError(
+            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}",
+            argument=name,
+        )
     comments = {line[1:].strip() for line in lines if line.startswith("#")}
     body = "".join(line for line in lines if line.strip() and not line.startswith("#"))
     first = body.partition("\n")[0]
     delimiter = max(",;\t ", key=first.count) if first else ","
     drawing = Drawing(name, "csv", options.layers, notes, 1.0, "oriented=true" in comments)
+    rows: list[list[str]] = []
     try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(body), delimiter=delimiter)]
+        rows += [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(body), delimiter=delimiter)]
         wanted, start = _columns(rows[0] if rows else [])
         table = np.array([[row[k] for k in wanted] for row in rows[start:]], dtype=np.float64).reshape(-1, 4)
     except (csv.Error, ValueError, LookupError) as error:
-        raise MalformedFileError("expected rows of x1, y1, x2, y2", argument=name) from error
+        raise MalformedFileError(
+            f"expected rows of x1, y1, x2, y2, found {_fault_of_rows(rows)}", argument=name
+        ) from error
     drawing.add_segments(table)
     return drawing
+
+
+def _fault_of_rows(rows: list[list[str]]) -> str:
+    """Return what the first row has that cannot be read; rows are counted without comments and empty lines."""
+    wanted, start = _columns(rows[0] if rows else [])
+    for number, row in enumerate(rows[start:], start + 1):
+        if len(row) <= max(wanted):
+            return f"{len(row)} cells in row {number}"
+        for column in wanted:
+            try:
+                float(row[column])
+            except ValueError:
+                return f"no number in column {column + 1} of row {number}"
+    return "cells that cannot be divided: check the quotes"
 
 
 def _columns(first: list[str]) -> tuple[list[int], int]:

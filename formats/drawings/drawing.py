@@ -96,7 +96,9 @@ class Drawing:
     def _keep(self, endpoints: Floats, width: float, layer: str) -> None:
         self._count += len(endpoints)
         if self._count > MAX_SEGMENTS:
-            raise TooLargeError(f"expected at most {MAX_SEGMENTS} lines", argument=self.name)
+            raise TooLargeError(
+                f"expected at most {MAX_SEGMENTS} lines, found {self._count} or more; select layers", argument=self.name
+            )
         if len(endpoints):
             self.segments.append(endpoints)
             self.widths.append(width)
@@ -106,7 +108,9 @@ class Drawing:
         try:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
-            raise MalformedFileError("has a coordinate that is not a number", argument=self.name) from error
+            raise MalformedFileError(
+                f"has a coordinate that is not a number up to {MAX_UNITS:g}: found text or a list", argument=self.name
+            ) from error
         if array.size == 0:
             return np.zeros((0, columns))
         if array.ndim != 2 or array.shape[1] != columns or not (np.abs(array) <= MAX_UNITS).all():

@@ -78,7 +78,9 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     except FormatError:
         raise
     except BROKEN as error:
-        raise MalformedFileError("has a block that cannot be read", argument=name) from error
+        raise MalformedFileError(
+            "has a block that cannot be read; expected valid entities. Repair the drawing (AUDIT)", argument=name
+        ) from error
     if others:
         what = f"entities on layers that the option layers excludes: {listed(others)}"
         notes.add_dropped("other_layer", what, others.total())
@@ -94,7 +96,10 @@ def _document(path: Path, notes: Notes) -> Document:
     if not content.strip():
         raise MalformedFileError("is empty, expected a DXF", argument=name)
     if sum(1 for _ in islice(_OBJECT.finditer(content), MAX_DXF_OBJECTS + 1)) > MAX_DXF_OBJECTS:
-        raise TooLargeError(f"expected at most {MAX_DXF_OBJECTS} entities and objects", argument=name)
+        raise TooLargeError(
+            f"expected at most {MAX_DXF_OBJECTS} entities and objects, found more; delete those that are no walls",
+            argument=name,
+        )
     try:
         document, auditor = _parsed(path, content)
     except (OSError, *BROKEN) as error:
@@ -166,7 +171,11 @@ def _add(entity: DXFEntity, drawing: Drawing, layer: str, sagitta: float) -> Non
             argument=drawing.name,
         ) from error
     if len(points) > MAX_CURVE_POINTS:
-        raise TooLargeError(f"expected at most {MAX_CURVE_POINTS} points of a curve", argument=drawing.name)
+        raise TooLargeError(
+            f"expected at most {MAX_CURVE_POINTS} points of a curve, found {len(points)}; simplify the curve on layer "
+            f"{shown(layer)}",
+            argument=drawing.name,
+        )
     drawing.add(points, width=width, layer=layer)
     drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
 

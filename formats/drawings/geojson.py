@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
-from ..files import load_json, name_of, read_bounded
+from ..files import kind_of, load_json, name_of, read_bounded
 from ..limits import MAX_ENTITIES, MAX_MAP_BYTES, MAX_UNITS
 from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
 
+MAX_COLLECTIONS = 4
 OWN = "linefix"  # the member that identifies our own files
 
 Lines = Iterator[tuple[Any, bool]]
@@ -37,7 +38,8 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     name = name_of(path)
     root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
-        raise MalformedFileError("is not GeoJSON", argument=name)
+        found = "an object without it" if isinstance(root, dict) else kind_of(root)
+        raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}", argument=name)
     own = root.get(OWN)
     told = own if isinstance(own, dict) else {}
     if not options.local_metres and told.get("metres") is not True:
@@ -48,12 +50,14 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     drawing = Drawing(name, "geojson", options.layers, notes, 1.0, told.get("oriented") is True)
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
-        raise MalformedFileError("expected features to be a list", argument=name)
+        raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}", argument=name)
     if len(features) > MAX_ENTITIES:
         raise TooLargeError(f"expected at most {MAX_ENTITIES} features, found {len(features)}", argument=name)
-    for feature in features:
+    for k, feature in enumerate(features):
         if not isinstance(feature, dict):
-            raise MalformedFileError("expected every feature to be an object", argument=name)
+            raise MalformedFileError(
+                f"expected every feature to be an object, found {kind_of(feature)} as feature {k}", argument=name
+            )
         _read_feature(feature, drawing)
     return drawing
 
@@ -75,9 +79,14 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
         try:
             pairs = [(p[0], p[1]) for p in points]
         except (TypeError, LookupError) as error:
-            raise MalformedFileError("has a position that is not [x, y]", argument=drawing.name) from error
-        if not all(type(c) in (int, float) for pair in pairs for c in pair):
-            raise MalformedFileError("has a coordinate that is not a number", argument=drawing.name)
+            raise MalformedFileError(
+                "has a position that is not [x, y]: check the nesting of lists", argument=drawing.name
+            ) from error
+        wrong = next((c for pair in pairs for c in pair if type(c) not in (int, float)), 0)
+        if wrong != 0:
+            raise MalformedFileError(
+                f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)}", argument=drawing.name
+            )
         drawing.add(pairs, closed=closed, width=width, layer=layers[0] if layers else "")
 
 
@@ -87,8 +96,15 @@ def _width(value: Any) -> float | None:
 
 def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
     """Yield the polylines of a geometry, and whether each is closed."""
-    if not isinstance(geometry, dict) or depth > 4:
-        raise MalformedFileError("has a geometry that is not an object, or nested collections", argument=drawing.name)
+    if not isinstance(geometry, dict):
+        raise MalformedFileError(
+            f"expected a geometry to be an object, found {kind_of(geometry)}", argument=drawing.name
+        )
+    if depth > MAX_COLLECTIONS:
+        raise MalformedFileError(
+            f"expected at most {MAX_COLLECTIONS} nested collections, found more; flatten them",
+            argument=drawing.name,
+        )
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind == "GeometryCollection":
         for inner in _listed(geometry.get("geometries"), drawing):
@@ -108,5 +124,5 @@ def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
 
 def _listed(value: Any, drawing: Drawing) -> list[Any]:
     if not isinstance(value, list):
-        raise MalformedFileError("expected coordinates in lists", argument=drawing.name)
+        raise MalformedFileError(f"expected coordinates in lists, found {kind_of(value)}", argument=drawing.name)
     return value

@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 from registration import RigidTransform
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError
-from ..files import name_of, read_bounded, text_of
+from ..files import kind_of, name_of, read_bounded, text_of
 from ..limits import (
     MAX_CELLS,
     MAX_MAP_BYTES,
@@ -87,7 +87,9 @@ def read_grid(
     told = read_description(path, notes)
     picture = path.parent / told.image if pictures is None else pictures.get(told.image)
     if picture is None:
-        raise IncompleteFileError("there is no such file", argument=shown(told.image))
+        raise IncompleteFileError(
+            "there is no such file among those of the request; add it", argument=shown(told.image)
+        )
     pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
@@ -116,13 +118,17 @@ def read_description(path: Path, notes: Notes) -> Description:
     text = text_of(read_bounded(path, MAX_YAML_BYTES), name)
     values = yaml_of(text, name)
     if not isinstance(values, dict):
-        raise MalformedFileError("expected a YAML mapping with image, resolution and origin", argument=name)
+        raise MalformedFileError(
+            f"expected a YAML mapping with image, resolution and origin, found {kind_of(values)}", argument=name
+        )
     missing = [key for key in ("image", "resolution", "origin") if key not in values]
     if missing:
         raise IncompleteFileError(f"has no {' and '.join(missing)}; add it", argument=name)
     mode = values.get("mode", "trinary")
     if mode not in MODES:
-        raise UnsupportedFormatError(f"has an unknown mode; expected one of {', '.join(MODES)}", argument=name)
+        raise UnsupportedFormatError(
+            f"has an unknown mode; expected one of {', '.join(MODES)}, found {shown(str(mode))}", argument=name
+        )
     for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
         if key not in values:
             notes.add_assumed(key, f"{key} is {assumed}, because the file has none")
@@ -140,7 +146,8 @@ def read_description(path: Path, notes: Notes) -> Description:
 def _image(value: Any, name: str) -> str:
     image = PureWindowsPath(value).name if isinstance(value, str) else ""
     if not image or "\0" in image:
-        raise MalformedFileError("expected image to be the name of a file", argument=name)
+        found = "a name that no file can have" if isinstance(value, str) else kind_of(value)
+        raise MalformedFileError(f"expected image to be the name of a file, found {found}", argument=name)
     return image
 
 
@@ -149,14 +156,19 @@ def _number(
 ) -> float:
     value = values.get(key, default)
     if not isinstance(value, int | float) or not low <= value <= high:
-        raise MalformedFileError(f"expected {key} to be a number from {low:g} to {high:g}", argument=name)
+        raise MalformedFileError(
+            f"expected {key} to be a number from {low:g} to {high:g}, found {kind_of(value)}", argument=name
+        )
     return float(value)
 
 
 def _origin(value: Any, name: str) -> RigidTransform:
     numbers = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
     if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in value):
-        raise MalformedFileError(f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}", argument=name)
+        found = ", ".join(map(kind_of, value[:4])) if isinstance(value, list) else kind_of(value)
+        raise MalformedFileError(
+            f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}, found {found}", argument=name
+        )
     return RigidTransform(*map(float, value))
 
 
@@ -184,16 +196,24 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
             warnings.simplefilter("error")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
                 if picture.width * picture.height > MAX_CELLS:
-                    raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name)
+                    raise TooLargeError(
+                        f"expected at most {MAX_CELLS} pixels, found {picture.width} x {picture.height}; crop the map",
+                        argument=name,
+                    )
                 return _pixels(picture)
     except FormatError:
         raise
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name) from error
+        raise TooLargeError(
+            f"expected at most {MAX_CELLS} pixels, found many more; crop the map", argument=name
+        ) from error
     except UnidentifiedImageError as error:
         raise MalformedFileError("is not a picture; expected PGM, PNG, BMP or JPEG", argument=name) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
-        raise MalformedFileError(f"is a broken picture: {shown(str(error))}", argument=name) from error
+        raise MalformedFileError(
+            f"is a broken picture: {shown(str(error))}; expected a whole PGM, PNG, BMP or JPEG. Save it again",
+            argument=name,
+        ) from error
 
 
 def _pixels(picture: Image.Image) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:

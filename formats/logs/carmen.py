@@ -42,7 +42,9 @@ def read_carmen(path: Path, options: LogOptions) -> Log:
         While iterating, when a line is too long.
     """
     if not path.is_file():
-        raise IncompleteFileError("there is no such file", argument=name_of(path))
+        raise IncompleteFileError(
+            "there is no such file; check the path and the working folder", argument=name_of(path)
+        )
     return Log("carmen", name_of(path), partial(_scans, path, options))
 
 
@@ -161,7 +163,7 @@ def _logged(
 def _count(word: str) -> int:
     n = int(word)
     if n < 0:
-        raise ValueError("a negative count")
+        raise ValueError(f"expected a count of at least 0, found {n}")
     return n
 
 

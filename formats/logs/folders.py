@@ -42,7 +42,7 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     """
     name = name_of(path)
     if not path.exists():
-        raise IncompleteFileError("there is no such file", argument=name)
+        raise IncompleteFileError("there is no such file; check the path and the working folder", argument=name)
     if not path.is_dir():
         hint = _hint(path)
         if hint is not None:

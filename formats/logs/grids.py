@@ -170,7 +170,10 @@ def grid_of(message: Any, name: str, notes: Notes) -> tuple[Grid, str]:
     width, height = int(message.info.width), int(message.info.height)
     resolution = float(np.float32(message.info.resolution))
     if width * height > MAX_CELLS:
-        raise TooLargeError(f"expected at most {MAX_CELLS} cells", argument=name)
+        raise TooLargeError(
+            f"expected at most {MAX_CELLS} cells, found {width} x {height}; crop the map, or make its cells larger",
+            argument=name,
+        )
     cells = _cells(message)
     if cells is None or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
         raise MalformedFileError(

@@ -18,6 +18,7 @@ from registration.limits import MAX_COORDINATE
 
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_TRANSFORMS
+from ..report import shown
 from .tuning import REFIXED, STALE_NS, UNIT, WINDOW_NS
 
 Floats = NDArray[np.float64]
@@ -195,12 +196,21 @@ class Transforms:
         """
         parent, child = parent.strip("/"), child.strip("/")
         if not parent or not child:
-            raise MalformedFileError("a frame has no name", argument=self._name)
+            raise MalformedFileError(
+                f"a frame has no name: expected two names, found {shown(parent)!r} and {shown(child)!r}",
+                argument=self._name,
+            )
         if parent == child:
-            raise MalformedFileError("a frame is its own parent", argument=self._name)
+            raise MalformedFileError(
+                f"the frame {shown(child)!r} is its own parent: expected two different frames", argument=self._name
+            )
         self._count += 1
         if self._count > MAX_TRANSFORMS or len(self._parents) > MAX_FRAMES:
-            raise TooLargeError(f"expected at most {MAX_TRANSFORMS} transforms", argument=self._name)
+            raise TooLargeError(
+                f"expected at most {MAX_TRANSFORMS} transforms of {MAX_FRAMES} frames, found {self._count} of "
+                f"{len(self._parents)} or more; record fewer topics",
+                argument=self._name,
+            )
         tracks = self._parents.setdefault(child, {})
         track = tracks.pop(parent) if parent in tracks else Track(static)
         track.add(stamp, matrix, static=static)

@@ -130,7 +130,7 @@ class Analysis:
             When the places cannot be had, or the drive is out of range.
         """
         if not 0.0 <= drive <= MOST_DRIVE:
-            raise AnalysisError(f"expected from 0 to {MOST_DRIVE:g} m, got {drive:g}", argument="drive")
+            raise AnalysisError(f"expected from 0 to {MOST_DRIVE:g} m, found {drive:g}", argument="drive")
         # Of a map without directions the index holds each segment twice.
         segments = Segments.derived(index.segments.endpoints[: index.directed])
         standing = standing_places(segments, robot, spacing, point)

@@ -54,7 +54,9 @@ class Reach:
         counts = np.ceil(segments.lengths / (0.5 * cell)).astype(np.int64) + 1
         if counts.sum() > MOST_STEPS:
             raise AnalysisError(
-                "expected a smaller map for an analysis from a point; omit the point, or cut the map", argument="point"
+                f"expected walls of at most {MOST_STEPS} cells for an analysis from a point, found {counts.sum()}; "
+                "omit the point, or cut the map",
+                argument="point",
             )
         which = np.repeat(np.arange(len(segments)), counts)
         first = np.cumsum(counts) - counts
@@ -64,13 +66,16 @@ class Reach:
         walls[columns, rows] = True
         start = np.asarray(point, dtype=np.float64)
         if not ((start >= low) & (start <= high)).all():
-            raise AnalysisError("expected a place on the map, found one outside", argument="point")
+            away = float(np.linalg.norm(np.maximum(0.0, np.maximum(low - start, start - high))))
+            raise AnalysisError(f"expected a place on the map, found one {away:.2f} m outside", argument="point")
         from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
 
         labels, _ = ndimage.label(~walls)
         label = labels[tuple(_cells(start[None], low, cell)[0])]
         if label == 0:
-            raise AnalysisError("expected a free place, found one on a wall", argument="point")
+            raise AnalysisError(
+                f"expected a free place, found one within {cell:.2f} m of a wall; choose another one", argument="point"
+            )
         return cls(low, cell, labels == label)
 
     def includes(self, places: Floats) -> NDArray[np.bool_]:

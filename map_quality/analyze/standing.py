@@ -78,7 +78,9 @@ def standing_places(
     if spacing is None:
         spacing = min(max(round(math.sqrt(width * height / PLACES), 1), SPACINGS[0]), SPACINGS[1])
     if not SPACINGS[0] <= spacing <= SPACINGS[1]:
-        raise AnalysisError(f"expected from {SPACINGS[0]:g} to {SPACINGS[1]:g} m, got {spacing:g}", argument="spacing")
+        raise AnalysisError(
+            f"expected from {SPACINGS[0]:g} to {SPACINGS[1]:g} m, found {spacing:g}", argument="spacing"
+        )
     counts = [max(1, math.floor(side / spacing)) for side in (width, height)]
     headings = robot.headings
     if counts[0] * counts[1] * len(headings) > MOST:

@@ -79,13 +79,16 @@ class Tokens:
             if self._keys and now - self._fetched > LONGEST_SECONDS:
                 self._keys = {}
                 logger.error(
-                    "tokens are rejected from now on, because the issuer's keys are %g h old", LONGEST_SECONDS / 3600.0
+                    "tokens are rejected until the issuer's keys can be fetched, because the last ones are %g h old",
+                    LONGEST_SECONDS / 3600.0,
                 )
-            logger.error("the issuer's keys cannot be fetched: %s", error)
+            logger.error("the issuer's keys cannot be fetched: %s; check LINEFIX_JWT_KEYS", error)
             return
         self._fetched = now
         if not self._keys:
-            logger.error("the issuer has no key that verifies signatures: its tokens are refused")
+            logger.error(
+                "the issuer has no key that verifies signatures: its tokens are rejected; check LINEFIX_JWT_KEYS"
+            )
 
     def _key(self, key_id: object) -> jwt.PyJWK:
         if key_id is None and len(self._keys) == 1:

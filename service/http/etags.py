@@ -28,7 +28,7 @@ def demands_of(request: Request) -> Preconditions:
     """
     match, none_match = _joined(request, "if-match"), _joined(request, "if-none-match")
     wrong = [
-        Fault(f"/header/{name}", 'expected * or tags in quotes, such as "3"')
+        Fault(f"/header/{name}", f'expected * or tags in quotes, such as "3", found {_found(value)}')
         for name, value in (("if-match", match), ("if-none-match", none_match))
         if value is not None and not _is_well_formed(value)
     ]
@@ -62,6 +62,11 @@ def _joined(request: Request, name: str) -> str | None:
 def _is_well_formed(header: str) -> bool:
     rest, tags = _TAG.subn("", header)
     return header == "*" or (tags > 0 and not rest.strip(" \t,"))
+
+
+def _found(header: str) -> str:
+    """Return what an ill-formed header has, without a repetition of it."""
+    return "text next to the tags" if _TAG.search(header) else "no tag in quotes"
 
 
 def _revisions(header: str, *, weak: bool) -> frozenset[int]:

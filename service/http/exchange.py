@@ -1,6 +1,6 @@
 """One request while it is served: its state from the first byte to the line in the log, and the exchange of its stages.
 
-The stages are functions of `receiving`, `map_stage` and `searching`, each of which takes an exchange.
+The stages are functions of `body_stage`, `map_stage` and `search_stage`, each of which takes an exchange.
 """
 
 from __future__ import annotations

@@ -142,7 +142,7 @@ def _require_report(told: dict[str, Any]) -> None:
             raise FileTooLargeError(why)
         case {"invalid": list(faults)}:
             raise InvalidRequestError([Fault(**fault) for fault in faults])
-    raise ReaderFailedError("an answer that is none")
+    raise ReaderFailedError("the output has neither a report nor a known error")
 
 
 def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadline) -> int:

@@ -75,7 +75,7 @@ def _units(values: Sequence[str]) -> str | float:
 def _truth(values: Sequence[str]) -> bool:
     truth = _TRUTHS.get(_text(values).lower())
     if truth is None:
-        raise ValueError("expected true or false")
+        raise ValueError("expected true or false, found other text")
     return truth
 
 
@@ -94,7 +94,8 @@ def _numbers(text: str, count: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count:
-        raise ValueError("expected a number" if count == 1 else f"expected {count} numbers")
+        found = f"{len(numbers)} numbers" if numbers else "text that is not a number"
+        raise ValueError(f"expected {'a number' if count == 1 else f'{count} numbers'}, found {found}")
     return numbers
 
 

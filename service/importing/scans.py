@@ -78,5 +78,6 @@ def _options_of(fields: Fields) -> tuple[str | None, int]:
     if most is None:
         return topic, DEFAULT_SCANS
     if not (most.isascii() and most.isdecimal() and len(most) < 5 and 1 <= int(most) <= MAX_SCANS):
-        raise InvalidRequestError([Fault("/max_scans", f"expected an integer from 1 to {MAX_SCANS}")])
+        found = "another integer" if most.removeprefix("-").isdecimal() else "text that is no integer"
+        raise InvalidRequestError([Fault("/max_scans", f"expected an integer from 1 to {MAX_SCANS}, found {found}")])
     return topic, int(most)

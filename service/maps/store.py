@@ -189,7 +189,7 @@ class MapStore:
 
     def _quarantine(self, record: MapRecord) -> None:
         """Mark a map as corrupt for all workers, also those that have it indexed, until it is put again."""
-        logger.error("map quarantined: it does not match its checksum", extra={"map_id": record.map_id})
+        logger.error("map quarantined: it does not match its checksum; put it again", extra={"map_id": record.map_id})
         same = (maps.c.map_id == record.map_id, maps.c.revision == record.revision)
         # If nothing can be written, the checksum still refuses the map.
         with suppress(StoreError), self._writing() as connection:

@@ -34,13 +34,35 @@ def _refuse(faults: Iterable[tuple[int, str]]) -> PydanticCustomError:
     return PydanticCustomError("rows", "some rows are wrong", {"rows": rows})
 
 
+def _kind(value: Any) -> str:
+    """Return the type of a JSON value in words; the value itself is not repeated."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true or false"
+        case int():
+            return "an integer"
+        case float():
+            return "a decimal number"
+        case str():
+            return "a string"
+        case list():
+            return "an array"
+    return "an object"
+
+
+def _not_an_array(value: Any) -> PydanticCustomError:
+    return PydanticCustomError("not_an_array", f"expected an array, found {_kind(value)}")
+
+
 def _listed(value: Any, info: ValidationInfo, counted: tuple[str, str]) -> list[Any]:
     """Return an array that is within its limit; `counted` are the limit's name in `Limits` and what it counts.
 
     Stored arrays are read without limits: they may have changed since.
     """
     if type(value) is not list:
-        raise PydanticCustomError("not_an_array", "expected an array")
+        raise _not_an_array(value)
     name, what = counted
     limits: Limits | None = info.context
     if limits is not None and len(value) > getattr(limits, name):
@@ -50,7 +72,7 @@ def _listed(value: Any, info: ValidationInfo, counted: tuple[str, str]) -> list[
 
 def _number_fault(item: Any, types: frozenset[type], low: float, high: float) -> str | None:
     if type(item) not in types:
-        return "expected an integer" if types is INTEGERS else "expected a number"
+        return f"expected {'an integer' if types is INTEGERS else 'a number'}, found {_kind(item)}"
     if item is not None and not low <= item <= high:
         return f"expected a number from {low:g} to {high:g}"
     return None
@@ -58,7 +80,7 @@ def _number_fault(item: Any, types: frozenset[type], low: float, high: float) ->
 
 def _row_fault(row: Any, width: int, types: frozenset[type], low: float, high: float) -> str | None:
     if type(row) is not list:
-        return f"expected an array of {width} numbers"
+        return f"expected an array of {width} numbers, found {_kind(row)}"
     if len(row) != width:
         return f"expected {width} numbers, found {len(row)}"
     return next((fault for item in row if (fault := _number_fault(item, types, low, high))), None)
@@ -174,17 +196,24 @@ Weights = Annotated[
 
 def _symmetric(value: Any) -> Floats:
     if type(value) is not list:
-        raise PydanticCustomError("not_an_array", "expected an array")
+        raise _not_an_array(value)
     if len(value) in (6, 36):
         raise PydanticCustomError(
             "covariance",
-            "expected 3 rows of 3 numbers, of x, y and yaw; of the 36 in ROS send rows and columns 0, 1, 5",
+            f"expected 3 rows of 3 numbers, of x, y and yaw, found {len(value)} items; of the 36 in ROS send rows and "
+            "columns 0, 1, 5",
         )
     if len(value) != 3:
         raise PydanticCustomError("covariance", f"expected 3 rows of 3 numbers, found {len(value)} items")
     matrix = _rows(value, 3, NUMBERS, -_M, _M)
-    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
-        raise PydanticCustomError("covariance", "expected a symmetric matrix; symmetrize it")
+    unequal = np.argwhere(~np.isclose(matrix, matrix.T, rtol=1e-9, atol=0.0))
+    if len(unequal):
+        row, column = unequal[0]
+        raise PydanticCustomError(
+            "covariance",
+            f"expected a symmetric matrix, found different numbers at rows {row} and {column} of columns {column} and "
+            f"{row}; symmetrize it",
+        )
     return matrix
 
 
@@ -194,7 +223,9 @@ def _covariance(value: Any) -> Floats:
         np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError as error:
         raise PydanticCustomError(
-            "covariance", "expected a positive definite matrix; for an unknown direction send a large variance"
+            "covariance",
+            "expected a positive definite matrix, found an eigenvalue of 0 or below; for an unknown direction send a "
+            "large variance",
         ) from error
     return matrix
 
@@ -202,7 +233,7 @@ def _covariance(value: Any) -> Floats:
 def _semidefinite(value: Any) -> Floats:
     matrix = _symmetric(value)
     if np.linalg.eigvalsh(matrix).min() < -1e-9 * np.abs(matrix).max():
-        raise PydanticCustomError("covariance", "expected a covariance, found a negative eigenvalue")
+        raise PydanticCustomError("covariance", "expected a covariance, found a negative eigenvalue; check its signs")
     return matrix
 
 

@@ -49,9 +49,11 @@ def _free_json(value: Any) -> Any:
         depth += 1
         count += len(layer)
         if count > MAX_FREE_BYTES:  # each takes one at least
-            raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
+            raise _too_long(count)
         if depth > MAX_FREE_DEPTH:
-            raise PydanticCustomError("too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found more")
+            raise PydanticCustomError(
+                "too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found {depth} or more; flatten it"
+            )
         inner: list[Any] = []
         for item in layer:
             if isinstance(item, dict):
@@ -59,9 +61,16 @@ def _free_json(value: Any) -> Any:
             elif isinstance(item, list):
                 inner.extend(item)
         layer = inner
-    if len(orjson.dumps(value)) > MAX_FREE_BYTES:
-        raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
+    size = len(orjson.dumps(value))
+    if size > MAX_FREE_BYTES:
+        raise _too_long(size)
     return value
+
+
+def _too_long(size: int) -> PydanticCustomError:
+    return PydanticCustomError(
+        "json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found {size} or more; send less"
+    )
 
 
 FreeJson = Annotated[Any, PlainValidator(_free_json), WithJsonSchema({})]

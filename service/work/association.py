@@ -183,7 +183,7 @@ def _search(
     if not isinstance(cached, CachedMaps):
         if prior_map is not None:
             raise InvalidSearchError(
-                "found it with a single map, expected it with several; omit it", argument="prior.map_id"
+                "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
             )
         return associate(cached.index, scan, prior, search, until)
     try:

@@ -177,7 +177,8 @@ def pairs_of(asked: RegisterRequest, map_count: int, scan_count: int) -> NDArray
         return asked.correspondences.astype(np.intp)
     if map_count != scan_count:
         raise InvalidArgumentError(
-            f"left out, though there are {scan_count} scan and {map_count} map segments", argument="correspondences"
+            f"found none, with {scan_count} scan and {map_count} map segments; expected pairs, or equal counts",
+            argument="correspondences",
         )
     return np.repeat(np.arange(map_count, dtype=np.intp)[:, None], 2, axis=1)
 

@@ -100,7 +100,7 @@ def test_ranges_are_searched_with_their_beams(tmp_path: Path) -> None:
     first, second = rows(tmp_path / "out.parquet")
     assert (first["stamp"], first["status"]) == (5000, "ambiguous")  # a rectangle has two ends
     assert abs(first["x"]) + abs(first["y"]) < 0.05
-    assert second["error"] == "invalid: scan: expected ranges or segments, got neither"
+    assert second["error"] == "invalid: scan: expected ranges or segments, found neither"
 
 
 def test_scans_are_searched_in_the_map_that_they_name_or_their_log_is_named_as(tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def test_a_worker_killed_on_the_way_costs_no_row(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("columns", "said"),
     [
-        ({"x": [1.0]}, "expected a column ranges or segments, got x"),
+        ({"x": [1.0]}, "expected a column ranges or segments, found x"),
         ({"ranges": [[1.0]], "angle_min": [0.0]}, "expected a column angle_increment"),
         ({"ranges": [["a"]], "angle_min": [0.0], "angle_increment": [0.1]}, "a list of numbers in ranges"),
         ({"segments": [1.0]}, "lists of four numbers"),

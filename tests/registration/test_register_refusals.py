@@ -53,7 +53,7 @@ def test_each_index_has_the_range_of_its_own_set() -> None:
     assert register(many, MeasuredSegments.from_segments(few), [[0, 4], [1, 5]]).diagnostics.pairs == 2
     assert register(few, MeasuredSegments.from_segments(many), [[4, 0], [5, 1]]).diagnostics.pairs == 2
     for map_segments, scan, pair in ((many, few, [2, 0]), (few, many, [0, 2])):
-        with pytest.raises(InvalidArgumentError, match="from 0 to 1, got 2"):
+        with pytest.raises(InvalidArgumentError, match="from 0 to 1, found 2"):
             register(map_segments, MeasuredSegments.from_segments(scan), [pair])
 
 

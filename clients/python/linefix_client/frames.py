@@ -82,7 +82,7 @@ def covariance_from_ros(covariance: Sequence[float]) -> Covariance | None:
         When there are not 36.
     """
     if len(covariance) != 36:
-        raise ValueError(f"expected 36 numbers, got {len(covariance)}")
+        raise ValueError(f"expected 36 numbers, found {len(covariance)}")
     planar = [[float(covariance[6 * i + j]) for j in _PLANAR] for i in _PLANAR]
     return planar if any(value != 0.0 for row in planar for value in row) else None
 

@@ -51,7 +51,9 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     except FormatError:
         raise
     except (ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
-        raise MalformedFileError("has an element that cannot be read", argument=name) from error
+        raise MalformedFileError(
+            "has an element that cannot be read; expected SVG 1.1. Save it as plain SVG", argument=name
+        ) from error
     return drawing
 
 

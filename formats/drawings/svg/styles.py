@@ -55,7 +55,10 @@ class Styles:
                 matcher.add_selector(selector, declared)
                 count += 1
                 if count > MAX_STYLE_RULES:
-                    raise TooLargeError(f"expected at most {MAX_STYLE_RULES} rules of style", argument=name)
+                    raise TooLargeError(
+                        f"expected at most {MAX_STYLE_RULES} rules of style, found {count} or more; save plain SVG",
+                        argument=name,
+                    )
         if count:
             for wrapper in cssselect2.ElementWrapper.from_xml_root(root).iter_subtree():
                 found = [declared for _, _, pseudo, declared in matcher.match(wrapper) if pseudo is None]

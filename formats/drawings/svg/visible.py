@@ -125,12 +125,14 @@ class Visible:
         self._path_bytes += len(element.get("d", "")) + len(element.get("points", ""))
         if self._count > MAX_ENTITIES or depth > MAX_DEPTH:
             raise TooLargeError(
-                f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another",
+                f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another, found "
+                f"{self._count}, {depth} in one another, or more",
                 argument=self._drawing.name,
             )
         if self._path_bytes > MAX_PATH_BYTES:
             raise TooLargeError(
-                f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included",
+                f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included, found "
+                f"{self._path_bytes} or more; simplify the paths",
                 argument=self._drawing.name,
             )
 

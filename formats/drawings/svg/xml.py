@@ -37,10 +37,16 @@ class _Builder:
         self.depth, self.count = self.depth + 1, self.count + 1
         self.path_bytes += len(attributes.get("d", "")) + len(attributes.get("points", ""))
         if self.path_bytes > MAX_PATH_BYTES:
-            raise TooLargeError(f"expected at most {MAX_PATH_BYTES} characters of paths", argument=self.name)
+            raise TooLargeError(
+                f"expected at most {MAX_PATH_BYTES} characters of paths, found {self.path_bytes} or more; simplify the "
+                "paths",
+                argument=self.name,
+            )
         if self.depth > MAX_DEPTH or self.count > MAX_ENTITIES:
             raise TooLargeError(
-                f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another", argument=self.name
+                f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another, found {self.count}, "
+                f"{self.depth} in one another, or more",
+                argument=self.name,
             )
         node = self.tree.start("{" + tag if "}" in tag else tag, attributes)
         assert isinstance(node, Node)
@@ -57,11 +63,14 @@ class _Builder:
             return
         self.style_bytes += len(data)
         if self.style_bytes > MAX_STYLE_BYTES:
-            raise TooLargeError(f"expected at most {MAX_STYLE_BYTES} characters of style elements", argument=self.name)
+            raise TooLargeError(
+                f"expected at most {MAX_STYLE_BYTES} characters of style elements, found {self.style_bytes} or more",
+                argument=self.name,
+            )
         self.tree.data(data)
 
     def refuse(self, *_declared: Any) -> None:
-        raise MalformedFileError("declares XML entities, which are not read", argument=self.name)
+        raise MalformedFileError("declares XML entities, which are not read; save it as plain SVG", argument=self.name)
 
 
 def parse_xml(content: bytes, name: str) -> Element:
@@ -78,8 +87,11 @@ def parse_xml(content: bytes, name: str) -> Element:
     try:
         for begin in range(0, len(content), CHUNK):
             builder.parser.Parse(content[begin : begin + CHUNK], False)
-            if begin - builder.parser.CurrentByteIndex > MAX_TOKEN_BYTES:
-                raise TooLargeError(f"expected elements of at most {MAX_TOKEN_BYTES} bytes", argument=name)
+            size = begin - builder.parser.CurrentByteIndex
+            if size > MAX_TOKEN_BYTES:
+                raise TooLargeError(
+                    f"expected elements of at most {MAX_TOKEN_BYTES} bytes, found {size} or more", argument=name
+                )
         builder.parser.Parse(b"", True)
         return builder.tree.close()
     except FormatError:

@@ -61,7 +61,7 @@ async def part_of_page(name: str) -> Response:
     """Give a script or a style of the page."""
     content = _built("built", name) if name in _PARTS else None
     if content is None:
-        raise NotFoundError("no file has this name")
+        raise NotFoundError("no file of the page has this name; load the page again")
     return PiecewiseResponse(content, media_type=_PARTS[name], headers=_REVALIDATED)
 
 
@@ -70,7 +70,7 @@ async def example(name: str) -> Response:
     """Give one of the page's examples."""
     content = _built("examples", name) if _EXAMPLE.fullmatch(name) else None
     if content is None:
-        raise NotFoundError("no example has this name")
+        raise NotFoundError("no example has this name; load the page again")
     return PiecewiseResponse(content, media_type="application/json", headers=_REVALIDATED)
 
 
@@ -108,5 +108,5 @@ async def asset(name: str) -> Response:
     """Give one of the page's files."""
     media_type = ASSETS.get(name)
     if media_type is None:
-        raise NotFoundError("no file has this name")
+        raise NotFoundError("no file of the documentation has this name; load /docs again")
     return PiecewiseResponse(_content(name), media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})

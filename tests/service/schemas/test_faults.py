@@ -33,7 +33,7 @@ def asked(**parts: Any) -> dict[str, Any]:
             asked(prior={"x": 0.0, "y": 0.0, "theta": 0.0, "radius": 0.0, "angle": 1.0}),
             "/prior/radius: expected more than 0",
         ),
-        (asked(client_ref="x" * 20_000), "/client_ref: expected at most 16384 bytes of JSON, found more"),
+        (asked(client_ref="x" * 20_000), "/client_ref: expected at most 16384 bytes of JSON, found 20002 or more"),
     ],
 )
 def test_a_fault_says_what_was_expected(body: dict[str, Any], fault: str) -> None:
