@@ -23,7 +23,7 @@ from .drawn import NEAR, campus_of_offices, cluttered_scan, nearby, take_scan
 from .outcomes import OPTIONS, offset, progress
 from .pictures import Curve, draw_growth
 from .queries import data_found, floor_plans
-from .table import Row, at_most, mean, print_rows, print_table, quantile
+from .table import Row, at_least, at_most, mean, print_rows, print_table, quantile
 
 PAIRS = (10, 100, 1_000, 10_000, 100_000, 1_000_000)
 SIZES = (200, 2_000, 20_000, 200_000)
@@ -201,16 +201,17 @@ def print_growth(title: str, what: str, values: Sequence[str], found: list[Growt
 
 
 def growth_rows(found: list[Growth]) -> list[Row]:
-    """Judge the times of the sizes that goals were set for."""
+    """Judge the times of the sizes that goals were set for; return what was measured of the others, too."""
     rows = []
     for g in found:
         median, p95 = TIMES.get(g.segments, (None, None))
         rows.append(at_most(f"{g.segments:,} map segments: search, median ms", g.median, None, median, ".2f"))
         rows.append(at_most(f"{g.segments:,} map segments: search, p95 ms", g.p95, None, p95, ".2f"))
     for g in found:
-        if g.segments == SIZES[-1]:
-            rows.append(at_most(f"{g.segments:,} map segments: index, s", g.build, None, INDEX_SECONDS, ".2f"))
-            rows.append(at_most(f"{g.segments:,} map segments: index, MB", g.megabytes, None, INDEX_MEGABYTES, ".0f"))
+        seconds, megabytes = (INDEX_SECONDS, INDEX_MEGABYTES) if g.segments == SIZES[-1] else (None, None)
+        rows.append(at_most(f"{g.segments:,} map segments: index, s", g.build, None, seconds, ".2f"))
+        rows.append(at_most(f"{g.segments:,} map segments: index, MB", g.megabytes, None, megabytes, ".1f"))
+        rows.append(at_least(f"{g.segments:,} map segments: right first", g.right, form=".2f"))
     return rows
 
 

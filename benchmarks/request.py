@@ -128,7 +128,17 @@ def request(quick: int) -> list[Row]:
         ("connections", *servers),
         [(str(many), *(f"{rates[name, many]:.0f}" for name in servers)) for many in (1, 2, 4)],
     )
-    return _by_part(cost, each)
+    return [*_by_part(cost, each), *_as_measured(cost, rates)]
+
+
+def _as_measured(cost: dict[str, tuple[float, float]], rates: dict[tuple[str, int], float]) -> list[Row]:
+    """Return the figures of both tables as rows without goals, for the file of results."""
+    what = "a stored map, 25 walls seen"
+    rows = [Row(f"{name}: processor ms", f"{one:.3f}") for name, (one, _) in cost.items()]
+    rows += [Row(f"{name}: client ms", f"{seen:.3f}") for name, (_, seen) in cost.items()]
+    counts = [many for name, many in rates if name == what]
+    told = "{} connections: requests a second of one core, " + what
+    return rows + [Row(told.format(many), f"{rates[what, many]:.0f}") for many in counts]
 
 
 def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> list[Row]:
