@@ -54,8 +54,8 @@ class Reach:
         counts = np.ceil(segments.lengths / (0.5 * cell)).astype(np.int64) + 1
         if counts.sum() > MOST_STEPS:
             raise AnalysisError(
-                f"expected walls of at most {MOST_STEPS} cells for an analysis from a point, found {counts.sum()}; "
-                "omit the point, or cut the map",
+                f"expected a smaller map for an analysis from a point: its walls cover {counts.sum()} cells of at most "
+                f"{MOST_STEPS}; omit the point, or cut the map",
                 argument="point",
             )
         which = np.repeat(np.arange(len(segments)), counts)
@@ -74,7 +74,7 @@ class Reach:
         label = labels[tuple(_cells(start[None], low, cell)[0])]
         if label == 0:
             raise AnalysisError(
-                f"expected a free place, found one within {cell:.2f} m of a wall; choose another one", argument="point"
+                f"expected a free place, found one on a wall; choose one {cell:.2f} m away", argument="point"
             )
         return cls(low, cell, labels == label)
 
