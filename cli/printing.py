@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -15,15 +16,17 @@ from service.contract import encode
 
 from .contract import Json
 
+WIDEST = 10_000  # characters of a row
+
 
 def print_json(answer: Any) -> None:
     """Print one document in one line, without control characters for a terminal."""
     sys.stdout.write(escaped(encode(answer).decode()) + "\n")
 
 
-def console() -> Console:
-    """Return where people read; nothing in what is printed there is taken for markup."""
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+def console(width: int | None = None) -> Console:
+    """Return where people read, by default as wide as the terminal; nothing printed there is taken for markup."""
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True, width=width)
 
 
 def plain(text: object) -> Text:
@@ -52,7 +55,10 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
         table.add_column(name, justify="right" if right else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(plain(shown(cell)) for cell in row))
-    console().print(table)
+    # As wide as its cells, whatever the terminal: a name or a number that is cut is lost.
+    where = console(WIDEST)
+    where.width = Measurement.get(where, where.options, table).maximum
+    where.print(table)
 
 
 def shown(value: object) -> str:

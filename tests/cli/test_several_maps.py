@@ -52,6 +52,18 @@ def test_a_scan_is_located_on_files_a_folder_and_stored_maps(linefix: Linefix, f
     assert "no_match" in told
 
 
+def test_the_table_of_maps_is_whole_in_a_narrow_terminal(
+    linefix: Linefix, files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A terminal breaks long lines; a name or a number that is cut is lost."""
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = linefix("locate", "floors", "scan.json").out.splitlines()
+    head = next(number for number, line in enumerate(lines) if "status" in line)
+    assert lines[head].split() == ["map", "status", "score", "probability", "pose"]
+    assert {line.split()[0] for line in lines[head + 1 :]} == {"room", "hall"}
+    assert "…" not in "".join(lines)
+
+
 def test_the_server_answers_as_this_process(linefix: Linefix, files: Path, service: RunningService) -> None:
     url = str(service.client.base_url)
     here = json.loads(linefix("locate", "floors", "scan.json", "--json").out)
