@@ -9,6 +9,7 @@ import numpy as np
 
 from registration import RigidTransform
 from registration.layout import POSE, Records
+from registration.observability import most_parallel_up_to
 from registration.values import value
 
 from .deadline import Deadline
@@ -188,7 +189,8 @@ class SearchContext:
     @cached_property
     def workspace(self) -> Workspace:
         """The arrays that the kernels write to while they look at poses."""
-        return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
+        count = len(self.lines.rows)
+        return Workspace.of(count, len(self.index.walls.rows), most_parallel_up_to(count))
 
     @cached_property
     def known_walls(self) -> KnownWalls:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from registration.layout import Floats, Records
-from registration.observability import most_parallel_up_to
 
 from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SUMS, Indices, Integers, record
 from .tuning import AT_ONCE
@@ -377,8 +376,8 @@ class Workspace(NamedTuple):
     parallel: Floats
 
     @classmethod
-    def of(cls, count: int, walls: int) -> Workspace:
-        """Return one for a scan of `count` lines and a map of that many walls."""
+    def of(cls, count: int, walls: int, parallel: Floats) -> Workspace:
+        """Return one for a scan of `count` lines and a map of that many walls, with `parallel` as above."""
         spreads, later, possible = np.zeros((3, count))
         shifts, held, listed = np.zeros((3, count), np.int64)
         shifts_held, weights_held = np.zeros((2, count))
@@ -386,4 +385,4 @@ class Workspace(NamedTuple):
         hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
         matches, wall_sums, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SUMS), record(SCRATCH)
         arrays = matches, spreads, shifts, later, possible, hypotheses, near
-        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch, most_parallel_up_to(count))
+        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch, parallel)

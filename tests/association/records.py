@@ -8,12 +8,18 @@ import numpy as np
 
 from association.consensus.beams import beam_rows
 from association.layout import ESTIMATE, POINT, SIGHTING, record
-from association.tables import Rays, Sights
+from association.tables import Rays, Sights, Workspace
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
+from registration.observability import most_parallel_up_to
 
 UPPER = ("xx", "xy", "xt", "yy", "yt", "tt")
 NOTHING_KNOWN = np.zeros((3, 3))  # as a covariance: the pose is exact
+
+
+def work_of(count: int, walls: int) -> Workspace:
+    """Return a workspace for a scan of `count` lines and a map of that many walls."""
+    return Workspace.of(count, walls, most_parallel_up_to(count))
 
 
 def estimate_of(at: RigidTransform, covariance: Floats = NOTHING_KNOWN) -> Records:

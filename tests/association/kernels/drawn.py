@@ -15,6 +15,7 @@ from association.tables import Workspace
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
+from ..records import work_of
 from ..reference.geometry import moved
 from ..scenes import Truth, context_of, index_of, local, maze, scan_of, seen
 
@@ -68,7 +69,7 @@ def drawn(seed: int, radius: float = 10.0, clutter: int = 5, index: MapIndex = I
 
 
 def workspace_of(scan: Records, index: MapIndex = INDEX) -> Workspace:
-    return Workspace.of(len(scan), len(index.walls.rows))
+    return work_of(len(scan), len(index.walls.rows))
 
 
 def covariance(rng: np.random.Generator) -> Floats:

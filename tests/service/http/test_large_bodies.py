@@ -26,7 +26,7 @@ def test_a_large_body_is_answered_like_a_small_one(client: httpx.Client) -> None
         assert answer.json()["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
     wrong = client.post("/v1/associate", content=body.replace(b"[[-4.0,", b'[["-4",', 1))
     assert wrong.status_code == 422
-    assert wrong.json()["errors"] == [{"pointer": "/map/segments/0", "message": "expected a number"}]
+    assert wrong.json()["errors"] == [{"pointer": "/map/segments/0", "message": "expected a number, found a string"}]
 
 
 def test_a_large_map_is_stored_and_found(client: httpx.Client) -> None:

@@ -9,20 +9,19 @@ import pytest
 from hypothesis import given, settings
 
 from association.consensus.kernels import agreement as comparing
-from association.tables import Workspace
 from association.tuning import RAYS
 from registration import RigidTransform
 from registration.layout import Records
 
 from ...kernels.drawn import INDEX, MAZE, PLACE, SEEDS, drawn
-from ...records import estimate_of, sights_of
+from ...records import estimate_of, sights_of, work_of
 from ...reference import agreement as twin
 from ...reference.geometry import moved
 from ...scenes import context_of, local, pose, scan_of, seen
 
 
 def agreement(scan: Records, viewpoint: np.ndarray, at: RigidTransform) -> float:
-    work = Workspace.of(len(scan), len(PLACE.walls))
+    work = work_of(len(scan), len(PLACE.walls))
     return comparing.agreement(sights_of(scan, viewpoint), estimate_of(at), PLACE, work)
 
 

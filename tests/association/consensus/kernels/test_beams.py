@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from association.consensus.beams import beam_rows
 from association.consensus.kernels import beams
 from association.layout import BEAM_EVIDENCE, RAY
-from association.tables import Rays, Workspace
+from association.tables import Rays
 from registration import RigidTransform
 
 from ...kernels.drawn import INDEX, PLACE, SEEDS
-from ...records import estimate_of, pose_of, rays_of
+from ...records import estimate_of, pose_of, rays_of, work_of
 from ...reference import beams as twin
 from ...reference.geometry import moved
 from ...scenes import ANGLES, INSIDE, ROOM, index_of, local, pose, read, same_pose
@@ -68,7 +68,7 @@ def test_beam_evidence(seed: int) -> None:
 
 def shares_of(ranges: np.ndarray) -> tuple[float, float]:
     rays, place = rays_of(ANGLES, ranges), ROOM_INDEX.tables.place
-    return beams.beam_fractions(rays, estimate_of(HERE), place, Workspace.of(1, 1))
+    return beams.beam_fractions(rays, estimate_of(HERE), place, work_of(1, 1))
 
 
 def test_beams_that_read_farther_and_nearer_than_the_map_shows() -> None:
@@ -90,7 +90,7 @@ def test_beam_shares(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 120)
     for at in (truth, moved(truth, rng.normal(size=3) * [0.1, 0.3, 0.3])):
-        found = beams.beam_fractions(rays, estimate_of(at), PLACE, Workspace.of(1, 1))
+        found = beams.beam_fractions(rays, estimate_of(at), PLACE, work_of(1, 1))
         assert found == pytest.approx(twin.beam_fractions(rays, at, PLACE))
 
 
@@ -100,7 +100,7 @@ def test_refine_by_beams(seed: int) -> None:
     """In the same workspace one after the other."""
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 60)
-    work = Workspace.of(1, 1)
+    work = work_of(1, 1)
     for count in (len(rays.beams), 16, 12):
         some = rays._replace(beams=rays.beams[:count])
         start = moved(truth, rng.normal(size=3) * [0.02, 0.05, 0.05])
@@ -119,7 +119,7 @@ def test_weigh_beams(seed: int) -> None:
     rays, truth = drawn_rays(rng, 40)
     starts = [moved(truth, rng.normal(size=3) * scale) for scale in (0.0, [0.02, 0.1, 0.1], [0.1, 1.0, 1.0], 0.05)]
     poses, out = np.concatenate([estimate_of(at) for at in starts]), np.zeros(4, BEAM_EVIDENCE)
-    beams.weigh_beams(rays, poses, PLACE, 3, Workspace.of(1, 1), out)
+    beams.weigh_beams(rays, poses, PLACE, 3, work_of(1, 1), out)
     for k, start in enumerate(starts):
         at, there, here = twin.weigh_beams(rays, start, PLACE)
         if k == 3:
@@ -131,7 +131,7 @@ def test_weigh_beams(seed: int) -> None:
 def test_beams_move_a_pose_to_where_they_fit() -> None:
     poses, out = estimate_of(moved(HERE, [0.02, 0.1, -0.08])), np.zeros(1, BEAM_EVIDENCE)
     rays = rays_of(ANGLES, read(ROOM_INDEX, INSIDE))
-    beams.weigh_beams(rays, poses, ROOM_INDEX.tables.place, 1, Workspace.of(1, 1), out)
+    beams.weigh_beams(rays, poses, ROOM_INDEX.tables.place, 1, work_of(1, 1), out)
     assert same_pose(pose_of(poses[0]), HERE, 1e-3, 1e-3)
     assert out[0]["read"] > 0.99
 
@@ -140,6 +140,6 @@ def test_beams_move_a_pose_to_where_they_fit() -> None:
 def test_few_beams_do_not_move_a_pose(count: int, moves: bool) -> None:
     start, ranges = moved(HERE, [0.01, 0.03, -0.03]), read(ROOM_INDEX, INSIDE)
     estimate, every = estimate_of(start), slice(None, None, 240 // count)
-    rays, work = rays_of(ANGLES[every][:count], ranges[every][:count]), Workspace.of(1, 1)
+    rays, work = rays_of(ANGLES[every][:count], ranges[every][:count]), work_of(1, 1)
     beams.refine_by_beams(rays, estimate[0], ROOM_INDEX.tables.place, 0.35, work)
     assert same_pose(pose_of(estimate[0]), start, 1e-9, 1e-9) is not moves

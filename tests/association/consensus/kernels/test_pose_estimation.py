@@ -13,12 +13,12 @@ from association.consensus.kernels.pose_estimation import estimate_poses, weakes
 from association.consensus.kernels.wall_errors import sort_by_ties
 from association.consensus.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, SORTED_BY_INSERTION, UNSEEN_ERROR
 from association.layout import ESTIMATED, LEVERAGE, WALL, Integers
-from association.tables import KnownWalls, Workspace
+from association.tables import KnownWalls
 from registration import RigidTransform
 from registration.layout import Record, Records
 
 from ...kernels.drawn import ASKED, PLACE, SEEDS, Drawn, drawn
-from ...records import covariance_of, estimate_of, pose_of
+from ...records import covariance_of, estimate_of, pose_of, work_of
 from ...reference import pose_estimation as twin
 from ...reference.consensus import matches_on
 from ...reference.geometry import direction, normal
@@ -37,7 +37,7 @@ class Set:
     def estimated(self, map_variance: float = -1.0) -> tuple[Record, Records]:
         """Return `ESTIMATED` and the leverages."""
         out, leverages = np.zeros(1, ESTIMATED), np.zeros(len(self.scan), LEVERAGE)
-        question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
+        question, work = ASKED._replace(scan=self.scan), work_of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)[None]
         count = estimate_poses(question, known_walls(self, map_variance), matches, start, out, 0, leverages, work)
         assert start == estimate_of(self.start)
@@ -123,7 +123,7 @@ def test_leverages_begin_at_any_wall() -> None:
     one = some(7)
     everything, every = one.estimated(0.02**2)
     out, leverages = np.zeros(1, ESTIMATED), np.zeros(2, LEVERAGE)
-    question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
+    question, work = ASKED._replace(scan=one.scan), work_of(len(one.scan), len(one.walls))
     matches, start = matches_on(one.held)[None], estimate_of(one.start)
     assert (
         estimate_poses(question, known_walls(one, 0.02**2), matches, start, out, 1, leverages, work) == len(every) > 3
@@ -147,7 +147,7 @@ def test_several_sets_are_each_estimated_as_if_alone() -> None:
     helds = np.stack([one.held[::-1], one.held])
     out, leverages = np.zeros(2, ESTIMATED), np.zeros(len(one.scan), LEVERAGE)
     starts = np.concatenate([estimate_of(one.start)] * 2)
-    question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
+    question, work = ASKED._replace(scan=one.scan), work_of(len(one.scan), len(one.walls))
     matches = np.stack([matches_on(held) for held in helds])
     count = estimate_poses(question, known_walls(one), matches, starts, out, 0, leverages, work)
     for k, held in enumerate(helds):

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from association.consensus.kernels import ranking
 from association.consensus.tuning import SAME_FAMILY
 from association.layout import MATCH, SET_SCORE
-from association.tables import Place, Sights, Workspace
+from association.tables import Place, Sights
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
 from ...kernels.drawn import ASKED, GATES, MODEL, PLACE, SEEDS, drawn
-from ...records import assert_records, covariance_of, estimate_of, pose_of, sights_of
+from ...records import assert_records, covariance_of, estimate_of, pose_of, sights_of, work_of
 from ...reference import ranking as twin
 from ...reference.geometry import moved
 from ...scenes import INSIDE, ROOM, context_of, index_of, local, pose, same_pose, scan_of, seen
@@ -27,7 +27,7 @@ def ranked(
     """Return estimates, scores and matches."""
     estimates = np.concatenate([estimate_of(at, np.full((3, 3), 9.0)) for at in poses])
     scores, matches = np.zeros(len(poses), SET_SCORE), np.zeros((len(poses), len(scan)), MATCH)
-    work = Workspace.of(len(scan), len(place.walls))
+    work = work_of(len(scan), len(place.walls))
     ranking.score_candidates(ASKED._replace(scan=scan), place, sights, estimates, scores, matches, work)
     return estimates, scores, matches
 

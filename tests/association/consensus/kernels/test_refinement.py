@@ -20,7 +20,7 @@ from registration.kernels import joint_cost, joint_information
 from registration.layout import JOINT_SUMS, SYMMETRIC3, Floats, Records
 
 from ...kernels.drawn import ASKED, GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, covariance, drawn, workspace_of
-from ...records import assert_records, covariance_of, estimate_of, pose_of
+from ...records import assert_records, covariance_of, estimate_of, pose_of, work_of
 from ...reference import consensus as twin
 from ...reference import proposing
 from ...reference.geometry import moved
@@ -78,7 +78,7 @@ class Some:
 
     def summed(self, *before: Integers) -> Workspace:
         """Return a workspace with the sums of these pairs, which held other pairs before."""
-        work = Workspace.of(len(self.scan), len(self.walls))
+        work = work_of(len(self.scan), len(self.walls))
         pair_sums.empty_sums(work)
         for held in (*before, self.held):
             pair_sums.update_pairs(self.scan, twin.matches_on(held), self.walls, work)

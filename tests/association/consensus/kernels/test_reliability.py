@@ -17,7 +17,7 @@ from registration.layout import Floats, Records
 from registration.observability import most_parallel
 
 from ...kernels.drawn import PLACE, SEEDS, SMALL, drawn, workspace_of
-from ...records import covariance_of, estimate_of, pose_of
+from ...records import covariance_of, estimate_of, pose_of, work_of
 from ...reference import reliability as twin
 from ...reference.consensus import matches_on
 from ...scenes import context_of, index_of, local, pose, scan_of
@@ -26,7 +26,7 @@ from .test_refinement import refine
 
 def sums_of(scan: Records, walls: Records, *helds: Integers) -> Workspace:
     """Return a workspace that held these sets of pairs, one after the other."""
-    work = Workspace.of(len(scan), len(walls))
+    work = work_of(len(scan), len(walls))
     empty_sums(work)
     for held in helds:
         update_pairs(scan, matches_on(held), walls, work)

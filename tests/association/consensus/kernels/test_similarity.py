@@ -10,11 +10,10 @@ from hypothesis import given, settings
 
 from association.consensus.kernels.similarity import estimate_similarity, pose_of_similarity, solve_similarity
 from association.layout import ESTIMATE
-from association.tables import Workspace
 from registration.layout import JOINT_SUMS, Floats
 
 from ...kernels.drawn import ASKED, SEEDS
-from ...records import covariance_of
+from ...records import covariance_of, work_of
 from ...reference.consensus import matches_on
 from ...reference.geometry import direction, normal, point, wrap
 from ...reference.pose_estimation import pairs_of
@@ -34,7 +33,7 @@ def stretched(one: Set, factor: float) -> Set:
 def estimated(one: Set) -> tuple[float, Floats, Floats]:
     """Return the walls' variance, (a, b, x, y) and their covariance."""
     solution, covariance = np.zeros(4), np.zeros((4, 4))
-    question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
+    question, work = ASKED._replace(scan=one.scan), work_of(len(one.scan), len(one.walls))
     matches = matches_on(one.held)
     variance, _ = estimate_similarity(question, known_walls(one), matches, solution, covariance, work)
     return variance, solution, covariance
