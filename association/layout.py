@@ -73,16 +73,11 @@ ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
-# matched segments; its fraction of the scan's; its reliability, Eq. (28), by the information of its angles, and the one
-# up to which their errors explain it; mean squared offset over what the scan's sigmas alone expect; the penalty of
-# lines of sight, nats; the fractions of the beams that read the wall they should, and that passed through one, 0
-# without beams; how many rows are matched.
+# matched segments; its fraction of the scan's; mean squared offset over what the scan's sigmas alone expect; the
+# penalty of lines of sight, nats; the fractions of the beams that read the wall they should, and that passed through
+# one, 0 without beams; how many rows are matched.
 SET_SCORE = fields(
-    (
-        _F,
-        "score chi_square one_step_chi_square length fraction reliability least_reliability misfit blocked read passed "
-        "count",
-    ),
+    (_F, "score chi_square one_step_chi_square length fraction misfit blocked read passed count"),
 )
 
 # The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its
@@ -208,10 +203,10 @@ TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_s
 ANGLE_SUMS = fields((_F, "xx xy yy"))
 
 # Records that kernels write to while they look at one pose: the pose; the information of its consensus set; its sums,
-# without the walls' errors and with them; the sums of its angles; a line; other evidence
-# of the error of walls that are tied; the terms of its score; the end of a beam; a ray; the evidence of the beams; the
-# geometry of a base. A record that a kernel takes from an array of its own would outlive the array, whose last use ends
-# it: hence these come from outside.
+# without the walls' errors and with them; the sums of its angles; a line; the other evidence of the error of walls that
+# are tied; the terms of its score; the end of a beam; a ray; the evidence of the beams; the geometry of a base. A
+# record that a kernel takes from an array of its own would outlive the array, whose last use ends it: hence these come
+# from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),

@@ -39,10 +39,6 @@ class ConsensusSet:
         Of the matched segments together, metres.
     fraction : float
         Of the scan's length that is matched, 0 to 1.
-    reliability : float
-        Eq. (28), by the information of the angles.
-    least_reliability : float
-        The reliability that parallel walls show by the errors of the angles: see `fixes_pose`.
     misfit : float
         Mean squared offset over what the sigmas alone expect.
     blocked : float
@@ -63,8 +59,6 @@ class ConsensusSet:
     one_step_chi_square: float
     length: float
     fraction: float
-    reliability: float
-    least_reliability: float
     misfit: float
     blocked: float
     read: float
@@ -77,8 +71,8 @@ class ConsensusSet:
         cls, estimate: Records, scores: tuple[float, ...], matches: Records, *, posterior: float, inside: bool
     ) -> ConsensusSet:
         """Return the set of a record of `SET_SCORE`, given as a tuple, and of the other arguments by name."""
-        score, chi_square, one_step, length, fraction, reliable, least, misfit, blocked, read, passed, count = scores
-        sums, seen = (chi_square, one_step), (length, fraction, reliable, least, misfit, blocked)
+        score, chi_square, one_step, length, fraction, misfit, blocked, read, passed, count = scores
+        sums, seen = (chi_square, one_step), (length, fraction, misfit, blocked)
         return cls(estimate, score, posterior, inside, *sums, *seen, read, passed, count, matches)
 
     @property
@@ -91,13 +85,8 @@ class ConsensusSet:
     def scores(self) -> tuple[float, ...]:
         """The same numbers in the order of `SET_SCORE`."""
         sums = self.score, self.chi_square, self.one_step_chi_square
-        seen = self.length, self.fraction, self.reliability, self.least_reliability, self.misfit, self.blocked
+        seen = self.length, self.fraction, self.misfit, self.blocked
         return *sums, *seen, self.read, self.passed, self.count
-
-    @property
-    def fixes_pose(self) -> bool:
-        """True if the walls fix the pose. Else the set is a family of poses along them."""
-        return self.reliability > self.least_reliability
 
     @property
     def by_segments(self) -> float:

@@ -88,8 +88,6 @@ def ranked(
         "one_step_chi_square": 9.0,
         "length": 30.0,
         "fraction": 0.9,
-        "reliability": 0.8,
-        "least_reliability": 0.1,
         "misfit": 1.0,
         "blocked": 0.0,
         "read": 0.0,

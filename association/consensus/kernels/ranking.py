@@ -15,7 +15,6 @@ from ..tuning import FAR_BEHIND, LEAST_COUNT, START_ANGLE_VARIANCE, START_VARIAN
 from .geometry import wrap
 from .matching import allow_all, match_scan, part_of_match
 from .refinement import refine
-from .reliability import least_reliability, reliability_of
 from .scoring import one_step_chi_square
 from .sight import count_blockers, sight_penalty
 
@@ -34,7 +33,7 @@ def score_candidates(
 
     1. Match the scan at the pose.
     2. Refine pose and set until both agree, and score the set.
-    3. Measure the set: its length, misfit, reliability.
+    3. Measure the set: its length and misfit.
     4. Charge it for the walls that lines of sight pass through; not where it is far behind.
 
     Parameters
@@ -63,7 +62,7 @@ def score_candidates(
         start_at(one)
         match_scan(scan, one, place, terms.gates, work.possible, 0.0, matches[k])
         out.score = refine(scan, one, place, terms, matches[k], work, 0.0)
-        measure_sums(work, one, out)
+        measure_sums(work.scratch[0].sums, work.scratch[0].terms, one, out)
         measure_matches(scan, matches[k], out)
         out.blocked = 0.0
         # The candidates come best first: a candidate far behind is no alternative, its score may stay too good.
@@ -86,13 +85,10 @@ def start_at(estimate: Record) -> None:
 
 
 @kernel
-def measure_sums(work: Workspace, estimate: Record, out: Record) -> None:
-    """Write the chi-square of a refined set, that at the paper's estimate, and the reliability, Eq. (28)."""
-    scratch = work.scratch[0]
-    out.chi_square = scratch.terms.chi_square if out.score > 0.0 else 0.0
-    out.one_step_chi_square = one_step_chi_square(scratch.sums, estimate) if out.score > 0.0 else 0.0
-    out.reliability = reliability_of(scratch.angles)
-    out.least_reliability = least_reliability(scratch.angles, work.parallel[int(scratch.plain.count)])
+def measure_sums(sums: Record, terms: Record, estimate: Record, out: Record) -> None:
+    """Write the chi-square of a refined set, and that at the paper's estimate."""
+    out.chi_square = terms.chi_square if out.score > 0.0 else 0.0
+    out.one_step_chi_square = one_step_chi_square(sums, estimate) if out.score > 0.0 else 0.0
 
 
 @kernel

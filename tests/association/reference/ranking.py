@@ -14,7 +14,6 @@ from registration.layout import Floats, Records
 
 from .consensus import Pairs, refine
 from .geometry import Vector, wrap
-from .reliability import least_reliability, reliability
 from .sight import count_blockers, sight_penalty
 
 START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
@@ -42,8 +41,6 @@ def rank(
         pairs = Pairs.of(scan, matches["wall"], place.walls, float(model["wall_variance"][0]))
         if score > 0.0:
             scored["one_step_chi_square"] = pairs.one_step_cost(found.pose)
-        scored["reliability"] = reliability(scan, matches["wall"], place.walls)
-        scored["least_reliability"] = least_reliability(scan, matches["wall"], place.walls)
         scored["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
         scored["count"] = on.sum()
         if viewpoint is not None and score > best - FAR_BEHIND:
