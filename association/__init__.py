@@ -7,6 +7,7 @@ from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.joint import MapPart
 from .index.map_index import MapIndex
+from .index.map_points import NO_POINTS, MapPoints
 from .messages import AS_WELL, message_of
 from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
@@ -41,6 +42,7 @@ __all__ = [
     "AS_WELL",
     "MAX_VIEWS",
     "NOTHING_KNOWN",
+    "NO_POINTS",
     "PARTS",
     "Alternative",
     "AnswerExplanation",
@@ -64,6 +66,7 @@ __all__ = [
     "KnownOfMaps",
     "MapIndex",
     "MapPart",
+    "MapPoints",
     "MapSet",
     "MapVerdict",
     "Prior",

@@ -148,7 +148,8 @@ def _with_smaller_map(context: SearchContext, factor: float) -> SearchContext:
     """Divide the map by a factor: where its unit is wrong, what is measured in metres holds for the scan as it is."""
     index, options = context.index, context.options
     segments = Segments.derived(index.segments.endpoints[: index.directed] / factor)
-    smaller = MapIndex.build(segments, index.sigma, oriented=options.oriented)
+    points = index.points.scaled(1.0 / factor)
+    smaller = MapIndex.build(segments, index.sigma, oriented=options.oriented, points=points)
     return SearchContext.of(smaller, context.scan, None, options, context.deadline)
 
 

@@ -11,7 +11,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Deadline, MapIndex
+from association import Deadline, MapIndex, MapPoints
 from map_quality import Analysis, PlaceVerdict, Robot, Standing
 from registration import Segments
 
@@ -33,7 +33,7 @@ class Task:
     ----------
     endpoints : (n, 4)
         The map as sent, metres.
-    sigma, oriented, robot, standing, seed, drive
+    sigma, points, oriented, robot, standing, seed, drive
         As in `MapIndex` and `Analysis`.
     landmark : (k, 4)
         Segments of the landmark, metres.
@@ -43,6 +43,7 @@ class Task:
 
     endpoints: NDArray[np.float64]
     sigma: float | None
+    points: MapPoints
     oriented: bool
     robot: Robot
     standing: Standing
@@ -77,7 +78,8 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
     context = multiprocessing.get_context("spawn")
     own = analysis.segments.endpoints
     landmark = np.empty((0, 4)) if analysis.landmark is None else analysis.landmark.segments.endpoints[len(own) :]
-    task = Task(own, analysis.index.sigma, analysis.oriented, analysis.robot, analysis.standing, analysis.seed,
+    index = analysis.index
+    task = Task(own, index.sigma, index.points, analysis.oriented, analysis.robot, analysis.standing, analysis.seed,
                 analysis.drive, landmark, deadline.at)  # fmt: skip
     with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (task,)) as pool:
         todo, running = iter(portions), set[Future[Looks]]()
@@ -107,7 +109,7 @@ def _begin(task: Task) -> None:
     """Index the map once in each process."""
     global _analysis, _deadline
     segments = Segments.derived(task.endpoints)
-    index = MapIndex.build(segments, task.sigma, oriented=task.oriented)
+    index = MapIndex.build(segments, task.sigma, oriented=task.oriented, points=task.points)
     _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed, task.drive)
     if len(task.landmark):
         _analysis = _analysis.with_segments(Segments.derived(task.landmark))

@@ -23,7 +23,7 @@ from .asking import server_at
 from .compiling import compile_first
 from .contract import Json, Progress
 from .errors import RefusedError, WrongUseError
-from .inputs import needing_formats, read_map_file, read_map_or_id
+from .inputs import line_map_of, needing_formats, read_map_file, read_map_or_id
 from .options import AsJson, MapArgument, Server, grouped
 from .printing import print_json, print_rows
 
@@ -179,16 +179,14 @@ def features(answer: Json) -> Json:
 
 def _draw(document: Json, answer: Json, picture: Path) -> None:
     with needing_formats("drawing"):
-        from formats import VERDICTS, LineMap, PlaceMark, draw_map, rgb, verdict_of
+        from formats import VERDICTS, PlaceMark, draw_map, rgb, verdict_of
 
-        segments = Segments.from_array(document["segments"], argument="map.segments")
-        oriented = document.get("oriented") is not False
         marks = [
             PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], rgb(VERDICTS[kind]))
             for one in answer["places"]
             for kind in [verdict_of(one["status"], usable=one["usable"])]
         ]
-        draw_map(LineMap(segments, oriented=oriented), picture, marks=marks)
+        draw_map(line_map_of(document), picture, marks=marks)
 
 
 def _rows(answer: Json) -> Iterator[tuple[str, str]]:

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from association import MapPoints
 from linefix.map_answers import map_json
 from registration import InputError, Segments
 from service.contract import InvalidRequestError, Limits, NotJsonError, TooManyError, fault_of, parse
@@ -137,7 +138,11 @@ def line_map_of(document: Json) -> LineMap:
     from formats import LineMap
 
     segments = Segments.from_array(document.get("segments", []), argument="segments")
-    return LineMap(segments, document.get("sigma"), document.get("oriented") is not False)
+    points = MapPoints.of(document.get("points", []), document.get("points_sigma"), path="")
+    directed = document.get("oriented") is not False
+    return LineMap(
+        segments, document.get("sigma"), directed, points=points.positions, points_sigma=document.get("points_sigma")
+    )
 
 
 @contextmanager

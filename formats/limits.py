@@ -5,6 +5,7 @@ MAX_YAML_BYTES = 16 * 2**10  # of a map_server description
 MAX_LINE_BYTES = 2 * 2**20  # of a text log: some 200,000 ranges
 MAX_CELLS = 40_000_000  # of a grid
 MAX_SEGMENTS = 500_000  # of a map
+MAX_POINTS = 200_000  # of a map, in addition to its segments; as the map index has it
 MAX_ENTITIES = 500_000  # of a drawing, with what its blocks expand to
 MAX_DXF_OBJECTS = 750_000  # of the text of a DXF: entities, blocks, and objects that are not drawn
 MAX_DEPTH = 64  # of elements in one another

@@ -27,6 +27,10 @@ class LineMap:
     frame_id : str
     meta : dict
         The origin of the map, for people.
+    points : (n, 2) float64
+        What is too small for a wall, metres in the map frame: evidence for the beams of a scan.
+    points_sigma : float or None
+        Standard deviation of a point, metres; None: 0.05.
     """
 
     segments: Segments
@@ -34,6 +38,8 @@ class LineMap:
     oriented: bool = True
     frame_id: str = "map"
     meta: dict[str, str] = field(default_factory=dict)
+    points: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    points_sigma: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

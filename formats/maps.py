@@ -124,8 +124,9 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
 
 
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
-    segments = find_faces(grid, notes, name)
-    notes.add_read("segments", "faces of walls", len(segments))
+    faces = find_faces(grid, notes, name)
+    notes.add_read("segments", "faces of walls", len(faces.segments))
     sigma = SURFACE_SIGMA * grid.resolution
     notes.add_assumed("sigma", f"sigma of the walls is assumed to be {sigma:g} m, half a cell")
-    return LineMap(segments, sigma, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})
+    meta = {"source": name, "resolution": f"{grid.resolution:g}"}
+    return LineMap(faces.segments, sigma, True, frame, meta, faces.points, sigma)

@@ -27,6 +27,7 @@ MARGIN = 20  # pixels
 TICK = 10.0  # pixels; towards the free side
 DASH = 8.0  # pixels
 MARK = 5.0  # pixels; of a pose
+DOT = 0.05  # m; half the width of a point without a sigma, as the search has it
 STRIP = 60  # pixels; below the map, for the scale and the legend
 LETTERS = 22  # pixels; height of the text
 LEAST_BAR = 120  # pixels; of the scale
@@ -61,9 +62,10 @@ def draw_map(
     marks: Iterable[PlaceMark] = (),
     lines: Iterable[DrawnLines] = (),
 ) -> None:
-    """Draw a map as PNG: walls in grey, a blue tick on the free side of each, poses in green, doubtful ones in grey.
+    """Draw a map as PNG: walls and points in grey, a blue tick on the free side of each wall.
 
-    Marks are painted below all that, lines above the walls. The strip below has the scale and a legend.
+    Poses are green, doubtful ones grey. Marks are painted below all that, lines above the walls. The strip below has
+    the scale and a legend.
 
     Parameters
     ----------
@@ -86,7 +88,9 @@ def draw_map(
         raise UnsupportedFormatError(
             f"expected a name that ends in .png, found {ending_of(Path(path))}", argument="picture"
         )
-    corners = map.segments.endpoints.reshape(-1, 2) if len(map.segments) else np.zeros((1, 2))
+    corners = np.vstack([map.segments.endpoints.reshape(-1, 2), map.points])
+    corners = corners if len(corners) else np.zeros((1, 2))
+    half = DOT if map.points_sigma is None else map.points_sigma
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)
     width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
@@ -108,6 +112,10 @@ def draw_map(
         if map.oriented:
             x, y = place(mx, my)
             draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=rgb(MATCHED), width=2)
+    for x, y in map.points.tolist():
+        left, top = place(x - half, y + half)
+        right, bottom = place(x + half, y - half)
+        draw.rectangle([left, top, max(right, left + 1), max(bottom, top + 1)], fill=rgb(WALL))
     for one in lines:
         for x1, y1, x2, y2 in one.ends:
             _draw_line(draw, place(x1, y1), place(x2, y2), one)

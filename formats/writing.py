@@ -33,7 +33,7 @@ def write_map(map: LineMap, path: str | os.PathLike[str]) -> None:
     ----------
     map : LineMap
     path : str or path
-        Ends in ``.json``, ``.geojson``, ``.svg``, ``.csv`` or ``.dxf``. GeoJSON, SVG and DXF do not keep sigma.
+        Ends in ``.json``, ``.geojson``, ``.svg``, ``.csv`` or ``.dxf``. Only JSON keeps the points and sigma.
 
     Raises
     ------
@@ -57,6 +57,8 @@ def _json(map: LineMap) -> bytes:
         "frame_id": map.frame_id,
         "meta": map.meta,
     }
+    if len(map.points):
+        fields |= {"points": map.points, "points_sigma": map.points_sigma}
     return orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY)
 
 

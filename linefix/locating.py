@@ -16,6 +16,7 @@ from association import (
     KnownOfMaps,
     MapIndex,
     MapPart,
+    MapPoints,
     MapSet,
     Prior,
     Scan,
@@ -32,7 +33,8 @@ from .ranges import MountedScan, ranges_scan, view_of
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
 
-MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "meta"))  # of a map document
+# Of a map document.
+MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "points", "points_sigma", "meta"))
 
 
 def locate(
@@ -133,7 +135,8 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     ----------
     map : MapIndex, LineMap, ImportedMap, Segments, mapping, or array-like of shape (n, 4)
         An index is returned as it is. The error of bare segments is not known: each answer estimates it. A
-        mapping is a map document as in a map file: ``segments``, and optionally ``sigma`` and ``oriented``.
+        mapping is a map document as in a map file: ``segments``, and optionally ``sigma``, ``oriented``, ``points`` and
+        ``points_sigma``.
 
     Raises
     ------
@@ -150,7 +153,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     if isinstance(map, MapIndex):
         return map
     part = _part(map, "map")
-    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented)
+    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented, points=part.points)
 
 
 def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
@@ -200,7 +203,8 @@ def _part(map: Any, argument: str) -> MapPart:
     inner: Any = getattr(map, "map", map)  # an imported map comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
-        return MapPart(segments, inner.sigma, inner.oriented)
+        points = MapPoints.of(inner.points, inner.points_sigma, path=f"{argument}.")
+        return MapPart(segments, inner.sigma, inner.oriented, points)
     return MapPart(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument=argument))
 
 
@@ -214,10 +218,13 @@ def _document_part(document: Mapping[str, Any], argument: str) -> MapPart:
     oriented, sigma = document.get("oriented"), document.get("sigma")
     if not (oriented is None or isinstance(oriented, bool)):
         raise InvalidArgumentError(f"expected true, false or null, found {oriented!r}", argument=f"{argument}.oriented")
-    if sigma is not None and (isinstance(sigma, bool) or not isinstance(sigma, int | float)):
-        raise InvalidArgumentError(f"expected metres or null, found {sigma!r}", argument=f"{argument}.sigma")
+    points_sigma = document.get("points_sigma")
+    for name, deviation in (("sigma", sigma), ("points_sigma", points_sigma)):
+        if deviation is not None and (isinstance(deviation, bool) or not isinstance(deviation, int | float)):
+            raise InvalidArgumentError(f"expected metres or null, found {deviation!r}", argument=f"{argument}.{name}")
     segments = Segments.from_array(document.get("segments", []), argument=f"{argument}.segments")
-    return MapPart(segments, sigma, oriented is not False)
+    points = MapPoints.of(document.get("points", []), points_sigma, path=f"{argument}.")
+    return MapPart(segments, sigma, oriented is not False, points)
 
 
 def scan_of(

@@ -20,12 +20,14 @@ MOST_INDICES = 1000  # of one finding
 
 
 def map_json(line_map: LineMap) -> Json:
-    """Return a map as a map document."""
+    """Return a map as a map document; one without points does not mention them."""
+    points = {"points": line_map.points.tolist(), "points_sigma": line_map.points_sigma}
     return {
         "segments": line_map.segments.endpoints.tolist(),
         "sigma": line_map.sigma,
         "oriented": line_map.oriented,
         "frame_id": line_map.frame_id,
+        **(points if len(line_map.points) else {}),
         "meta": line_map.meta,
     }
 

@@ -23,13 +23,14 @@ def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined:
     Moves the first `refined` of the poses. The evidence of poses not reached before the deadline is 0, and all of it if
     rays cannot be followed.
     """
-    evidence, rays, place = np.zeros(len(poses), BEAM_EVIDENCE), rays_of(context, most), context.index.tables.place
+    evidence, rays = np.zeros(len(poses), BEAM_EVIDENCE), rays_of(context, most)
+    place, obstacles = context.index.tables.place, context.index.obstacles
     step = max(1, int(MOST_LOOKED_AT / (1.0 + context.looks)))
     for begin in range(0, len(poses) if context.can_look else 0, step):
         if begin > 0 and context.deadline.passed:
             break
         some, moved = slice(begin, begin + step), max(0, refined - begin)
-        weigh_beams(rays, poses[some], place, moved, context.workspace, evidence[some])
+        weigh_beams(rays, poses[some], place, obstacles, moved, context.workspace, evidence[some])
     return evidence
 
 

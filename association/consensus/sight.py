@@ -75,9 +75,11 @@ def compare_beams(context: SearchContext, estimated: EstimatedPose) -> BeamFract
     """Return the fractions of beams that do not read what the map shows from the estimated pose."""
     if not context.with_beams or not context.can_look:
         return NO_BEAMS
-    pose, place = estimated.pose, context.index.tables.place
+    pose, index = estimated.pose, context.index
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
-    farther, nearer = beam_fractions(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
+    farther, nearer = beam_fractions(
+        rays_of(context, COMPARED_BEAMS), at, index.tables.place, index.obstacles, context.workspace
+    )
     return BeamFractions(farther, nearer, _in_step(context, at))
 
 

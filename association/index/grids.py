@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from registration.layout import Records
 
-from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
-from ..tables import Crossings, Grid, Raster, Sweep, Walls
+from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, WALL, as_records, record
+from ..tables import Crossings, Grid, Place, Raster, Sweep, Walls
 from ..tuning import APART_STEP, NARROW_REACH, REACH, SECTORS
 from .kernels.crossings import find_crossings, list_crossings, sample_crossings
 from .kernels.walls import direction_raster, grid_cells
+from .map_points import MapPoints
 from .tuning import (
     CELL,
     CELL_GROWTH,
@@ -32,6 +33,7 @@ from .tuning import (
     MOST_CROSSINGS,
     MOST_FIELD_CELLS,
     NEIGHBOURHOOD,
+    OBSTACLE_CELL,
     RASTER_CELL,
     SWEEP_CELL,
     SWEEP_REACH,
@@ -44,6 +46,22 @@ Floats = NDArray[np.float64]
 def near_walls(walls: Walls) -> Grid:
     """List in each cell the walls within `REACH` of it."""
     return _grid(ends_of(walls), CELL, REACH, MAX_CELLS)
+
+
+def stopping_beams(place: Place, points: MapPoints) -> Place:
+    """Return the walls with points of the index frame behind them, as two short walls each, for beams to end at."""
+    arms = points.arms()
+    rows = np.zeros(len(arms), WALL)
+    across, along = slice(0, len(points)), slice(len(points), None)
+    for name, values, half in (("dx", across, 0), ("dy", along, 1)):
+        rows[name][values] = 1.0
+        rows["begin"][values], rows["end"][values] = arms[values, half], arms[values, half + 2]
+    rows["offset"][across], rows["offset"][along] = arms[across, 1], -arms[along, 0]
+    rows["angle"][along] = 0.5 * math.pi
+    rows["before"] = rows["after"] = -1
+    walls = np.concatenate([place.walls, rows])
+    grid = _grid(ends_of_rows(walls), OBSTACLE_CELL, SWEEP_REACH, MAX_CELLS)
+    return Place(walls, place.bin_starts, grid, np.append(place.ties, np.full(len(rows), -1.0)))
 
 
 def swept_chains(chains: Walls) -> Sweep:

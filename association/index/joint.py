@@ -24,6 +24,7 @@ from ..errors import InvalidMapError
 from ..layout import Integers
 from ..tuning import DIRECTION_BINS, EXCEEDING, FAR, FARTHER, MODEL_OFFSET, REACH
 from .map_index import MapIndex, tables_of
+from .map_points import NO_POINTS, MapPoints
 from .tuning import CELL
 from .walls import both_ways
 
@@ -47,18 +48,21 @@ class MapPart:
         Standard deviation of its lines normal to themselves, metres; None: unknown.
     oriented : bool
         True if free space lies on the left of its segments.
+    points : MapPoints
+        What is too small for a wall.
     """
 
     segments: Segments
     sigma: float | None = None
     oriented: bool = True
+    points: MapPoints = NO_POINTS
 
     @classmethod
     def of(cls, index: MapIndex) -> MapPart:
         """Return the map of an index."""
         directed = len(index.segments) == index.directed
         segments = index.segments if directed else index.segments.take(np.arange(index.directed))
-        return cls(segments, index.sigma, directed)
+        return cls(segments, index.sigma, directed, index.points)
 
 
 @dataclass(frozen=True)
@@ -115,11 +119,11 @@ class JointIndex(MapIndex):
         segments = Segments.derived(np.concatenate(shifted))
         directed, sigma = len(segments), joint_sigma([part.sigma for part in parts])
         either = segments if oriented else both_ways(segments)
-        tables = tables_of(either, sigma, deadline)
+        tables, points = tables_of(either, sigma, deadline), joint_points(parts, shifts)
         starts = np.concatenate([[0], np.cumsum(counts)])
         boxes = own + np.tile(shifts, 2)
         together = tuple(parts), float(gap), shifts, starts, boxes
-        return cls(either, sigma, np.zeros(2), directed, *tables, *together).warmed()
+        return cls(either, sigma, np.zeros(2), directed, points, *tables, *together).warmed()
 
     def _undirected(self, deadline: Deadline | None) -> JointIndex:
         if len(self.segments) > self.directed:
@@ -182,7 +186,7 @@ def checked_parts(parts: Sequence[MapPart]) -> tuple[MapPart, ...]:
     if not 1 <= len(parts) <= MOST_MAPS:
         raise InvalidMapError(f"expected 1 to {MOST_MAPS} maps, found {len(parts)}", argument="maps")
     for number, part in enumerate(parts):
-        MapIndex.require(part.segments, part.sigma, f"maps.{number}.")
+        MapIndex.require(part.segments, part.sigma, f"maps.{number}.", part.points)
     return tuple(parts)
 
 
@@ -197,6 +201,15 @@ def joint_sigma(sigmas: Sequence[float | None]) -> float | None:
     known = [sigma for sigma in sigmas if sigma is not None]
     largest = max(known)
     return None if len(known) < len(sigmas) and largest <= MODEL_OFFSET else largest
+
+
+def joint_points(parts: Sequence[MapPart], shifts: Floats) -> MapPoints:
+    """Return the points of several maps moved by their shifts (k, 2), metres; those of the least exact map count."""
+    with_points = [(part.points, shift) for part, shift in zip(parts, shifts, strict=True) if len(part.points)]
+    if not with_points:
+        return NO_POINTS
+    together = np.concatenate([points.positions + shift for points, shift in with_points])
+    return MapPoints(together, max(points.sigma for points, _ in with_points))
 
 
 def gap_of(extent: float) -> float:

@@ -11,14 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Records
+from registration.layout import Floats, Records
 
 from ..layout import ENDS, as_records
-from ..tables import Walls
 from .grids import field_shape
 from .kernels.likelihood_field import stamp_walls
 from .tuning import FIELD_DEVIATION, FIELD_LEVELS
-from .walls import ends_of
 
 
 class LikelihoodField(NamedTuple):
@@ -36,9 +34,8 @@ class LikelihoodField(NamedTuple):
     pyramid: NDArray[np.uint8]
 
 
-def likelihood_field(walls: Walls) -> LikelihoodField | None:
-    """Return the likelihood field of walls; None where the map is too large for one."""
-    ends = ends_of(walls)
+def likelihood_field(ends: Floats) -> LikelihoodField | None:
+    """Return the likelihood field of walls from their ends (m, 4), metres; None where the map is too large for one."""
     shape = field_shape(ends)
     if shape is None:
         return None

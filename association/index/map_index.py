@@ -17,8 +17,9 @@ from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from ..tuning import WHOLE_GAP
-from .grids import crossing_chains, directions_near, field_shape, near_walls, swept_chains
+from .grids import crossing_chains, directions_near, field_shape, near_walls, stopping_beams, swept_chains
 from .likelihood_field import LikelihoodField, likelihood_field
+from .map_points import NO_POINTS, MapPoints
 from .tuning import (
     BLENDED_SIGMAS,
     BLENDED_STEP,
@@ -29,7 +30,7 @@ from .tuning import (
     ONE_LINE,
     ONE_LINE_SHARE,
 )
-from .walls import blended, both_ways, chains_of, ends_of, merge, tie
+from .walls import blended, both_ways, chains_of, ends_of_rows, merge, tie
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,8 @@ class MapIndex:
         Centre of the map, metres in the map frame; the index works relative to it, so that maps far out lose nothing.
     directed : int
         Number of segments as sent; piece i stands for segment ``i % directed``.
+    points : MapPoints
+        What is too small for a wall, in the map frame: evidence for beams.
     wall_of_piece : (n,) the wall that each segment is part of
     pieces : Pieces
         Which segments each wall consists of.
@@ -72,6 +75,7 @@ class MapIndex:
     sigma: float | None
     origin: Floats
     directed: int
+    points: MapPoints
     wall_of_piece: Integers
     pieces: Pieces
     walls: Walls
@@ -89,6 +93,7 @@ class MapIndex:
         sigma: float | None = None,
         *,
         oriented: bool = True,
+        points: MapPoints = NO_POINTS,
         deadline: Deadline | None = None,
     ) -> MapIndex:
         """Index a map; some 10 microseconds a segment.
@@ -102,23 +107,27 @@ class MapIndex:
             each answer estimates it from what its walls leave.
         oriented : bool
             False lists every segment in both directions, for scans whose directions mean nothing.
+        points : MapPoints, optional
+            What is too small for a wall, in the map frame: evidence for the beams of a scan.
         deadline : Deadline, optional
             Looked at every few tenths of a second.
 
         Raises
         ------
         InvalidMapError
-            When the map is empty or too wide, or sigma out of range.
+            When the map is empty or too wide, also with its points, or sigma out of range.
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        low, high = cls.require(segments, sigma, "map.")
+        low, high = cls.require(segments, sigma, "map.", points)
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
-        return cls._of(either, sigma, origin, len(segments), deadline)
+        return cls._of(either, sigma, origin, len(segments), points, deadline)
 
     @staticmethod
-    def require(segments: Segments, sigma: float | None, path: str) -> tuple[Floats, Floats]:
+    def require(
+        segments: Segments, sigma: float | None, path: str, points: MapPoints = NO_POINTS
+    ) -> tuple[Floats, Floats]:
         """Return the low and the high corner of a map, (2,) metres, that can be indexed.
 
         Raises
@@ -140,17 +149,25 @@ class MapIndex:
                 f"expected an extent of at most {MAX_EXTENT:g} m, found {extent:.4g} m; check the unit",
                 argument=f"{path}segments",
             )
+        points.require_near(low, high, path)
         return low, high
 
     @classmethod
     def _of(
-        cls, segments: Segments, sigma: float | None, origin: Floats, directed: int, deadline: Deadline | None
+        cls,
+        segments: Segments,
+        sigma: float | None,
+        origin: Floats,
+        directed: int,
+        points: MapPoints,
+        deadline: Deadline | None,
     ) -> MapIndex:
-        return cls(segments, sigma, origin, directed, *tables_of(segments.shifted(-origin), sigma, deadline)).warmed()
+        tables = tables_of(segments.shifted(-origin), sigma, deadline)
+        return cls(segments, sigma, origin, directed, points, *tables).warmed()
 
     def warmed(self) -> Self:
         """Compute what the first search would wait for, and return the index."""
-        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
+        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables", "obstacles"):
             getattr(self, name)
         return self
 
@@ -175,12 +192,19 @@ class MapIndex:
     def _undirected(self, deadline: Deadline | None) -> MapIndex:
         if len(self.segments) > self.directed:
             return self
-        return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed, deadline)
+        either = both_ways(self.segments)
+        return MapIndex._of(either, self.sigma, self.origin, self.directed, self.points, deadline)
 
     @cached_property
     def likelihood_field(self) -> LikelihoodField | None:
-        """The likelihood field of the walls; None if the map is too large for one."""
-        return likelihood_field(self.walls)
+        """The likelihood field of walls and points; None if the map is too large for one."""
+        return likelihood_field(ends_of_rows(self.obstacles.walls))
+
+    @cached_property
+    def obstacles(self) -> Place:
+        """What stops beams: the walls, and behind them two short ones for each point."""
+        place = self.tables.place
+        return stopping_beams(place, self.points.shifted(-self.origin)) if len(self.points) else place
 
     @cached_property
     def wall_lengths(self) -> WallLengths:
@@ -191,14 +215,16 @@ class MapIndex:
 
     @cached_property
     def crowd(self) -> float:
-        """Return the mean number of walls on the list of a cell, over all entries of all lists."""
-        counts = np.diff(self.grid.starts).astype(np.float64)
-        return float((counts * counts).sum() / max(1.0, counts.sum()))
+        """Return the mean number of walls on the list of a cell, over all entries of all lists; of points the same."""
+        return max(_crowd(self.grid), _crowd(self.obstacles.grid))
 
     @cached_property
     def most_near(self) -> int:
-        """Return the number of walls on the longest list of a cell."""
-        return int(np.diff(self.grid.starts).max())
+        """Return the number of walls on the longest list of a cell; on that of walls and points, for as long a way."""
+        grid, obstacles = self.grid, self.obstacles.grid
+        cells = float(grid.shape["cell"][0] / obstacles.shape["cell"][0])
+        longest = [float(np.diff(one.starts).max()) for one in (grid, obstacles)]
+        return math.ceil(max(longest[0], cells * longest[1]))
 
     def agreeing_share(self) -> float:
         """Return the probability that two points of walls have the same direction, up to a neighbouring bin."""
@@ -258,7 +284,9 @@ class MapIndex:
         ]
         tables.append((self.sweep.chains, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
-        shape = field_shape(ends_of(self.walls))
+        if len(self.points):
+            tables += [(self.points.positions, self.obstacles.walls, self.obstacles.ties), self.obstacles.grid]
+        shape = field_shape(ends_of_rows(self.obstacles.walls))
         of_field = 0 if shape is None else FIELD_LEVELS * int(shape["rows"][0] * shape["columns"][0])
         arrays = [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
         return of_field + sum(int(array.nbytes) for array in arrays)
@@ -291,6 +319,11 @@ def tables_of(
     _require_time(deadline)
     raster = directions_near(walls, chains)
     return wall_of_piece, pieces, walls, ties, chains, near_walls(walls), sweep, crossings, raster
+
+
+def _crowd(grid: Grid) -> float:
+    counts = np.diff(grid.starts).astype(np.float64)
+    return float((counts * counts).sum() / max(1.0, counts.sum()))
 
 
 def _require_time(deadline: Deadline | None) -> None:

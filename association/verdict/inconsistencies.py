@@ -37,7 +37,8 @@ def absences(context: SearchContext, best: ConsensusSet, others: Sequence[Consen
 def _readings(context: SearchContext, rays: Rays, one: ConsensusSet) -> Floats:
     """Return for each beam what `read_beams` writes of it at a pose, (n, 2)."""
     readings = np.zeros((len(rays.beams), 2))
-    read_beams(rays, one.estimate, context.index.tables.place, context.workspace, readings)
+    index = context.index
+    read_beams(rays, one.estimate, index.tables.place, index.obstacles, context.workspace, readings)
     return readings
 
 

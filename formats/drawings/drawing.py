@@ -33,6 +33,10 @@ class Drawing:
         True if the drawing declares free space on the left of its lines.
     sigma, frame_id, meta
         As in `LineMap`, where the file says.
+    points : (n, 2)
+        What is too small for a wall, units of the drawing.
+    points_sigma : float or None
+        As in `LineMap`.
     segments : list of (k, 4)
         The lines so far, units of the drawing.
     widths : list of float
@@ -50,6 +54,8 @@ class Drawing:
     sigma: float | None = None
     frame_id: str = "map"
     meta: dict[str, str] = field(default_factory=dict)
+    points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    points_sigma: float | None = None
     segments: list[Floats] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
     layer_names: list[str] = field(default_factory=list)

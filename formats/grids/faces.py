@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import contourpy
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from registration import Segments
 from vectorization import VectorizationOptions, vectorize
 
 from ..errors import MalformedFileError, TooLargeError
-from ..limits import MAX_SEGMENTS
+from ..limits import MAX_POINTS, MAX_SEGMENTS
 from ..report import Notes
 from .cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
 from .tuning import (
     BAND_SHARE,
     CONTOUR_SIGMA,
     CORNER_REACH,
+    COVERED,
     GREATEST_BAND,
     LEAST_DEPTH,
     LEAST_LENGTH,
@@ -32,8 +36,24 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
-    """Find the faces of the walls in a grid.
+@dataclass(frozen=True, slots=True)
+class Faces:
+    """What a grid shows.
+
+    Attributes
+    ----------
+    segments : Segments
+        The faces of its walls, metres in the map frame, free space on the left.
+    points : (n, 2)
+        The occupied cells next to free ones that are on no face: their middles, metres in the map frame.
+    """
+
+    segments: Segments
+    points: Floats
+
+
+def find_faces(grid: Grid, notes: Notes, name: str) -> Faces:
+    """Find the faces of the walls in a grid, and what is too small for one.
 
     Contours of the free space have it on their left. A border with unknown cells is no wall. The
     contour runs along the front of the occupied cells, the wall's surface behind it: see `surface_depth`.
@@ -47,8 +67,7 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
 
     Returns
     -------
-    Segments
-        Metres in the map frame, free space on the left.
+    Faces
 
     Raises
     ------
@@ -66,11 +85,11 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         sigma=CONTOUR_SIGMA * grid.resolution, min_length=max(1e-3, LEAST_LENGTH * grid.resolution)
     )
     found: list[Floats] = []
-    points = 0
+    fronts: list[Floats] = []
     for contour in wall_contours(cells):
         lines = vectorize(contour * grid.resolution, options, viewpoint=None).measured
-        points += len(contour) - int(lines.point_counts.sum())
         if len(lines):
+            fronts.append(lines.segments.endpoints / grid.resolution)
             found.append(lines.segments.endpoints - np.tile(lines.segments.normals * depth * grid.resolution, 2))
         if sum(map(len, found)) > MAX_SEGMENTS:
             raise TooLargeError(
@@ -87,12 +106,38 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
             f"no wall found: expected a straight border between free and occupied cells, found {counts} cells{said}",
             argument=name,
         )
-    if points > 0:
-        notes.add_dropped(
-            "short_pieces", f"cell borders outside of straight lines of at least {LEAST_LENGTH:g} cells", points
-        )
     notes.add_assumed("surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells")
-    return Segments.from_array(_placed(np.vstack(found), grid))
+    points = _outside_of(np.vstack(fronts), cells)
+    if len(points) > MAX_POINTS:
+        notes.add_dropped(
+            "points", f"cells that are on no wall, more than the {MAX_POINTS} points of a map", len(points)
+        )
+        points = np.zeros((0, 2))
+    elif len(points):
+        notes.add_read("points", "occupied cells that are on no wall", len(points))
+    placed = grid.origin.apply(points * grid.resolution)
+    return Faces(Segments.from_array(_placed(np.vstack(found), grid)), placed)
+
+
+def _outside_of(fronts: Floats, cells: Cells) -> Floats:
+    """Return the middles of the occupied cells that border on a free one and lie on no front, (n, 2), in cells.
+
+    Parameters
+    ----------
+    fronts : (m, 4)
+        The lines along the fronts of the occupied cells, in cells.
+    """
+    beside_free = ndimage.binary_dilation(cells == FREE)
+    row, column = np.nonzero((cells == OCCUPIED) & beside_free)
+    middles = np.column_stack([column + 0.5, row + 0.5])
+    lengths = np.hypot(*(fronts[:, 2:] - fronts[:, :2]).T)
+    counts = np.ceil(2.0 * lengths).astype(np.intp) + 1  # two on the length of a cell
+    of_front = np.repeat(np.arange(len(fronts)), counts)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    along = ((np.arange(len(of_front)) - first) / (counts[of_front] - 1))[:, None]
+    on_fronts = (1.0 - along) * fronts[of_front, :2] + along * fronts[of_front, 2:]
+    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=COVERED)
+    return np.asarray(middles[np.isinf(away)])
 
 
 def surface_depth(cells: Cells) -> float:

@@ -65,6 +65,10 @@ CORNER_REACH = 3
 LEAST_LENGTH = 3.0
 LEAST_POINTS = 4
 
+# Occupied cells whose middle is farther than this from each line along the front of the cells are points of the map.
+# Geometry: half a cell behind the line, and the steps of a line that is not along the grid.
+COVERED = 1.5
+
 # Points of a contour that are fitted together.
 LONGEST_CONTOUR = 50_000
 

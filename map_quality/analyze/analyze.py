@@ -76,7 +76,7 @@ class Analysis:
     index : MapIndex
         The index in which scans are searched.
     segments : Segments
-        The segments that the scanner sees: the map as sent.
+        The map as sent; the scanner also sees the points of the index.
     robot : Robot
     standing : Standing
     oriented : bool
@@ -148,7 +148,7 @@ class Analysis:
         """
         ends = np.vstack([self.segments.endpoints, landmark.endpoints])
         segments = Segments.derived(ends)
-        index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+        index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented, points=self.index.points)
         return replace(self, landmark=replace(self, index=index, segments=segments, drive=0.0, landmark=None))
 
     def look(self, number: int, deadline: Deadline | None = None) -> PlaceVerdict | None:
@@ -212,7 +212,9 @@ class Analysis:
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
         """Return the scan that the robot would send from there; the noise of a place is the same on each attempt."""
-        return look(self.segments, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
+        arms = self.index.points.arms()
+        seen = Segments.derived(np.vstack([self.segments.endpoints, arms])) if len(arms) else self.segments
+        return look(seen, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
 
 
 def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> PlaceVerdict:

@@ -264,7 +264,8 @@ class _Update:
         return replace(proposed, found=tuple(again), sharpened=sharpened)
 
     def _indexed(self, segments: Segments) -> MapIndex:
-        return MapIndex.build(segments, self.index.sigma, oriented=self.gatherer.oriented)
+        index = self.index
+        return MapIndex.build(segments, index.sigma, oriented=self.gatherer.oriented, points=index.points)
 
     def search_others(
         self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapSet
+from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapPoints, MapSet
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
@@ -90,7 +90,7 @@ class MapLookup:
     def takes_long(self, asked: InlineMap | FoundMap) -> bool:
         """Return whether it may take long until a map is ready to be searched."""
         if isinstance(asked, InlineMap):
-            return len(asked.segments) > LONG_SEGMENTS
+            return len(asked.segments) + len(asked.points) > LONG_SEGMENTS
         return asked.document is not None and len(asked.document) > LONG_BYTES
 
     def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
@@ -116,7 +116,7 @@ class MapLookup:
             return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
         # Robots send the same map with every scan: its content is its name.
         directed = is_oriented(oriented, asked.oriented)
-        key = _digest(asked), asked.sigma, asked.frame_id, directed
+        key = *_content(asked), directed
         return self._cache.get(key, lambda: self._index(asked, directed), deadline)
 
     def find_together(self, asked: Sequence[NamedMap | StoredMap] | MapPrefix, prefix: str) -> FoundMaps:
@@ -166,11 +166,13 @@ class MapLookup:
                 raise IndexNotReadyError
             document = one if isinstance(one, InlineMap) else self._document(FoundMap(one, None))
             segments = Segments.from_array(document.segments, argument=f"maps.{number}.segments")
-            parts[name] = MapPart(segments, document.sigma, is_oriented(oriented, document.oriented))
+            directed, points = is_oriented(oriented, document.oriented), _points_of(document, f"maps.{number}.")
+            parts[name] = MapPart(segments, document.sigma, directed, points)
             frame_ids.append(document.frame_id)
         count = sum(len(part.segments) for part in parts.values())
         if count > MOST_TOGETHER:
             raise TooManyError("/maps", MOST_TOGETHER, "segments of all maps together")
+        count += sum(len(part.points) for part in parts.values())
         self._cache.make_room(2 * INDEXED_BYTES * count)
         try:
             maps = MapSet(parts, deadline)
@@ -188,9 +190,9 @@ class MapLookup:
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        self._cache.make_room(INDEXED_BYTES * len(asked.segments))
+        self._cache.make_room(INDEXED_BYTES * (len(asked.segments) + len(asked.points)))
         segments = Segments.from_array(asked.segments, argument="map.segments")
-        return MapIndex.build(segments, asked.sigma, deadline=deadline)
+        return MapIndex.build(segments, asked.sigma, points=_points_of(asked, "map."), deadline=deadline)
 
     def document(self, found: FoundMap) -> MapDocument:
         """Return the document of a stored map; runs off the event loop.
@@ -220,23 +222,28 @@ class MapLookup:
 
     def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
         # The old goes before the new comes: two of the largest at once would take too much.
-        self._cache.make_room(INDEXED_BYTES * len(asked.segments) * (1 if oriented else 2))
+        self._cache.make_room(INDEXED_BYTES * (len(asked.segments) * (1 if oriented else 2) + len(asked.points)))
         segments = Segments.from_array(asked.segments, argument="map.segments")
-        index = MapIndex.build(segments, asked.sigma, oriented=oriented)
+        index = MapIndex.build(segments, asked.sigma, oriented=oriented, points=_points_of(asked, "map."))
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
 
 
 def _key_together(asked: FoundMaps, oriented: bool | None) -> Hashable:
     """Return the name of the content of several maps, in their order."""
     parts = (
-        (name, one) if isinstance(one, MapRecord) else (name, _digest(one), one.sigma, one.frame_id, one.oriented)
-        for name, one in asked.maps
+        (name, one) if isinstance(one, MapRecord) else (name, *_content(one), one.oriented) for name, one in asked.maps
     )
     return ("together", oriented, *parts)
 
 
-def _digest(asked: InlineMap) -> str:
-    return hashlib.sha256(asked.segments.tobytes()).hexdigest()
+def _content(asked: InlineMap) -> tuple[Hashable, ...]:
+    """Return what an index and its answers depend on, in addition to whether directions mean anything."""
+    segments, points = (hashlib.sha256(rows.tobytes()).hexdigest() for rows in (asked.segments, asked.points))
+    return segments, asked.sigma, points, asked.points_sigma, asked.frame_id
+
+
+def _points_of(document: MapDocument, path: str) -> MapPoints:
+    return MapPoints.of(document.points, document.points_sigma, path=path)
 
 
 def outline_of(document: MapDocument) -> MapOutline:
@@ -249,6 +256,6 @@ def outline_of(document: MapDocument) -> MapOutline:
     """
     segments = Segments.from_array(document.segments, argument="segments")
     # No negative zeros: not every database keeps them.
-    corners = MapIndex.require(segments, document.sigma, "")
+    corners = MapIndex.require(segments, document.sigma, "", _points_of(document, ""))
     (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in corners)
     return MapOutline(len(segments), (left, bottom, right, top), document.sigma, document.oriented)

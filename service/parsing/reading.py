@@ -17,6 +17,7 @@ from ..schemas.requests import BatchItem, BatchRequest
 from .errors import NotJsonError
 
 M = TypeVar("M", bound=BaseModel)
+MAP_FIELDS = ("segments", "sigma", "oriented", "frame_id", "points", "points_sigma", "meta")
 _NO_NUMBER = re.compile(r"-?(NaN|Inf)", re.IGNORECASE)
 
 
@@ -51,7 +52,7 @@ def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, l
 def read_map(data: bytes | bytearray, limits: Limits) -> tuple[MapDocument, bytes]:
     """Return a map that is to be stored, and the document to store: the sent fields and no more."""
     asked = read_model(MapDocument, data, limits)
-    document = {name: getattr(asked, name) for name in ("segments", "sigma", "oriented", "frame_id", "meta")}
+    document = {name: getattr(asked, name) for name in MAP_FIELDS}
     return asked, encode({name: value for name, value in document.items() if name in asked.model_fields_set})
 
 

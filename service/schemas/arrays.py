@@ -143,6 +143,11 @@ MapSegmentRows = Annotated[
 ScanSegmentRows = Annotated[
     Floats, PlainValidator(_rows_validator(4, NUMBERS, -_M, _M, _SCAN)), _rows_schema(4, _number())
 ]
+MapPointRows = Annotated[
+    Floats,
+    PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, ("map_segments", "map points"))),
+    _rows_schema(2, _number()),
+]
 PointRows = Annotated[Floats, PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, _BEAMS)), _rows_schema(2, _number())]
 CentroidRows = Annotated[
     Floats, PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, _SCAN)), _rows_schema(2, _number())

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from .checks import MapCheckAnswer
-from .replies import Index, Milliseconds, PoseAnswer, Row4
+from .replies import Index, Milliseconds, PoseAnswer, Row2, Row4
 from .strict import Answer
 
 
@@ -37,6 +37,8 @@ class ImportedMapAnswer(Answer):
     sigma: float | None
     oriented: bool
     frame_id: str
+    points: list[Row2] = Field([], description="`[x, y]` each, metres; absent if the map has none")
+    points_sigma: float | None = Field(None, description="metres; absent if the map has no points")
     meta: Any
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import (
     CentroidRows,
     Covariance,
+    MapPointRows,
     MapSegmentRows,
     PointCounts,
     PointRows,
@@ -21,6 +23,7 @@ from .arrays import (
 from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict, in_radians
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
+PointSigma = Annotated[float, Field(gt=0.0, le=10.0)]
 RaySigma = Annotated[float, Field(ge=1e-6, le=10.0)]
 IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map", "causes"]
 EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segments", "missing_map")
@@ -29,7 +32,7 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 INLINE, STORED = "<inline>", "<stored>"
 BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS = "<segments>", "<laser>", "<points>", "<views>"
 SOFT, HARD = "<soft>", "<hard>"
-_BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta"))
+_BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta", "points", "points_sigma"))
 _BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint", "twist"))
 TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS, SOFT, HARD, "<list>", "<prefix>"))
 
@@ -47,6 +50,15 @@ class MapDocument(Strict):
         "precedence",
     )
     frame_id: FrameId = Field("map", description="frame of the map, as `frame_id` of the answer")
+    points: MapPointRows = Field(
+        default_factory=lambda: np.zeros((0, 2)),
+        description="`[x, y]` each, metres: what is too small for a wall, such as legs and posts; evidence for the "
+        "beams of a scan only; at most as many as `max_map_segments` of /v1/limits",
+        json_schema_extra={"default": []},
+    )
+    points_sigma: PointSigma | None = Field(
+        None, description="standard deviation of the points' positions, and half their width, metres; null: 0.05"
+    )
     meta: FreeJson = Field(None, description="returned as it was sent")
 
 

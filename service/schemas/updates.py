@@ -13,7 +13,7 @@ from .arrays import Covariance, MapSegmentRows
 from .errors import TooManyError
 from .limits import Limits
 from .parts import LaserScan, MapDocument, MapSigma
-from .replies import Index, MapReference, Row4, Share, TimingAnswer
+from .replies import Index, MapReference, Row2, Row4, Share, TimingAnswer
 from .strict import Answer, Coordinate, FreeJson, Pose, Strict
 
 MOST_VISITS = 100
@@ -116,6 +116,8 @@ class NewMapAnswer(Answer):
     sigma: float | None
     oriented: bool | None
     frame_id: str
+    points: list[Row2] = Field([], description="`[x, y]` each, metres; absent if the map has none")
+    points_sigma: float | None = Field(None, description="metres; absent if the map has no points")
     meta: Any
 
 

@@ -17,6 +17,7 @@ from registration import InputError, Segments
 
 from ..maps.lookup import FoundMap, MapLookup, outline_of
 from ..schemas.errors import Fault, InvalidRequestError
+from ..schemas.parts import MapDocument
 from ..schemas.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
 from .association import reference_to
 from .inputs import naming_scan, scanned_of, transform_of
@@ -66,8 +67,14 @@ def begin_update(lookup: MapLookup, source: FoundMap, asked: UpdateRequest, job:
     ]
     job.begin_search()
     steps = updating(cached.index, scans, job.deadline, accept=asked.accept, refuse=asked.refuse)
-    document: dict[str, Any] = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
-    return Progress(steps, document, reference_to(source))
+    return Progress(steps, _kept_fields(old), reference_to(source))
+
+
+def _kept_fields(old: MapDocument) -> Json:
+    """Return the fields of a map that no update changes."""
+    points: dict[str, Any] = {"points": old.points.tolist(), "points_sigma": old.points_sigma}
+    kept = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
+    return {**kept, **(points if len(old.points) else {})}
 
 
 def _scan_of(asked: UpdateRequest, visit: int, number: int) -> VisitScan:
@@ -130,8 +137,7 @@ def answer_apply(asked: ApplyRequest, job: Job) -> Done:
             raise
         raise InvalidRequestError([Fault(f"/changes/{list(accepted)[error.index]}", error.message)]) from error
     job.watch.lap("search")
-    document = {"segments": new.endpoints.tolist(), "sigma": sigma, "oriented": old.oriented}
-    document |= {"frame_id": old.frame_id, "meta": old.meta}
+    document = {"segments": new.endpoints.tolist(), "sigma": sigma, **_kept_fields(old)}
     return job.done({"map": document, "client_ref": asked.client_ref}, changes=len(changes))
 
 

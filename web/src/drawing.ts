@@ -53,6 +53,7 @@ function draw(): void {
   drawHeat(context, colours);
   drawGrid(context, colours.grid);
   drawWalls(context, colours.wall, redraw);
+  drawPoints();
   for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.added, 3);
   for (const k of state.off) line(state.walls[k], colours.off, 4, [3, 5]);
   drawChanges(context, colours, line);
@@ -63,6 +64,15 @@ function draw(): void {
   if (scan && !state.virtual && !state.log.length) drawScan(scan, state.robot, "robot", 0.35);
   if (answer && sent) drawAnswer(sent.scan);
   if ((scan && !state.log.length) || state.virtual) drawRobot(state.robot, "robot", true);
+}
+
+function drawPoints(): void {
+  const half = Math.max(0.75, (state.map?.points_sigma ?? 0.05) * view.scale); // px
+  context.fillStyle = colours.wall;
+  for (const [x, y] of state.map?.points ?? []) {
+    const [px, py] = toPixels(x, y);
+    context.fillRect(px - half, py - half, 2 * half, 2 * half);
+  }
 }
 
 function line([x1, y1, x2, y2]: Segment, colour: string, width: number, dashes: number[] = []): void {

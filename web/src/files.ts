@@ -97,10 +97,11 @@ function take(name: string, text: string): [string, Proposal][] {
     takeMap(map);
     takeScan(scan);
   } else if ("ranges" in fields) takeScan({ laser: fields } as unknown as Scan);
-  else if ("laser" in fields || "points" in fields) takeScan(fields as Scan);
+  else if ("laser" in fields || ("points" in fields && !("segments" in fields))) takeScan(fields as Scan);
   else if ("segments" in fields) {
-    // Both are lists of segments. A scan is recognized by its name, or by fields that only scans have.
-    if (/scan/i.test(name) || "viewpoint" in fields || "stamp" in fields || "points" in fields) takeScan(fields as Scan);
+    // Both are lists of segments; a map may have points, too. A scan is recognized by its name, or by its own fields.
+    const scan = /scan/i.test(name) || "viewpoint" in fields || "stamp" in fields;
+    if (scan && !("points" in fields)) takeScan(fields as Scan);
     else takeMap(fields as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);
   return [];
@@ -110,6 +111,8 @@ function takeMap(map: MapDocument): void {
   if (!Array.isArray(map.segments) || !map.segments.length) throw new Error("The map has no segments. Expected at least one.");
   if (!map.segments.every((s) => Array.isArray(s) && s.length === 4 && s.every(Number.isFinite)))
     throw new Error("A segment of the map is not valid. Expected four numbers, x1, y1, x2, y2.");
+  if (!(map.points ?? []).every((p) => Array.isArray(p) && p.length === 2 && p.every(Number.isFinite)))
+    throw new Error("A point of the map is not valid. Expected two numbers, x, y.");
   setMap(map); // a scan stays: it may be waiting for this map
   showAll("A map from a file.");
 }

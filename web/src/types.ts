@@ -13,6 +13,8 @@ export interface MapDocument {
   sigma?: number | null;
   oriented?: boolean | null;
   frame_id?: string;
+  points?: [number, number][]; // too small for a wall; metres
+  points_sigma?: number | null;
   meta?: unknown;
 }
 

@@ -6,7 +6,6 @@ from compiled import kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
-from ...layout import Integers
 from ...tables import Place, Rays, Workspace
 from ..tuning import (
     BEAM_GATES,
@@ -26,14 +25,17 @@ from .sight import first_hit
 
 
 @kernel
-def across_wall(
-    ray: Record, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
-) -> tuple[float, int]:
-    """Return how much farther than the map shows a beam reads, metres across the wall, and the wall; -1 for none.
+def across_wall(ray: Record, distance: float, place: Place, obstacles: Place) -> tuple[float, int]:
+    """Return how much farther than the map shows a beam reads, metres across the obstacle, and that; -1 for none.
 
-    At a grazing angle the pose decides the range, so that it counts across the wall.
+    At a grazing angle the pose decides the range, so that it counts across the wall. A beam that passed a point is
+    compared with the walls alone: an error of some centimetres suffices to pass one.
     """
-    expected, w = first_hit(ray, walls, starts, items, shape)
+    walls = obstacles.walls
+    grid = obstacles.grid
+    expected, w = first_hit(ray, walls, grid.starts, grid.items, grid.shape[0])
+    if w >= len(place.walls) and distance - expected > CERTAIN:
+        expected, w = first_hit(ray, place.walls, place.grid.starts, place.grid.items, place.grid.shape[0])
     if w < 0:
         return 0.0, w
     return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx)), w
@@ -56,17 +58,14 @@ def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> Non
 
 
 @kernel
-def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
+def beam_evidence(rays: Rays, pose: Record, place: Place, obstacles: Place, ray: Record, evidence: Record) -> None:
     """Write the fractions of the beams that read the wall they should, and that passed through one, to `evidence`.
 
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
     proves little, black or mirror walls give none.
     """
     beams = rays.beams
-    walls = place.walls
-    starts = place.grid.starts
-    items = place.grid.items
-    shape = place.grid.shape[0]
+    walls = obstacles.walls
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     read = 0.0
@@ -76,7 +75,7 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
             continue
         put_beam(ray, beams[i], c, s, pose)
         ray.limit = min(rays.reach, beams[i].range + BEHIND)
-        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
+        across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
             continue
         here, through = evidence_of_beam(across, walls[w])
@@ -88,16 +87,12 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
 
 
 @kernel
-def beam_fractions(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
+def beam_fractions(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace) -> tuple[float, float]:
     """Return the fractions of the beams that read farther, and nearer, than the map shows from the first pose.
 
     Beams without a return, and beams for which the map shows nothing, are not compared. `poses` (1,).
     """
     beams = rays.beams
-    walls = place.walls
-    starts = place.grid.starts
-    items = place.grid.items
-    shape = place.grid.shape[0]
     pose = poses[0]
     ray = work.scratch[0].ray
     c = math.cos(pose.theta)
@@ -109,10 +104,10 @@ def beam_fractions(rays: Rays, poses: Records, place: Place, work: Workspace) ->
             continue
         put_beam(ray, beams[i], c, s, pose)
         ray.limit = min(rays.reach, beams[i].range + WALL_BEHIND)
-        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
+        across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
             continue
-        if across > FARTHER_BY:
+        if across > FARTHER_BY and w < len(place.walls):
             farther += 1
         elif across < -NEAR:
             nearer += 1
@@ -172,7 +167,9 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
 
 
 @kernel
-def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
+def weigh_beams(
+    rays: Rays, poses: Records, place: Place, obstacles: Place, refined: int, work: Workspace, out: Records
+) -> None:
     """Write the evidence of the beams at each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.
@@ -180,14 +177,14 @@ def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Wo
     moved = work.scratch[0].estimate
     evidence = work.scratch[0].evidence
     for k in range(len(poses)):
-        beam_evidence(rays, poses[k], place, work.scratch[0].ray, out[k])
+        beam_evidence(rays, poses[k], place, obstacles, work.scratch[0].ray, out[k])
         if k < refined:
             moved.theta = poses[k].theta
             moved.x = poses[k].x
             moved.y = poses[k].y
             for gate in BEAM_GATES:
                 refine_by_beams(rays, moved, place, gate, work)
-            beam_evidence(rays, moved, place, work.scratch[0].ray, evidence)
+            beam_evidence(rays, moved, place, obstacles, work.scratch[0].ray, evidence)
             if evidence.read > out[k].read and evidence.passed <= out[k].passed + PASSED_SLACK:
                 out[k].read = evidence.read
                 out[k].passed = evidence.passed

@@ -14,13 +14,13 @@ from ..tuning import LEAST_OF_BEAM
 
 
 @kernel
-def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readings: Floats) -> None:
+def read_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace, readings: Floats) -> None:
     """Write for each beam its part of the score at the first of the poses, nats, and where the map stops it, metres.
 
     `readings` (n, 2). The second is the range of the beam where it does not pass through a wall.
     """
     beams = rays.beams
-    walls = place.walls
+    walls = obstacles.walls
     pose = poses[0]
     ray = work.scratch[0].ray
     c = math.cos(pose.theta)
@@ -32,7 +32,7 @@ def read_beams(rays: Rays, poses: Records, place: Place, work: Workspace, readin
             continue
         put_beam(ray, beams[i], c, s, pose)
         ray.limit = min(rays.reach, beams[i].range + BEHIND)
-        across, w = across_wall(ray, beams[i].range, walls, place.grid.starts, place.grid.items, place.grid.shape[0])
+        across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
             continue
         read, passed = evidence_of_beam(across, walls[w])

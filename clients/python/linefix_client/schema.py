@@ -128,6 +128,8 @@ class ImportedMapAnswer(TypedDict):
     sigma: float | None
     oriented: bool
     frame_id: str
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: Any
 
 
@@ -176,6 +178,8 @@ class MapDocument(TypedDict):
     sigma: NotRequired[float | None]
     oriented: NotRequired[bool | None]
     frame_id: NotRequired[str]
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: NotRequired[Any]
 
 
@@ -210,6 +214,8 @@ class NewMapAnswer(TypedDict):
     sigma: float | None
     oriented: bool | None
     frame_id: str
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: Any
 
 
@@ -520,6 +526,8 @@ class InlineMap(TypedDict):
     sigma: NotRequired[float | None]
     oriented: NotRequired[bool | None]
     frame_id: NotRequired[str]
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: NotRequired[Any]
 
 
@@ -532,6 +540,8 @@ class KnownMap(TypedDict):
     sigma: NotRequired[float | None]
     oriented: NotRequired[bool | None]
     frame_id: NotRequired[str]
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: NotRequired[Any]
 
 
@@ -581,6 +591,8 @@ class NamedMap(TypedDict):
     sigma: NotRequired[float | None]
     oriented: NotRequired[bool | None]
     frame_id: NotRequired[str]
+    points: NotRequired[list[list[float]]]
+    points_sigma: NotRequired[float | None]
     meta: NotRequired[Any]
     map_id: str
 

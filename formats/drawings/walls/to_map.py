@@ -70,7 +70,10 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
         )
     drawing.notes.add_read("segments", "faces of walls" if oriented else "lines", len(endpoints))
     meta = drawing.meta if drawing.format == "json" and drawing.meta else {"source": drawing.name} | drawing.meta
-    return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta)
+    points, sigma = drawing.points * metres, drawing.points_sigma
+    if len(points):
+        drawing.notes.add_read("points", "points", len(points))
+    return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta, points, sigma)
 
 
 def _means_directions(drawing: Drawing, options: ImportOptions) -> bool:

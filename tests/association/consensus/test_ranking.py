@@ -30,7 +30,7 @@ from association.context import SearchContext
 from association.layout import ESTIMATE, FOUND, record
 from association.rank_and_estimate import search_and_rank
 from association.search.candidates import find_candidates
-from association.tables import Place, Rays
+from association.tables import Rays
 from association.tuning import FEW_KEPT
 from registration import RigidTransform
 from registration.layout import Floats, Records
@@ -185,7 +185,7 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
     step = math.ceil(known.sum() / MOST_BEAMS)
     rays = rays_of(beams.angles[known][::step], beams.ranges[known][::step])
     place, here = index.tables.place, local(index, INSIDE)
-    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, here, place)
+    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, here, place, place)
     ((_, _, scored, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
     expected = scored["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
     assert (found.read, found.passed) == pytest.approx((reading, passed), abs=1e-4)
@@ -332,9 +332,9 @@ def test_the_clock_is_looked_at_between_the_beams_of_some_poses(monkeypatch: pyt
     whole = beam_evidence_at(context, poses.copy(), 60, 2)
     calls: list[int] = []
 
-    def counted(rays: Rays, some: Records, place: Place, refined: int, *rest: Any) -> None:
+    def counted(rays: Rays, some: Records, *rest: Any) -> None:
         calls.append(len(some))
-        weigh_beams(rays, some, place, refined, *rest)
+        weigh_beams(rays, some, *rest)
 
     monkeypatch.setattr(single_beams, "weigh_beams", counted)
     monkeypatch.setattr(single_beams, "MOST_LOOKED_AT", 1.5 * context.looks)

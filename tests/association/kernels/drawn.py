@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import strategies as st
 
-from association import AssociationOptions, HardPrior, MapIndex, Prior, SoftPrior
+from association import AssociationOptions, HardPrior, MapIndex, MapPoints, Prior, SoftPrior
 from association.layout import Indices
 from association.scan.scan_lines import gates
 from association.tables import Workspace
@@ -24,6 +24,8 @@ MAZE = maze(1)
 INDEX = index_of(MAZE)
 TABLES = INDEX.tables
 PLACE = TABLES.place
+POINTS = MapPoints(np.random.default_rng(2).uniform(0.0, 30.0, (300, 2)), 0.06)  # as the maze is wide
+OBSTACLES = MapIndex.build(INDEX.segments, points=POINTS).obstacles
 GATES = gates(AssociationOptions())
 ASKED = context_of(INDEX, scan_of([[0.0, 0.0, 1.0, 0.0]])).question_of_a_pose  # under the usual options
 MODEL = ASKED.terms["model"]

@@ -41,33 +41,41 @@ def begins(rays: Rays) -> Floats:
     return np.stack([rays.beams["x"], rays.beams["y"]], axis=1)
 
 
-def offsets(rays: Rays, pose: RigidTransform, place: Place, behind: float) -> Iterator[tuple[float, np.void]]:
-    """Yield how much farther each beam reads than the first wall on its way, metres across that, and the wall."""
+def offsets(
+    rays: Rays, pose: RigidTransform, place: Place, obstacles: Place, behind: float
+) -> Iterator[tuple[float, int, np.void]]:
+    """Yield how much farther each beam reads than the first obstacle on its way, metres across that, and the obstacle.
+
+    Those behind the walls are points: a beam that has passed one is compared with the walls alone.
+    """
     for angle, distance, begin in zip(angles_of(rays) + pose.theta, rays.beams["range"], begins(rays), strict=True):
         if distance == math.inf:
             continue
         limit = min(rays.reach, distance + behind)
-        expected, w = first_hit(pose.apply(begin), angle, limit, place.walls)
+        expected, w = first_hit(pose.apply(begin), angle, limit, obstacles.walls)
+        if w >= len(place.walls) and distance - expected > CERTAIN:
+            expected, w = first_hit(pose.apply(begin), angle, limit, place.walls)
         if w >= 0:
-            wall = place.walls[w]
+            wall = obstacles.walls[w]
             sine = abs(normal(wall) @ [math.cos(angle), math.sin(angle)])
-            yield (distance - expected) * max(LEAST_INCIDENCE, sine), wall
+            yield (distance - expected) * max(LEAST_INCIDENCE, sine), w, wall
 
 
-def beam_evidence(rays: Rays, pose: RigidTransform, place: Place) -> Evidence:
+def beam_evidence(rays: Rays, pose: RigidTransform, place: Place, obstacles: Place) -> Evidence:
     """Compare every beam with the first wall on its way."""
     read = passed = 0.0
-    for across, wall in offsets(rays, pose, place, BEHIND):
+    for across, _, wall in offsets(rays, pose, place, obstacles, BEHIND):
         read += math.exp(-0.5 * (across / NEAR) ** 2)
         passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
     return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams))
 
 
-def beam_fractions(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
-    """Count the beams that read farther than the map shows, and nearer."""
-    across = np.array([offset for offset, _ in offsets(rays, pose, place, WALL_BEHIND)])
+def beam_fractions(rays: Rays, pose: RigidTransform, place: Place, obstacles: Place) -> tuple[float, float]:
+    """Count the beams that read farther than the walls of the map, and nearer than it shows."""
+    found = list(offsets(rays, pose, place, obstacles, WALL_BEHIND))
     n = max(1, len(rays.beams))
-    return float((across > FARTHER_BY).sum()) / n, float((across < -NEAR).sum()) / n
+    farther = sum(across > FARTHER_BY and w < len(place.walls) for across, w, _ in found)
+    return farther / n, sum(across < -NEAR for across, _, _ in found) / n
 
 
 def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
@@ -94,12 +102,14 @@ def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float)
     return solve(Pairs(seen, place.walls[lines], np.eye(2 * len(lines))), pose).pose
 
 
-def weigh_beams(rays: Rays, pose: RigidTransform, place: Place) -> tuple[RigidTransform, Evidence, Evidence]:
+def weigh_beams(
+    rays: Rays, pose: RigidTransform, place: Place, obstacles: Place
+) -> tuple[RigidTransform, Evidence, Evidence]:
     """Return where a pose is moved to, and what the beams say there and where it was."""
     moved = pose
     for gate in BEAM_GATES:
         moved = refine_by_beams(rays, moved, place, gate)
-    before, after = (beam_evidence(rays, at, place) for at in (pose, moved))
+    before, after = (beam_evidence(rays, at, place, obstacles) for at in (pose, moved))
     if after[0] > before[0] and after[1] <= before[1] + PASSED_SLACK:
         return moved, after, before
     return pose, before, before

@@ -14,7 +14,7 @@ from association.layout import BEAM_EVIDENCE, RAY
 from association.tables import Rays
 from registration import RigidTransform
 
-from ...kernels.drawn import INDEX, PLACE, SEEDS
+from ...kernels.drawn import INDEX, OBSTACLES, PLACE, SEEDS
 from ...records import estimate_of, pose_of, rays_of, work_of
 from ...reference import beams as twin
 from ...reference.geometry import moved
@@ -40,7 +40,7 @@ def drawn_rays(rng: np.random.Generator, count: int) -> tuple[Rays, RigidTransfo
 def evidence_of(ranges: np.ndarray) -> tuple[float, float]:
     out, rays = np.zeros(1, BEAM_EVIDENCE), rays_of(ANGLES, ranges)
     place = ROOM_INDEX.tables.place
-    beams.beam_evidence(rays, estimate_of(HERE)[0], place, np.zeros(1, RAY)[0], out[0])
+    beams.beam_evidence(rays, estimate_of(HERE)[0], place, place, np.zeros(1, RAY)[0], out[0])
     read, passed = out[0].item()
     return read, passed
 
@@ -61,14 +61,15 @@ def test_beam_evidence(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 120)
     for at in (truth, moved(truth, rng.normal(size=3) * [0.1, 0.3, 0.3])):
-        out = np.zeros(1, BEAM_EVIDENCE)
-        beams.beam_evidence(rays, estimate_of(at)[0], PLACE, np.zeros(1, RAY)[0], out[0])
-        assert out[0].item() == pytest.approx(twin.beam_evidence(rays, at, PLACE))
+        for obstacles in (PLACE, OBSTACLES):
+            out = np.zeros(1, BEAM_EVIDENCE)
+            beams.beam_evidence(rays, estimate_of(at)[0], PLACE, obstacles, np.zeros(1, RAY)[0], out[0])
+            assert out[0].item() == pytest.approx(twin.beam_evidence(rays, at, PLACE, obstacles))
 
 
 def shares_of(ranges: np.ndarray) -> tuple[float, float]:
     rays, place = rays_of(ANGLES, ranges), ROOM_INDEX.tables.place
-    return beams.beam_fractions(rays, estimate_of(HERE), place, work_of(1, 1))
+    return beams.beam_fractions(rays, estimate_of(HERE), place, place, work_of(1, 1))
 
 
 def test_beams_that_read_farther_and_nearer_than_the_map_shows() -> None:
@@ -90,8 +91,9 @@ def test_beam_shares(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 120)
     for at in (truth, moved(truth, rng.normal(size=3) * [0.1, 0.3, 0.3])):
-        found = beams.beam_fractions(rays, estimate_of(at), PLACE, work_of(1, 1))
-        assert found == pytest.approx(twin.beam_fractions(rays, at, PLACE))
+        for obstacles in (PLACE, OBSTACLES):
+            found = beams.beam_fractions(rays, estimate_of(at), PLACE, obstacles, work_of(1, 1))
+            assert found == pytest.approx(twin.beam_fractions(rays, at, PLACE, obstacles))
 
 
 @given(SEEDS)
@@ -119,9 +121,9 @@ def test_weigh_beams(seed: int) -> None:
     rays, truth = drawn_rays(rng, 40)
     starts = [moved(truth, rng.normal(size=3) * scale) for scale in (0.0, [0.02, 0.1, 0.1], [0.1, 1.0, 1.0], 0.05)]
     poses, out = np.concatenate([estimate_of(at) for at in starts]), np.zeros(4, BEAM_EVIDENCE)
-    beams.weigh_beams(rays, poses, PLACE, 3, work_of(1, 1), out)
+    beams.weigh_beams(rays, poses, PLACE, OBSTACLES, 3, work_of(1, 1), out)
     for k, start in enumerate(starts):
-        at, there, here = twin.weigh_beams(rays, start, PLACE)
+        at, there, here = twin.weigh_beams(rays, start, PLACE, OBSTACLES)
         if k == 3:
             at, there = start, here
         assert same_pose(pose_of(poses[k]), at, 1e-5, 1e-6)
@@ -131,7 +133,8 @@ def test_weigh_beams(seed: int) -> None:
 def test_beams_move_a_pose_to_where_they_fit() -> None:
     poses, out = estimate_of(moved(HERE, [0.02, 0.1, -0.08])), np.zeros(1, BEAM_EVIDENCE)
     rays = rays_of(ANGLES, read(ROOM_INDEX, INSIDE))
-    beams.weigh_beams(rays, poses, ROOM_INDEX.tables.place, 1, work_of(1, 1), out)
+    place = ROOM_INDEX.tables.place
+    beams.weigh_beams(rays, poses, place, place, 1, work_of(1, 1), out)
     assert same_pose(pose_of(poses[0]), HERE, 1e-3, 1e-3)
     assert out[0]["read"] > 0.99
 

@@ -1,0 +1,112 @@
+"""Points of a map: things that are too small for a wall, such as legs, posts and clutter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from registration.layout import Floats
+from registration.values import value
+
+from ..errors import InvalidMapError
+from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MAX_POINTS, POINT_SIGMA
+
+
+@value(frozen=True, slots=True)
+class MapPoints:
+    """What a map shows as points: evidence for single beams, and never part of a hypothesis.
+
+    A beam that ends at a point reads it, as it would read a wall. A beam that passes a point is no evidence, because an
+    error of some centimetres suffices.
+
+    Attributes
+    ----------
+    positions : (n, 2)
+        Metres in the map frame.
+    sigma : float
+        Standard deviation of a position, metres; also half the width that stops a beam.
+    """
+
+    positions: Floats
+    sigma: float = POINT_SIGMA
+
+    @classmethod
+    def of(cls, positions: ArrayLike, sigma: float | None = None, *, path: str = "map.") -> MapPoints:
+        """Check the points of a map document.
+
+        Parameters
+        ----------
+        positions : array-like of shape (n, 2)
+            Metres in the map frame.
+        sigma : float or None
+            Metres, above 0; None: 0.05.
+        path : str
+            Names of arguments in errors begin with it.
+
+        Raises
+        ------
+        InvalidMapError
+            When they are no such array, not finite, too many or too far apart, or sigma is out of range.
+        """
+        argument = f"{path}points"
+        try:
+            rows = np.array(positions, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InvalidMapError("expected rows [x, y] of numbers", argument=argument) from None
+        rows = rows.reshape(0, 2) if rows.size == 0 else rows
+        if rows.ndim != 2 or rows.shape[1] != 2:
+            raise InvalidMapError(f"expected rows [x, y], found an array of shape {rows.shape}", argument=argument)
+        if len(rows) > MAX_POINTS:
+            raise InvalidMapError(f"expected at most {MAX_POINTS} points, found {len(rows)}", argument=argument)
+        if not np.isfinite(rows).all():
+            k = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
+            raise InvalidMapError("expected finite numbers", argument=f"{argument}.{k}")
+        deviation = POINT_SIGMA if sigma is None else float(sigma)
+        if not 0.0 < deviation <= MAX_MAP_SIGMA or not math.isfinite(deviation):
+            raise InvalidMapError(
+                f"expected a number above 0 and up to {MAX_MAP_SIGMA:g} m, found {deviation:g}",
+                argument=f"{path}points_sigma",
+            )
+        return cls(rows, deviation)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def require_near(self, low: Floats, high: Floats, path: str) -> None:
+        """Require that the points and the corners of the walls, (2,) metres, are within one extent.
+
+        Raises
+        ------
+        InvalidMapError
+            When they are not.
+        """
+        if not len(self):
+            return
+        reach = np.maximum(high, self.positions.max(axis=0)) - np.minimum(low, self.positions.min(axis=0))
+        if float(reach.max()) > MAX_EXTENT:
+            raise InvalidMapError(
+                f"expected an extent of at most {MAX_EXTENT:g} m with the points, found {float(reach.max()):.4g} m; "
+                "check the unit",
+                argument=f"{path}points",
+            )
+
+    def shifted(self, offset: Floats) -> MapPoints:
+        """Return the points moved by an offset, (2,) metres."""
+        return MapPoints(self.positions + offset, self.sigma)
+
+    def scaled(self, factor: float) -> MapPoints:
+        """Return the points of the map with all lengths times a factor."""
+        return MapPoints(self.positions * factor, self.sigma)
+
+    def arms(self) -> Floats:
+        """Return a cross for each point, (2 n, 4) endpoints, metres: from each side it stops beams that come near."""
+        x, y = self.positions.T
+        half = self.sigma
+        return np.concatenate(
+            [np.column_stack([x - half, y, x + half, y]), np.column_stack([x, y - half, x, y + half])]
+        )
+
+
+NO_POINTS = MapPoints(np.zeros((0, 2)))
