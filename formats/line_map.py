@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,19 @@ class LineMap:
     meta: dict[str, str] = field(default_factory=dict)
     points: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     points_sigma: float | None = None
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The fields of a map document, segments and points as arrays; one without points does not mention them."""
+        points = {"points": self.points, "points_sigma": self.points_sigma}
+        return {
+            "segments": self.segments.endpoints,
+            "sigma": self.sigma,
+            "oriented": self.oriented,
+            "frame_id": self.frame_id,
+            **(points if len(self.points) else {}),
+            "meta": self.meta,
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,16 +50,7 @@ def write_map(map: LineMap, path: str | os.PathLike[str]) -> None:
 
 
 def _json(map: LineMap) -> bytes:
-    fields = {
-        "segments": map.segments.endpoints,
-        "sigma": map.sigma,
-        "oriented": map.oriented,
-        "frame_id": map.frame_id,
-        "meta": map.meta,
-    }
-    if len(map.points):
-        fields |= {"points": map.points, "points_sigma": map.points_sigma}
-    return orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(map.document, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _geojson(map: LineMap) -> bytes:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from association import Status
 from map_quality import Analysis, Change, Finding, MapCheck, MapUpdate, PlaceVerdict, Sample
 
@@ -21,15 +23,8 @@ MOST_INDICES = 1000  # of one finding
 
 def map_json(line_map: LineMap) -> Json:
     """Return a map as a map document; one without points does not mention them."""
-    points = {"points": line_map.points.tolist(), "points_sigma": line_map.points_sigma}
-    return {
-        "segments": line_map.segments.endpoints.tolist(),
-        "sigma": line_map.sigma,
-        "oriented": line_map.oriented,
-        "frame_id": line_map.frame_id,
-        **(points if len(line_map.points) else {}),
-        "meta": line_map.meta,
-    }
+    document = line_map.document
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in document.items()}
 
 
 def import_json(imported: ImportedMap, found: MapCheck) -> Json:

@@ -49,7 +49,7 @@ class Bounds:
     file_bytes : int
         Of one file.
     segments : int
-        Of the map.
+        Of the map; as many points.
     cpu_seconds : int
         Of a processor.
     """
@@ -130,10 +130,9 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
 
     def read(files: OwnFiles) -> Lines:
         imported = read_map(files.map, options, files.paths)
-        found = len(imported.map.segments)
-        if found > bounds.segments:
-            told = f"expected at most {bounds.segments} segments, found {found}; simplify the file"
-            return [{"too_large": told}]
+        for name, found in (("segments", len(imported.map.segments)), ("points", len(imported.map.points))):
+            if found > bounds.segments:
+                return [{"too_large": f"expected at most {bounds.segments} {name}, found {found}; simplify the file"}]
         return _answer(imported, files)
 
     return read_own(form, folder, read, MAP_SUFFIXES, "map", "one map and the files that it names, such as a picture")
@@ -141,13 +140,7 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
 
 def _answer(imported: ImportedMap, files: OwnFiles) -> Lines:
     line_map, report = imported.map, asdict(imported.report)
-    document = {
-        "segments": line_map.segments.endpoints,
-        "sigma": line_map.sigma,
-        "oriented": line_map.oriented,
-        "frame_id": line_map.frame_id,
-        "meta": {key: files.as_sent(value) for key, value in line_map.meta.items()},
-    }
+    document = {**line_map.document, "meta": {key: files.as_sent(value) for key, value in line_map.meta.items()}}
     report["files"] = tuple(map(files.as_sent, report["files"]))
     return [
         {"report": report, "picture": None if imported.picture is None else picture_json(imported.picture)},

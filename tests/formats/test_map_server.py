@@ -190,3 +190,33 @@ def test_pictures_too_large_or_cut_off_are_refused(tmp_path: Path) -> None:
 def test_a_picture_without_walls_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MalformedFileError, match="no wall found"):
         read_map(write(tmp_path, np.full((50, 50), FREE, dtype=np.uint8)))
+
+
+def with_posts(up: Pixels) -> Pixels:
+    """Stand a table of four legs, of one cell each, and a box of two by two cells in the room; one speck outside."""
+    for row, column in ((20, 20), (20, 30), (26, 20), (26, 30)):
+        up[row, column] = WALL
+    up[55:57, 20:22] = WALL
+    up[75, 95] = WALL
+    return up
+
+
+def test_cells_that_are_too_few_for_a_wall_are_points(tmp_path: Path) -> None:
+    imported = read_map(write(tmp_path, with_posts(l_room()), origin="1.0, -2.0, 0"))
+    line_map, expected = imported.map, {(20, 20), (20, 30), (26, 20), (26, 30), (55, 20), (55, 21), (56, 20), (56, 21)}
+    assert walls(read_map(write(tmp_path, with_posts(l_room())))) == L_ROOM
+    middles = {(round((y + 2.0) / 0.05 - 0.5), round((x - 1.0) / 0.05 - 0.5)) for x, y in line_map.points.tolist()}
+    assert middles == expected
+    assert line_map.points_sigma == line_map.sigma == 0.025
+    assert {note.code: note.count for note in imported.report.read}["points"] == 8
+
+
+def test_walls_leave_no_points(tmp_path: Path) -> None:
+    """Also those that are not along the grid, and thick ones."""
+    assert len(read_map(write(tmp_path, l_room())).map.points) == 0
+    y, x = np.mgrid[0:200, 0:200] - 100.0
+    turned = np.abs(np.stack([0.9 * x + 0.436 * y, -0.436 * x + 0.9 * y])).max(axis=0)
+    grid = np.full((200, 200), UNKNOWN, dtype=np.uint8)
+    grid[turned < 83] = WALL
+    grid[turned < 80] = FREE
+    assert len(read_map(write(tmp_path, grid)).map.points) <= 8, "at the corners"
