@@ -29,7 +29,7 @@ class LineMap:
     meta : dict
         The origin of the map, for people.
     points : (n, 2) float64
-        What is too small for a wall, metres in the map frame: evidence for the beams of a scan.
+        Objects too small for a wall, metres in the map frame: evidence for the beams of a scan.
     points_sigma : float or None
         Standard deviation of a point, metres; None: 0.05.
     """

@@ -140,7 +140,7 @@ class Settings(BaseSettings):
         le=100_000,
         description="maximum number of open connections; fewer if the system has fewer descriptors",
     )
-    max_map_segments: int = Field(200_000, ge=1, description="maximum number of segments of a map")
+    max_map_segments: int = Field(200_000, ge=1, description="maximum number of segments of a map, and of its points")
     max_scan_segments: int = Field(2_000, ge=1, description="maximum number of segments of a scan")
     max_beams: int = Field(20_000, ge=1, description="maximum number of ranges or points of a scan")
     max_correspondences: int = Field(200_000, ge=1, description="maximum number of correspondences of a registration")

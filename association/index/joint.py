@@ -49,7 +49,7 @@ class MapPart:
     oriented : bool
         True if free space lies on the left of its segments.
     points : MapPoints
-        What is too small for a wall.
+        Objects too small for a wall.
     """
 
     segments: Segments

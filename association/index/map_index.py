@@ -52,7 +52,7 @@ class MapIndex:
     directed : int
         Number of segments as sent; piece i stands for segment ``i % directed``.
     points : MapPoints
-        What is too small for a wall, in the map frame: evidence for beams.
+        Objects too small for a wall, in the map frame: evidence for beams.
     wall_of_piece : (n,) the wall that each segment is part of
     pieces : Pieces
         Which segments each wall consists of.
@@ -108,7 +108,7 @@ class MapIndex:
         oriented : bool
             False lists every segment in both directions, for scans whose directions mean nothing.
         points : MapPoints, optional
-            What is too small for a wall, in the map frame: evidence for the beams of a scan.
+            Objects too small for a wall, in the map frame: evidence for the beams of a scan.
         deadline : Deadline, optional
             Looked at every few tenths of a second.
 
@@ -202,7 +202,7 @@ class MapIndex:
 
     @cached_property
     def obstacles(self) -> Place:
-        """What stops beams: the walls, and behind them two short ones for each point."""
+        """The obstacles of beams: the walls, and behind them two short ones for each point."""
         place = self.tables.place
         return stopping_beams(place, self.points.shifted(-self.origin)) if len(self.points) else place
 

@@ -16,7 +16,7 @@ from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MAX_POINTS, POINT_SIGMA
 
 @value(frozen=True, slots=True)
 class MapPoints:
-    """What a map shows as points: evidence for single beams, and never part of a hypothesis.
+    """Objects that a map shows as points: evidence for single beams, never part of a hypothesis.
 
     A beam that ends at a point reads it, as it would read a wall. A beam that passes a point is no evidence, because an
     error of some centimetres suffices.

@@ -34,7 +34,7 @@ class Drawing:
     sigma, frame_id, meta
         As in `LineMap`, where the file says.
     points : (n, 2)
-        What is too small for a wall, units of the drawing.
+        Objects too small for a wall, units of the drawing.
     points_sigma : float or None
         As in `LineMap`.
     segments : list of (k, 4)

@@ -38,7 +38,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Faces:
-    """What a grid shows.
+    """The walls and small objects of a grid.
 
     Attributes
     ----------

@@ -52,7 +52,7 @@ class MapDocument(Strict):
     frame_id: FrameId = Field("map", description="frame of the map, as `frame_id` of the answer")
     points: MapPointRows = Field(
         default_factory=lambda: np.zeros((0, 2)),
-        description="`[x, y]` each, metres: what is too small for a wall, such as legs and posts; evidence for the "
+        description="`[x, y]` each, metres: objects too small for a wall, such as legs and posts; evidence for the "
         "beams of a scan only; at most as many as `max_map_segments` of /v1/limits",
         json_schema_extra={"default": []},
     )
