@@ -33,7 +33,6 @@ from .tuning import (
     MOST_CROSSINGS,
     MOST_FIELD_CELLS,
     NEIGHBOURHOOD,
-    OBSTACLE_CELL,
     RASTER_CELL,
     SWEEP_CELL,
     SWEEP_REACH,
@@ -60,7 +59,7 @@ def stopping_beams(place: Place, points: MapPoints) -> Place:
     rows["angle"][along] = 0.5 * math.pi
     rows["before"] = rows["after"] = -1
     walls = np.concatenate([place.walls, rows])
-    grid = _grid(ends_of_rows(walls), OBSTACLE_CELL, SWEEP_REACH, MAX_CELLS)
+    grid = _grid(ends_of_rows(walls), RASTER_CELL, SWEEP_REACH, MAX_CELLS)
     return Place(walls, place.bin_starts, grid, np.append(place.ties, np.full(len(rows), -1.0)))
 
 

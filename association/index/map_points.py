@@ -11,7 +11,10 @@ from registration.layout import Floats
 from registration.values import value
 
 from ..errors import InvalidMapError
-from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MAX_POINTS, POINT_SIGMA
+from .tuning import MAX_EXTENT, MAX_MAP_SIGMA
+
+MAX_POINTS = 200_000  # of a map; the contract
+POINT_SIGMA = 0.05  # m, if a map does not state it; the contract
 
 
 @value(frozen=True, slots=True)

@@ -10,8 +10,6 @@ import math
 
 MAX_EXTENT = 1e5  # m; the contract
 MAX_MAP_SIGMA = 10.0  # m; the contract
-MAX_POINTS = 200_000  # the contract; of a map, too small for walls
-POINT_SIGMA = 0.05  # m; the contract
 # Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
 ONE_LINE = 1e-4  # m, rounding
 LEAST_DIFFERENCE = 1e-6  # m, rounding; walls whose offsets or lengths differ by less are equal in them
@@ -44,8 +42,7 @@ PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadlin
 CELL = 1.0  # m, tables
 SWEEP_CELL = 2.0  # m, tables; of the sweep's grid, and of the cells of crossings about a base
 SWEEP_REACH = 0.02  # m, rounding
-RASTER_CELL = 0.5  # m, tables
-OBSTACLE_CELL = 0.5  # m, measured; of the grid of walls and points, in which beams are followed
+RASTER_CELL = 0.5  # m, tables; also of the grid of walls and points
 NEIGHBOURHOOD = 64.0  # m, squares of which the chains are numbered together; measured: 8 to 128 are as good
 MAX_CELLS = 4_000_000  # memory: some 50 MB
 MAX_SWEEP_CELLS = 1_000_000  # memory
