@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from playwright.sync_api import Page, Route, expect
 
 from examples.sample import OfficePlan, offices, way_through, with_furniture, write_drive, write_grid
 from tests.running import RunningService, running
+from tests.service.http.test_map_points import MAP, SCAN
 from tests.service.importing.forms import SQUARE
 
 from .plan import shown, verdict
@@ -129,3 +131,17 @@ def test_a_broken_bag_is_named(page: Page, tmp_path: Path) -> None:
     page.set_input_files("#files", [tmp_path / "drive.bag"])
     expect(page.locator("#reading")).to_contain_text(re.compile("^drive.bag: "), timeout=60_000)
     verdict(page, "ambiguous")
+
+
+def test_a_map_with_points_is_opened_as_a_map(page: Page, tmp_path: Path) -> None:
+    """A scan of points has no segments, a map has them; both are searched together."""
+    (tmp_path / "rooms.json").write_text(json.dumps(MAP))
+    (tmp_path / "seen.json").write_text(json.dumps(SCAN))
+    page.goto("/")
+    verdict(page, "ambiguous")
+    page.set_input_files("#files", [tmp_path / "rooms.json"])
+    expect(page.locator("#about")).to_contain_text("A map from a file.")
+    with page.expect_request("**/v1/associate") as asked:
+        page.set_input_files("#files", [tmp_path / "seen.json"])
+    assert asked.value.post_data_json["map"]["points"] == MAP["points"]
+    verdict(page, "usable")
