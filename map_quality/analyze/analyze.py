@@ -21,7 +21,7 @@ from registration import RigidTransform, Segments
 
 from ..views import AnalysisError, Robot, is_elsewhere, is_same, look, similar_pose
 from .drive import STEP, seen_on_the_way, ways_from
-from .standing import Standing, is_free, standing_places
+from .standing import CLEARANCE, Standing, is_free, standing_places
 
 MOST_DRIVE = 30.0  # m
 
@@ -176,7 +176,8 @@ class Analysis:
             When the deadline was cancelled.
         """
         pose = self.standing.pose(number)
-        if not is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented):
+        walls_away = is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented)
+        if not walls_away or self._meets_a_point(pose):
             return None
         seen = self._scan(pose, number)
         found = _verdict(number, pose, self._search(seen, deadline))
@@ -209,6 +210,11 @@ class Analysis:
                 if result.usable and result.pose is not None and is_same(result.pose, there):
                     return STEP * (len(views) - 1)
         return None
+
+    def _meets_a_point(self, pose: RigidTransform) -> bool:
+        """Return whether a point of the map is too near for a robot to stand there."""
+        away = self.index.points.positions - [pose.x, pose.y]
+        return bool((np.hypot(*away.T) < CLEARANCE).any())
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
         """Return the scan that the robot would send from there; the noise of a place is the same on each attempt."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from association import CancelledError, Deadline, MapIndex, Status
+from association import CancelledError, Deadline, MapIndex, MapPoints, Status
 from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.standing import is_free
 from map_quality.views import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
@@ -57,6 +57,21 @@ def test_two_equal_rooms_look_alike() -> None:
         there = one.pose.x + (20.0 if one.pose.x < 10.0 else -20.0)
         assert one.similar_pose.x == pytest.approx(there, abs=0.1)
         assert (one.similar_pose.y, one.similar_pose.theta) == pytest.approx((one.pose.y, one.pose.theta), abs=0.1)
+
+
+def test_points_separate_equal_rooms_and_stand_in_the_way() -> None:
+    """The posts of the left room: none of its places is within 0.2 m of one, and most are usable."""
+    segments, turn = two_rooms(), np.arange(24) * math.tau / 24
+    ring = 0.3 * np.column_stack([np.cos(turn), np.sin(turn)])
+    posts = np.concatenate([ring + at for at in ((2.0, 4.0), (6.2, 1.3), (3.5, 2.0), (1.2, 1.4), (4.0, 4.7))])
+    robot = Robot(sigma=0.01)
+    index = MapIndex.build(segments, 0.0, points=MapPoints.of(posts, 0.03))
+    found = looks(Analysis(index, segments, robot, standing_places(segments, robot, 1.0)))
+    here = np.array([[one.pose.x, one.pose.y] for one in found])
+    assert np.hypot(*(here[:, None] - posts).T).min() >= 0.2
+    left = [one for one in found if one.pose.x < 10.0]
+    assert sum(one.usable for one in left) > 0.5 * len(left)
+    assert not any(one.usable for one in found if one.pose.x > 10.0)
 
 
 def test_a_rectangle_is_its_own_look_alike() -> None:
