@@ -76,6 +76,14 @@ class Explanations:
         return (one for one in self.ranked if one is not best)
 
 
+def put_first(answer: Answer, explanations: Explanations) -> Explanations:
+    """Return explanations with another answer, before all others; the same ones if theirs is at that place."""
+    if explanations.answer is not None and _same_place(answer.best, explanations.answer.best):
+        return explanations
+    others = (one for one in explanations.ranked if not _same_place(answer.best, one))
+    return replace(explanations, ranked=(answer.best, *others), answer=answer)
+
+
 def add_alternatives(explanations: Explanations, alternatives: Sequence[ConsensusSet]) -> Explanations:
     """Add alternatives that fit at other scales to explanations, none of them above the answer."""
     if explanations.answer is None:

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from registration import RigidTransform
 from registration.layout import Floats, Records
 from registration.values import value
 
@@ -20,8 +21,7 @@ from ..deadline import CancelledError
 from ..index.likelihood_field import LikelihoodField
 from ..index.tuning import CELL_GROWTH
 from ..layout import ESTIMATE, FOUND, Integers
-from ..tuning import COMPARED_BEAMS, DISTINCT_ANGLE, DISTINCT_DISTANCE
-from .candidates import Candidates
+from ..tuning import COMPARED_BEAMS, DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_PLACE
 from .kernels.branch_and_bound import branch_and_bound, greatest_mean
 from .layout import CELL_POSE
 from .tuning import END_SQUARE, FIELD_GAP, FIELD_LEAST, FIELD_POINTS, KEPT, WELL_EXPLAINED
@@ -44,12 +44,55 @@ class _TurnedPoints:
     cells: Integers
 
 
-def add_point_matches(context: SearchContext, candidates: Candidates) -> Candidates:
-    """Add the poses at which more of the beams end on walls than at any candidate.
+@value(frozen=True, slots=True)
+class PointMatches:
+    """The poses at which most of the beams end on walls.
 
-    Returns the candidates as they are if there is none, if most beams end on walls at one of the candidates, without
-    beams, with a hard prior, on a map that is too large for a likelihood field, and after the deadline. If the deadline
-    passes meanwhile, the report is that of an incomplete search.
+    Attributes
+    ----------
+    poses : (k,) of `FOUND`, the best first
+        All poses within `FIELD_GAP` of the best one, if the search is complete.
+    means : (k,) float64
+        Mean likelihood of the ends of beams at each, 0 to 1.
+    complete : bool
+        False if the deadline ended the search.
+    """
+
+    poses: Records
+    means: Floats
+    complete: bool
+
+    @property
+    def decisive(self) -> RigidTransform | None:
+        """The best pose in the index frame, if it explains the scan well and no other place does nearly as well."""
+        if not self.complete or not len(self.poses) or self.means[0] < WELL_EXPLAINED:
+            return None
+        best, others = self.poses[0], self.poses[1:]
+        away = np.hypot(others["x"] - best["x"], others["y"] - best["y"])
+        turned = np.abs((others["theta"] - best["theta"] + math.pi) % math.tau - math.pi)
+        if ((away > SAME_PLACE) | (turned > 2.0 * DISTINCT_ANGLE)).any():
+            return None
+        return RigidTransform(float(best["x"]), float(best["y"]), float(best["theta"]))
+
+    def better_than(self, mean: float) -> Records:
+        """Return the poses with a greater mean."""
+        better: Records = self.poses[self.means > mean]
+        return better
+
+
+def match_points(context: SearchContext, candidates: Records, answer: Records) -> PointMatches | None:
+    """Search for the poses at which most of the beams end on walls.
+
+    Returns None if the answer explains most beams, as well as any candidate; without beams, with a hard prior, on a
+    map that is too large for a likelihood field, and after the deadline.
+
+    Parameters
+    ----------
+    context : SearchContext
+    candidates : (k,) of `FOUND`
+        The poses of bases.
+    answer : (1,) or (0,) of `FOUND`
+        The pose of the answer so far; empty if it has none.
 
     Raises
     ------
@@ -58,28 +101,27 @@ def add_point_matches(context: SearchContext, candidates: Candidates) -> Candida
     """
     points = _points_of(context)
     if len(points) < LEAST_POINTS:
-        return candidates
+        return None
     field = context.index.likelihood_field
     if field is None:
-        return candidates
-    reached = greatest_mean(field.pyramid[0], field.shape, points, candidates.poses)
-    if reached >= WELL_EXPLAINED:
-        return candidates
+        return None
+    reached, own = (greatest_mean(field.pyramid[0], field.shape, points, poses) for poses in (candidates, answer))
+    if own >= max(WELL_EXPLAINED, reached - FIELD_GAP):
+        return None
     cell = float(field.shape["cell"][0])
     turned = _at_all_headings(points, cell)
     found = np.zeros(KEPT, CELL_POSE)
-    least, gap = (round(255.0 * len(points) * mean) for mean in (max(FIELD_LEAST, reached), FIELD_GAP))
+    least, gap = (round(255.0 * len(points) * mean) for mean in (max(FIELD_LEAST, reached - FIELD_GAP), FIELD_GAP))
     apart = math.ceil(DISTINCT_DISTANCE / cell), math.ceil(DISTINCT_ANGLE / math.tau * len(turned.headings))
     with context.deadline.watched() as stop:
         count = branch_and_bound(field.pyramid, turned.cells, least, gap, *apart, found, stop)
         interrupted = bool(stop[0])
     if context.deadline.cancelled:
         raise CancelledError
-    report = candidates.report.cut_short() if interrupted else candidates.report
-    if not count and not interrupted:
-        return candidates
-    poses = _poses_of(context, field, turned, found[:count])
-    return Candidates(np.concatenate([candidates.poses, poses]), report)
+    found = found[:count][np.argsort(-found["value"][:count], kind="stable")]
+    means = found["value"] / (255.0 * len(points))
+    near = means >= means.max(initial=0.0) - FIELD_GAP  # the best was not known when the first were found
+    return PointMatches(_poses_of(context, field, turned, found[near]), means[near], not interrupted)
 
 
 def _points_of(context: SearchContext) -> Floats:

@@ -68,8 +68,8 @@ KEPT_SHARE_FOR_BEAMS = 0.5
 # --- Branch and bound over the ends of beams --------------------------------------------------------------------------
 
 # Fractions of the places where beams end, by the likelihood of the map's field there, 0 to 1.
-WELL_EXPLAINED = 0.6  # tables; with more at one of the poses, no more is searched
+WELL_EXPLAINED = 0.6  # tables; with more at the answer, no more is searched
 FIELD_LEAST = RIVAL_SHARE * WELL_EXPLAINED  # tables; with less, poses in other buildings explain a scan as well
-FIELD_GAP = 0.05  # tables; a pose farther behind the best one is not kept
+FIELD_GAP = 0.1  # tables; a pose farther behind the best one is not kept, and a place nearer to it leaves it in doubt
 FIELD_POINTS = 80  # tables; of a scan
 END_SQUARE = CERTAIN  # m, tables; ends of beams within one such square count as one

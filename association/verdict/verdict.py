@@ -83,7 +83,9 @@ class Verdict:
         return replace(self, usable=False, vetoes=vetoes, reasons=reasons)
 
 
-def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
+def judge(
+    context: SearchContext, explanations: Explanations, *, off_scale: bool = False, on_map: bool = False
+) -> Verdict:
     """Judge the best explanation.
 
     1. Describe it by features, among its alternatives.
@@ -98,6 +100,8 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     explanations : Explanations
     off_scale : bool
         True if scan and map differ by a factor that was not corrected.
+    on_map : bool
+        True if other evidence than the models shows that the scan was taken on this map.
 
     Raises
     ------
@@ -112,7 +116,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     found = work_out_probabilities(context, description, applied(findings))
     pose = choose_along_direction(context, answer)
     vetoes = applied(_all_findings(context, findings, found, pose))
-    status = _status(found, vetoes)
+    status = _status(found, vetoes, on_map=on_map)
     vetoes = counted(vetoes, status)
     usable = status is Status.OK and not vetoes
     margin, runner_up = _margin(context, explanations, answer)
@@ -123,7 +127,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
         pose=pose,
         margin=margin,
         runner_up=runner_up,
-        reasons=() if usable else _reasons(description, found, status, vetoes),
+        reasons=() if usable else _reasons(description, found, status, vetoes, on_map=on_map),
         vetoes=vetoes,
         description=description,
         probabilities=found,
@@ -202,22 +206,22 @@ def _probability(status: Status, right: float, *, contradicted: bool) -> float |
 
 
 def _reasons(
-    description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...]
+    description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...], *, on_map: bool
 ) -> tuple[Reason, ...]:
     """List why an answer is not usable."""
     doubts = Doubts(
         status,
         vetoes,
-        not_on_map=found.explained < ELSEWHERE_PROBABILITY,
+        not_on_map=found.explained < ELSEWHERE_PROBABILITY and not on_map,
         similar_place=found.among_alternatives < USABLE_PROBABILITY,
         alone=not description.others,
     )
     return reasons_of(doubts, found.features, found.model)
 
 
-def _status(found: Probabilities, vetoes: tuple[Veto, ...]) -> Status:
+def _status(found: Probabilities, vetoes: tuple[Veto, ...], *, on_map: bool) -> Status:
     """Decide in order of precedence."""
-    if found.explained < NO_MATCH_PROBABILITY:
+    if found.explained < NO_MATCH_PROBABILITY and not on_map:
         return Status.NO_MATCH
     caps = [veto.caps for veto in vetoes if veto.caps is not None]
     if Status.DEGENERATE in caps:

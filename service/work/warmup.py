@@ -23,9 +23,8 @@ from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.layout import FOUND
-from association.rank_and_estimate import NOT_SEARCHED, estimate_at
-from association.search.branch_and_bound import add_point_matches
-from association.search.candidates import Candidates
+from association.rank_and_estimate import estimate_at
+from association.search.branch_and_bound import match_points
 from association.verdict.chance import symmetry_of
 from association.verdict.inconsistencies import absences
 from association.verdict.verdict import judge
@@ -173,7 +172,7 @@ def warm_up_searching() -> None:
     answer = estimate_at(context, RigidTransform(0, 0, 0)).answer
     assert answer is not None
     absences(context, answer.best, [answer.best])
-    add_point_matches(context, Candidates(np.zeros(0, FOUND), NOT_SEARCHED))
+    match_points(context, np.zeros(0, FOUND), np.zeros(0, FOUND))
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
