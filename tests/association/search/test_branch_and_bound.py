@@ -109,7 +109,7 @@ def test_another_place_as_good_leaves_a_doubt() -> None:
 
 
 def test_a_decision_of_points_is_the_answer_and_cannot_be_used() -> None:
-    """Where the segments alone prefer another pose: most of them are clutter that fits there."""
+    """The segments alone prefer another pose, because most of them are clutter that fits there."""
     ranges, rng = read(MAZE, HERE), np.random.default_rng(3)
     ranges[rng.random(len(ranges)) < 0.3] = 0.6
     few, clutter = seen(maze(1), HERE, radius=6.0)[0][:3], seen(maze(1), pose(8.0, 20.0, 1.0), radius=10.0)[0]
