@@ -159,9 +159,9 @@ def _search_by_points(
 def _decided_by_points(
     context: SearchContext, found: ScaledSearch, verdict: Verdict, pose: RigidTransform
 ) -> tuple[ScaledSearch, Verdict]:
-    """Make the pose at which most beams end on walls the answer, which cannot be used; the best by score follows it.
+    """Make the pose at which most beams end on walls the answer; the best one by score is its first alternative.
 
-    `pose` is in the index frame. Only the segments are scored with what the models of the verdict were fitted to.
+    It is not usable: an alternative with a higher score makes it as likely wrong as right. `pose` is in the index frame.
     """
     x, y = context.index.origin
     there = estimate_at(context, RigidTransform(pose.x + x, pose.y + y, pose.theta))

@@ -74,11 +74,6 @@ class PointMatches:
             return None
         return RigidTransform(float(best["x"]), float(best["y"]), float(best["theta"]))
 
-    def better_than(self, mean: float) -> Records:
-        """Return the poses with a greater mean."""
-        better: Records = self.poses[self.means > mean]
-        return better
-
 
 def match_points(context: SearchContext, candidates: Records, answer: Records) -> PointMatches | None:
     """Search for the poses at which most of the beams end on walls.
