@@ -161,7 +161,8 @@ def _decided_by_points(
 ) -> tuple[ScaledSearch, Verdict]:
     """Make the pose at which most beams end on walls the answer; the best one by score is its first alternative.
 
-    It is not usable: an alternative with a higher score makes it as likely wrong as right. `pose` is in the index frame.
+    It is not usable, because an alternative with a higher score makes it as likely wrong as right. `pose` is in the
+    index frame.
     """
     x, y = context.index.origin
     there = estimate_at(context, RigidTransform(pose.x + x, pose.y + y, pose.theta))
