@@ -61,11 +61,15 @@ def ask(port: int, body: bytes) -> int:
 
 
 def count(port: int, name: str) -> float:
-    """Return one of the service's own counts."""
+    """Return one of the service's own counts; 0 where the worker that was to return it was killed meanwhile."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-    connection.request("GET", "/metrics")
-    lines = connection.getresponse().read().decode().splitlines()
-    connection.close()
+    try:
+        connection.request("GET", "/metrics")
+        lines = connection.getresponse().read().decode().splitlines()
+    except (ConnectionError, http.client.HTTPException):
+        return 0.0
+    finally:
+        connection.close()
     return next((float(line.split()[1]) for line in lines if line.startswith(name + " ")), 0.0)
 
 
