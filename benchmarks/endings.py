@@ -7,6 +7,7 @@ the service when it is reported to end while it searches.
 from __future__ import annotations
 
 import http.client
+import math
 import os
 import signal
 import socket
@@ -61,13 +62,13 @@ def ask(port: int, body: bytes) -> int:
 
 
 def count(port: int, name: str) -> float:
-    """Return one of the service's own counts; 0 where the worker that was to return it was killed meanwhile."""
+    """Return one of the service's own counts; NaN if the worker that was to return it was killed meanwhile."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("GET", "/metrics")
         lines = connection.getresponse().read().decode().splitlines()
     except (ConnectionError, http.client.HTTPException):
-        return 0.0
+        return math.nan
     finally:
         connection.close()
     return next((float(line.split()[1]) for line in lines if line.startswith(name + " ")), 0.0)
@@ -144,7 +145,7 @@ def killed_workers() -> list[Row]:
             os.kill(_newest_worker(pid), signal.SIGKILL)
             begun = time.monotonic()
             until(lambda: count(port, "linefix_workers_ready") < 2)
-            while count(port, "linefix_workers_ready") < 2:
+            while not count(port, "linefix_workers_ready") >= 2:
                 asked += 1
                 failed += ask(port, orjson.dumps(examples.ASSOCIATE)) != 200
                 time.sleep(0.02)  # a robot's pace: who starts needs a processor
