@@ -15,7 +15,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -208,15 +208,20 @@ def large(service: Service, rounds: int) -> list[Row]:
 
 
 def family(pid: int) -> Iterator[int]:
+    """Yield a process and its descendants, as far as they are still there."""
     yield pid
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            yield from family(int(child))
+    with suppress(OSError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError):  # a thread that has just ended
+                for child in (task / "children").read_text().split():
+                    yield from family(int(child))
 
 
 def _resident(pid: int) -> float:
-    """Return a process's memory, bytes."""
-    return float(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+    """Return a process's memory, bytes; 0 of one that has just ended."""
+    with suppress(OSError):
+        return float(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+    return 0.0
 
 
 @contextmanager
