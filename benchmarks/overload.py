@@ -35,6 +35,7 @@ PAIRS = 8
 SECONDS = 5.0
 FACTOR = 10
 PROBES = 100.0  # a second
+IDLE_S = 3.0  # after which memory has been given back
 GOODPUT, SHARE, PROBE_MS, MEMORY_MB = 0.95, 0.9, 50.0, 512
 QUEUE = 16
 FLOORS = 8
@@ -184,7 +185,7 @@ def large(service: Service, rounds: int) -> list[Row]:
     size = len(rows) / 1e6
     scan = b'"scan": {"segments": [[0.0, 1.0, 5.0, 1.0], [5.0, 1.0, 5.0, 4.0]]}, "options": {"deadline_ms": 2000}}'
     statuses: list[int] = []
-    seconds = 12.0 * rounds
+    seconds, before = 12.0 * rounds, service.memory_mb()
     probes = (service.port, [request_of("/livez")], PROBES, seconds)
     with beside(at_rate, *probes) as answers, highest(service.memory_mb) as most:
         end = time.monotonic() + seconds
@@ -198,12 +199,15 @@ def large(service: Service, rounds: int) -> list[Row]:
             statuses.append(service.call("POST", "/v1/associate", b'{"map": {"map_id": "large"}, ' + scan))
             statuses.append(service.call("POST", "/v1/associate", b'{"map": ' + inline + b", " + scan))
         probed = [a.seconds for a in answers()]
+    time.sleep(IDLE_S)
     return [
         Row(f"maps of {size:.1f} MB stored, searched, sent along", f"{len(statuses)} requests in {seconds:.0f} s"),
         at_most("not answered with 2xx", sum(not 200 <= status < 300 for status in statuses), 0, form=".0f"),
         at_most(f"/livez meanwhile, p99 of {len(probed)}, ms", 1e3 * quantile(probed, 0.99), PROBE_MS, form=".1f"),
         Row("/livez meanwhile, longest, ms", f"{1e3 * max(probed):.1f}"),
         at_most("memory of all processes together, at most, MB", max(most), MEMORY_MB, form=".0f"),
+        Row("  before, MB", f"{before:.0f}"),
+        Row("  with a map in the cache, MB", f"{service.memory_mb():.0f}"),
     ]
 
 
