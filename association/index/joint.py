@@ -119,7 +119,7 @@ class JointIndex(MapIndex):
         segments = Segments.derived(np.concatenate(shifted))
         directed, sigma = len(segments), joint_sigma([part.sigma for part in parts])
         either = segments if oriented else both_ways(segments)
-        tables, points = tables_of(either, sigma, deadline), joint_points(parts, shifts)
+        tables, points = tables_of(either, sigma, deadline), joint_points(parts, own, shifts)
         starts = np.concatenate([[0], np.cumsum(counts)])
         boxes = own + np.tile(shifts, 2)
         together = tuple(parts), float(gap), shifts, starts, boxes
@@ -186,7 +186,7 @@ def checked_parts(parts: Sequence[MapPart]) -> tuple[MapPart, ...]:
     if not 1 <= len(parts) <= MOST_MAPS:
         raise InvalidMapError(f"expected 1 to {MOST_MAPS} maps, found {len(parts)}", argument="maps")
     for number, part in enumerate(parts):
-        MapIndex.require(part.segments, part.sigma, f"maps.{number}.", part.points)
+        MapIndex.require(part.segments, part.sigma, f"maps.{number}.")
     return tuple(parts)
 
 
@@ -203,13 +203,17 @@ def joint_sigma(sigmas: Sequence[float | None]) -> float | None:
     return None if len(known) < len(sigmas) and largest <= MODEL_OFFSET else largest
 
 
-def joint_points(parts: Sequence[MapPart], shifts: Floats) -> MapPoints:
-    """Return the points of several maps moved by their shifts (k, 2), metres; those of the least exact map count."""
-    with_points = [(part.points, shift) for part, shift in zip(parts, shifts, strict=True) if len(part.points)]
-    if not with_points:
+def joint_points(parts: Sequence[MapPart], boxes: Floats, shifts: Floats) -> MapPoints:
+    """Return the points of several maps, near their boxes (k, 4), moved by their shifts (k, 2), metres.
+
+    All have the sigma of the least exact of these maps.
+    """
+    near = [part.points.near(box[:2], box[2:]) for part, box in zip(parts, boxes, strict=True)]
+    moved = [points.shifted(shift) for points, shift in zip(near, shifts, strict=True) if len(points)]
+    if not moved:
         return NO_POINTS
-    together = np.concatenate([points.positions + shift for points, shift in with_points])
-    return MapPoints(together, max(points.sigma for points, _ in with_points))
+    together = np.concatenate([points.positions for points in moved])
+    return MapPoints(together, max(points.sigma for points in moved))
 
 
 def gap_of(extent: float) -> float:

@@ -108,26 +108,25 @@ class MapIndex:
         oriented : bool
             False lists every segment in both directions, for scans whose directions mean nothing.
         points : MapPoints, optional
-            Objects too small for a wall, in the map frame: evidence for the beams of a scan.
+            Objects too small for a wall, in the map frame: evidence for the beams of a scan. Those more than 40 m
+            outside the box around the segments are left out.
         deadline : Deadline, optional
             Looked at every few tenths of a second.
 
         Raises
         ------
         InvalidMapError
-            When the map is empty or too wide, also with its points, or sigma out of range.
+            When the map is empty or too wide, or sigma out of range.
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        low, high = cls.require(segments, sigma, "map.", points)
+        low, high = cls.require(segments, sigma, "map.")
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
-        return cls._of(either, sigma, origin, len(segments), points, deadline)
+        return cls._of(either, sigma, origin, len(segments), points.near(low, high), deadline)
 
     @staticmethod
-    def require(
-        segments: Segments, sigma: float | None, path: str, points: MapPoints = NO_POINTS
-    ) -> tuple[Floats, Floats]:
+    def require(segments: Segments, sigma: float | None, path: str) -> tuple[Floats, Floats]:
         """Return the low and the high corner of a map, (2,) metres, that can be indexed.
 
         Raises
@@ -149,7 +148,6 @@ class MapIndex:
                 f"expected an extent of at most {MAX_EXTENT:g} m, found {extent:.4g} m; check the unit",
                 argument=f"{path}segments",
             )
-        points.require_near(low, high, path)
         return low, high
 
     @classmethod

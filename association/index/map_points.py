@@ -11,10 +11,11 @@ from registration.layout import Floats
 from registration.values import value
 
 from ..errors import InvalidMapError
-from .tuning import MAX_EXTENT, MAX_MAP_SIGMA
+from .tuning import MAX_MAP_SIGMA
 
 MAX_POINTS = 200_000  # of a map; the contract
 POINT_SIGMA = 0.05  # m, if a map does not state it; the contract
+POINTS_REACH = 40.0  # m; less than half the gap between two maps of a joint index
 
 
 @value(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class MapPoints:
         Raises
         ------
         InvalidMapError
-            When they are no such array, not finite, too many or too far apart, or sigma is out of range.
+            When they are no such array, not finite or too many, or sigma is out of range.
         """
         argument = f"{path}points"
         try:
@@ -77,23 +78,14 @@ class MapPoints:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def require_near(self, low: Floats, high: Floats, path: str) -> None:
-        """Require that the points and the corners of the walls, (2,) metres, are within one extent.
+    def near(self, low: Floats, high: Floats) -> MapPoints:
+        """Return the points within `POINTS_REACH` of the box of the walls, whose corners are (2,) metres.
 
-        Raises
-        ------
-        InvalidMapError
-            When they are not.
+        Others would make the grid of obstacles coarse, and lie on the other maps of a joint index.
         """
-        if not len(self):
-            return
-        reach = np.maximum(high, self.positions.max(axis=0)) - np.minimum(low, self.positions.min(axis=0))
-        if float(reach.max()) > MAX_EXTENT:
-            raise InvalidMapError(
-                f"expected an extent of at most {MAX_EXTENT:g} m with the points, found {float(reach.max()):.4g} m; "
-                "check the unit",
-                argument=f"{path}points",
-            )
+        inside = (self.positions >= low - POINTS_REACH) & (self.positions <= high + POINTS_REACH)
+        kept = inside.all(axis=1)
+        return self if kept.all() else MapPoints(self.positions[kept], self.sigma)
 
     def shifted(self, offset: Floats) -> MapPoints:
         """Return the points moved by an offset, (2,) metres."""

@@ -256,6 +256,7 @@ def outline_of(document: MapDocument) -> MapOutline:
     """
     segments = Segments.from_array(document.segments, argument="segments")
     # No negative zeros: not every database keeps them.
-    corners = MapIndex.require(segments, document.sigma, "", _points_of(document, ""))
+    _points_of(document, "")
+    corners = MapIndex.require(segments, document.sigma, "")
     (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in corners)
     return MapOutline(len(segments), (left, bottom, right, top), document.sigma, document.oriented)

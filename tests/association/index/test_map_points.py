@@ -91,7 +91,9 @@ def test_what_are_no_points(points: object, sigma: float | None, argument: str, 
     assert error.value.argument == argument
 
 
-def test_points_too_far_from_the_walls() -> None:
-    with pytest.raises(InvalidMapError, match="with the points") as error:
-        MapIndex.build(WALLS, points=MapPoints.of([[2e5, 0.0]]))
-    assert error.value.argument == "map.points"
+def test_points_far_outside_are_left_out() -> None:
+    """They would make the cells coarse, and of several maps they would lie on another one."""
+    far = MapPoints.of([POST, [90.0, 0.0], [2e5, 0.0], [0.0, -90.0]])
+    np.testing.assert_array_equal(MapIndex.build(WALLS, points=far).points.positions, [POST])
+    together = JointIndex.of_parts([MapPart(WALLS, points=far), MapPart(WALLS)], gap_of(20.0))
+    np.testing.assert_allclose(together.points.positions, [np.array(POST) + together.shifts[0]])
