@@ -16,7 +16,7 @@ POST = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: applica
 def store_hard_map(running: RunningService, workers: int = 1) -> None:
     """Store a map for `searched_for`, and have every worker index it: the search is all that is left to do."""
     rng = np.random.default_rng(1)
-    begins, angles = rng.uniform(0.0, 300.0, (30_000, 2)), rng.uniform(0.0, np.pi, 30_000)
+    begins, angles = rng.uniform(0.0, 120.0, (30_000, 2)), rng.uniform(0.0, np.pi, 30_000)
     walls = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     body = orjson.dumps({"segments": walls}, option=orjson.OPT_SERIALIZE_NUMPY)
     assert running.client.put("/v1/maps/hard", content=body).status_code == 201
@@ -34,7 +34,7 @@ def store_hard_map(running: RunningService, workers: int = 1) -> None:
 
 
 def searched_for(seconds: float = 4.0) -> bytes:
-    """A request that takes as long as this: by far more can be tried than its deadline lets."""
+    """A request that takes as long as this, up to some 20 s: more can be tried than its deadline lets."""
     rng = np.random.default_rng(2)
     begins, angles = rng.uniform(-5.0, 5.0, (40, 2)), rng.uniform(0.0, np.pi, 40)
     seen = np.hstack([begins, begins + np.stack([np.cos(angles), np.sin(angles)], axis=1)])
