@@ -58,7 +58,9 @@ class MapPoints:
         try:
             rows = np.array(positions, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InvalidMapError("expected rows [x, y] of numbers", argument=argument) from None
+            raise InvalidMapError(
+                "expected rows [x, y] of two numbers, found rows of other lengths or types", argument=argument
+            ) from None
         rows = rows.reshape(0, 2) if rows.size == 0 else rows
         if rows.ndim != 2 or rows.shape[1] != 2:
             raise InvalidMapError(f"expected rows [x, y], found an array of shape {rows.shape}", argument=argument)

@@ -54,18 +54,23 @@ class PointMatches:
         All poses within `FIELD_GAP` of the best one, if the search is complete.
     means : (k,) float64
         Mean likelihood of the ends of beams at each, 0 to 1.
+    least : float
+        No place with a greater mean was missed, if the search is complete.
     complete : bool
         False if the deadline ended the search.
     """
 
     poses: Records
     means: Floats
+    least: float
     complete: bool
 
     @property
     def decisive(self) -> RigidTransform | None:
         """The best pose in the index frame, if it explains the scan well and no other place does nearly as well."""
-        if not self.complete or not len(self.poses) or self.means[0] < WELL_EXPLAINED:
+        if not self.complete or not len(self.poses):
+            return None
+        if self.means[0] < max(WELL_EXPLAINED, self.least + FIELD_GAP):
             return None
         best, others = self.poses[0], self.poses[1:]
         away = np.hypot(others["x"] - best["x"], others["y"] - best["y"])
@@ -106,17 +111,19 @@ def match_points(context: SearchContext, candidates: Records, answer: Records) -
     cell = float(field.shape["cell"][0])
     turned = _at_all_headings(points, cell)
     found = np.zeros(KEPT, CELL_POSE)
-    least, gap = (round(255.0 * len(points) * mean) for mean in (max(FIELD_LEAST, reached - FIELD_GAP), FIELD_GAP))
+    # In the cells of the field the best pose has less than a candidate between two of them.
+    least = max(FIELD_LEAST, reached - 2.0 * FIELD_GAP)
+    least_value, gap = (round(255.0 * len(points) * mean) for mean in (least, FIELD_GAP))
     apart = math.ceil(DISTINCT_DISTANCE / cell), math.ceil(DISTINCT_ANGLE / math.tau * len(turned.headings))
     with context.deadline.watched() as stop:
-        count = branch_and_bound(field.pyramid, turned.cells, least, gap, *apart, found, stop)
+        count = branch_and_bound(field.pyramid, turned.cells, least_value, gap, *apart, found, stop)
         interrupted = bool(stop[0])
     if context.deadline.cancelled:
         raise CancelledError
     found = found[:count][np.argsort(-found["value"][:count], kind="stable")]
     means = found["value"] / (255.0 * len(points))
     near = means >= means.max(initial=0.0) - FIELD_GAP  # the best was not known when the first were found
-    return PointMatches(_poses_of(context, field, turned, found[near]), means[near], not interrupted)
+    return PointMatches(_poses_of(context, field, turned, found[near]), means[near], least, not interrupted)
 
 
 def _points_of(context: SearchContext) -> Floats:

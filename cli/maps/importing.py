@@ -231,9 +231,10 @@ def report_rows(answer: Json) -> list[tuple[str, str]]:
     """Return the report of an import as text for people."""
     report, line_map = answer["report"], answer["map"]
     directed = "free space on the left" if line_map["oriented"] else "directions mean nothing"
+    points = f", {len(line_map['points'])} points" if line_map.get("points") else ""
     rows = [
         ("from", f"{', '.join(report['files'])} ({report['format']})"),
-        ("map", f"{len(line_map['segments'])} segments, {directed}"),
+        ("map", f"{len(line_map['segments'])} segments, {directed}{points}"),
     ]
     for kind in ("read", "merged", "dropped", "assumed"):
         rows += [(kind, noted(note)) for note in report[kind]]
