@@ -9,6 +9,7 @@ import numpy as np
 
 from .building import Building
 from .cubicles import Cubicles
+from .dormitory import Dormitory
 from .facades import Facades
 from .factory import Factory
 from .flats import Apartments, MirroredFlats
@@ -21,6 +22,7 @@ from .office_floors import OfficeFloors
 from .round_rooms import RoundRooms
 from .school import School
 from .supermarket import Supermarket
+from .terraces import Terraces
 from .warehouse import RackLegs, Warehouse
 
 
@@ -75,4 +77,6 @@ FAMILIES: dict[str, Family] = {
     "museum": Family("galleries in a line", Museum.draw, held_out=True),
     "offices": Family("rooms on both sides of corridors", OfficeFloors.draw, held_out=False),
     "apartments": Family("flats of which no two are alike", Apartments.draw, held_out=False),
+    "dormitory": Family("a corridor of equal rooms", Dormitory.draw, held_out=False),
+    "terraces": Family("one house again and again in a row", Terraces.draw, held_out=True),
 }
