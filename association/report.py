@@ -26,7 +26,6 @@ from .result import Alternative, AssociationDiagnostics, AssociationResult, Corr
 from .to_scale import Factor
 from .tuning import CRITICAL_DISPLACEMENT
 from .verdict.alternatives import compare_alternatives
-from .verdict.tuning import ALTERNATIVE_TEMPERATURE
 from .verdict.verdict import Verdict
 from .warnings import warnings_of, warnings_of_causes
 
@@ -175,7 +174,7 @@ def probabilities_of_others(
     if answer is None or verdict.status is Status.NO_MATCH or verdict.probability is None or verdict.contradicted:
         return [None] * len(others)
     alternatives = compare_alternatives(answer.best, others)
-    parts = alternatives["counted"] * np.exp(np.minimum(0.0, alternatives["gap"]) / ALTERNATIVE_TEMPERATURE)
+    parts = alternatives["counted"] * np.exp(np.minimum(0.0, alternatives["gap"]))
     inside = [one.inside for one in others]  # a hard prior excludes the others
     found: list[float | None] = (verdict.probability * parts * inside).tolist()
     return found

@@ -17,12 +17,13 @@ from .index.map_index import MapIndex
 from .options import AssociationOptions, Prior
 from .result import AssociationResult, Reason, ReasonCode, Status
 from .scan.scan import Scan
-from .verdict.features import Description, Features
-from .verdict.models import USUAL, Model
+from .verdict.alternatives import AmongAlternatives
+from .verdict.features import Description
+from .verdict.models import USUAL
 from .verdict.probabilities import Probabilities
 from .verdict.reasons import taken_by_reason
 from .verdict.roles import ROLES
-from .verdict.tuning import ALTERNATIVE_TEMPERATURE, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from .verdict.tuning import NO_MATCH_PROBABILITY
 from .verdict.verdict import Verdict
 from .verdict.vetoes import VETOES, Origin
 
@@ -54,21 +55,27 @@ class Contribution:
 
 @dataclass(frozen=True, slots=True)
 class ExplainedModel:
-    """One of the two models, evaluated.
+    """The model, evaluated.
 
     Attributes
     ----------
-    probability : float
-        Of the features alone, 0 to 1.
-    log_odds : float
-        The sum of the terms, nats.
     contributions : tuple of Contribution
         In the order of the model.
+    log_odds : float
+        The sum of the terms, nats.
+    probability : float
+        Of these log odds, 0 to 1: out-of-map scans are included.
+    on_map : float
+        Nats that are added for a scan that is known to be of this map.
+    probability_on_map : float
+        With it, and without the null score, which is about other maps.
     """
 
-    probability: float
-    log_odds: float
     contributions: tuple[Contribution, ...]
+    log_odds: float
+    probability: float
+    on_map: float
+    probability_on_map: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +136,8 @@ class VetoOutcome:
 class VerdictExplanation:
     """The numbers behind the verdict on an answer.
 
-    The answer is usable if ``probability_of_pose`` and ``cautious`` reach their thresholds and no veto applies. Both
-    are the probability by a model times that among the alternatives.
+    The answer is usable if ``cautious`` reaches its threshold and no veto applies. It is the probability by the model
+    times the least of those among the alternatives.
 
     Attributes
     ----------
@@ -144,22 +151,19 @@ class VerdictExplanation:
         The whole table, in its order.
     features : mapping or None
         By name; None without an answer, as all that follows.
-    usual, cautious_model : ExplainedModel or None
-        The model for scans that are known to be of this map, and the one that includes out-of-map scans.
+    model : ExplainedModel or None
     taken : mapping or None
-        By reason the decrease of the cautious log odds by its features, nats.
+        By reason the decrease of the log odds by its features, nats.
     alternatives : tuple of WeighedAlternative
-    among_as_scored, among_by_shown, among_with_loose_walls : float or None
-        Probability of the answer among its alternatives: as they were scored, where what the scan does not show
-        counts little, and with walls that may be off by more. The last is None where it was not needed. The lowest
-        counts.
+    among : AmongAlternatives or None
+        Probability of the answer among its alternatives, by three comparisons.
     null : ExplainedNull or None
         None where it was not needed.
     probability_of_pose, cautious : float or None
     explained : float or None
         Probability that this place or a similar one is right.
     thresholds : mapping of str to float
-        Of ``probability_of_pose``, ``cautious`` and ``explained``.
+        Of ``cautious`` and ``explained``.
     """
 
     status: Status
@@ -169,13 +173,10 @@ class VerdictExplanation:
     reasons: tuple[Reason, ...]
     vetoes: tuple[VetoOutcome, ...]
     features: Mapping[str, float] | None = None
-    usual: ExplainedModel | None = None
-    cautious_model: ExplainedModel | None = None
+    model: ExplainedModel | None = None
     taken: Mapping[ReasonCode, float] | None = None
     alternatives: tuple[WeighedAlternative, ...] = ()
-    among_as_scored: float | None = None
-    among_by_shown: float | None = None
-    among_with_loose_walls: float | None = None
+    among: AmongAlternatives | None = None
     null: ExplainedNull | None = None
     probability_of_pose: float | None = None
     cautious: float | None = None
@@ -261,38 +262,35 @@ def _with_numbers(
         shown.reasons,
         shown.vetoes,
         features=found.features._asdict(),
-        usual=_evaluated(found.usual, found.features, found.by_usual),
-        cautious_model=_evaluated(found.model, found.features, found.by_model),
+        model=_evaluated(found),
         taken=taken_by_reason(found.features, found.model),
         alternatives=_weighed(context, description),
-        among_as_scored=found.among_as_scored,
-        among_by_shown=found.among_by_shown,
-        among_with_loose_walls=found.among_with_loose_walls,
+        among=found.among,
         null=_null(description, found),
         probability_of_pose=found.right,
         cautious=found.cautious,
         explained=found.explained,
         thresholds={
-            "probability_of_pose": USABLE_PROBABILITY,
             "cautious": found.least_cautious,
             "explained": NO_MATCH_PROBABILITY,
         },
     )
 
 
-def _evaluated(model: Model, features: Features, probability: float) -> ExplainedModel:
-    terms, usual, values = model.terms(features), model.terms(USUAL), features._asdict()
+def _evaluated(found: Probabilities) -> ExplainedModel:
+    model, values = found.model, found.features._asdict()
+    terms, usual = model.terms(found.features), model.terms(USUAL)
     contributions = tuple(
         Contribution(name, values.get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None)
         for name, nats in terms.items()
     )
-    return ExplainedModel(probability, sum(terms.values()), contributions)
+    return ExplainedModel(contributions, sum(terms.values()), found.by_model, model.on_map, found.on_map)
 
 
 def _weighed(context: SearchContext, description: Description) -> tuple[WeighedAlternative, ...]:
     """Return the alternatives with their weights, as in `probability_among`."""
     gaps, counted = description.alternatives["gap"], description.alternatives["counted"]
-    weights = counted * np.exp(np.minimum(0.0, gaps) / ALTERNATIVE_TEMPERATURE)
+    weights = counted * np.exp(np.minimum(0.0, gaps))
     rows = zip(description.others, gaps.tolist(), counted.tolist(), weights.tolist(), strict=True)
     return tuple(WeighedAlternative(context.in_map(one.pose), *numbers) for one, *numbers in rows)
 

@@ -1,17 +1,18 @@
 """Fits the verdict's models, reports them by cross-validation over buildings, writes `association.verdict.models`.
 
-The chance that the best explanation is right is a logistic function of `association.verdict.features`, shared between
-explanations that are about as good. Scans of floor plans (three levels of clutter), of logs and of drawn worlds, as
-segments and with their raw ranges, and scans that were searched in the map of another building or of another part of
-it, where nothing is right: these count next to nothing for the one probability, which is about scans of this map, and
-fully for the cautious one, which an answer has to pass too before a robot goes by it. The report of an answer
-comes from a fit without its building, its log or its world; the coefficients come from all of these. The drawn worlds
-that ``python -m benchmarks worlds`` reports on are never fitted on.
+The probability that the best explanation is right is a logistic function of `association.verdict.features`, shared
+between explanations that are about as good. Scans of floor plans (three levels of clutter), of logs and of drawn
+worlds, as segments and with their raw ranges, and scans that were searched in the map of another building or of another
+part of it, where nothing is right. A robot goes by an answer only if it is probable with these. The probability that is
+answered holds for scans that are known to be of this map: it has the same log odds and a constant more. The report of
+an answer comes from a fit without its building, its log or its world; the coefficients come from all of these. The
+drawn worlds that ``python -m benchmarks worlds`` reports on are never fitted on.
 
-The tables are about the number that is answered: alternatives are compared again with walls off by more where an answer
-would be usable, and vetoes apply. The fit itself takes the alternatives as they were scored.
+The tables are about the number that is answered, and vetoes apply.
 
-``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]]``
+The features and pairs are those of the present models; ``--select`` selects them again.
+
+``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--select] [--write [FILE]]``
 """
 
 from __future__ import annotations
@@ -26,18 +27,20 @@ from typing import Any
 import numpy as np
 
 from association.verdict.features import Features
-from association.verdict.models import MODELS, USUAL, Model
+from association.verdict.models import MANIFEST, MODELS, ON_MAP, USUAL, Model
 from association.verdict.roles import ROLES
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
+from association.verdict.tuning import USABLE_CAUTIOUS
 
-from .curves import Fitted, Task, fit, log_loss
-from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
-from .full_path import answered, veto_rows
+from .curves import Answers, Task, fit, log_loss
+from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, collected
+from .full_path import Answered, Probabilities, answered, by_model, veto_rows
 from .manifest import MODELS_FILE, data_of, manifest_of
+from .outcomes import progress
 from .reliability import TELLING, bins, print_bins
+from .selection import Selected, candidates, select
 from .table import print_table
 
-TEMPERATURES = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)  # nats
+FORMS = (SEGMENTS, RANGES)
 THRESHOLDS = (0.8, 0.85, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99)
 GROUPS = ("scan", "scan_30", "scan_50", "logs", DRAWN, STRANGERS)
 AWAY = (
@@ -47,71 +50,33 @@ KEPT = ("clean", "clutter_33", "clutter_66", "changed", "scaled_1", "walls_5cm",
 """Conditions of drawn worlds that are shown by themselves: of out-of-map scans, and of scans in the map."""
 
 
-BEAMS = tuple(name for name, role in ROLES.items() if role.needs_beams)
-# Chosen one after the other by what each takes off the cross-validated log-loss, until none takes off 0.0002 more.
-LIKELY = (
-    "constant", "deviation", "lead", "blocked", "agreement", "root_length", "inverse_count", "longest_unmatched",
-    "log_significance",
-)  # fmt: skip
-LIKELY_WITH_BEAMS = ("constant", "solitude", "deviation", "agreement", "root_unmatched", "read", "root_count")
-CAREFUL = (
-    "constant", "null", "null_better", "longest_unmatched", "lead", "blocked", "root_unmatched", "inlier_fraction",
-    "misfit_of_many", "root_length", "deviation", "solitude", "critical_deviation", "critical_displacement",
-)  # fmt: skip
-CAREFUL_WITH_BEAMS = (
-    "constant", "null_gap", "longest_unmatched", "root_length", "passed", "inlier_fraction", "deviation", "null",
-    "null_better", "read", "solitude", "lead", "root_unmatched", "agreement", "misfit_of_many", "critical_deviation",
-    "critical_displacement",
-    "root_farther", "root_nearer",
-)  # fmt: skip
-# Chosen likewise, each of the 45 pairs that promised most tried in both kinds, until none takes off 0.0003 more.
-# Without deviations and critical walls: the map of the scan does not depend on free directions.
-PAIRS = (
-    ("least", "+misfit", "+root_count"), ("most", "-longest_unmatched", "+misfit_of_many"),
-    ("least", "-blocked", "-misfit_of_many"), ("most", "-null", "-root_length"), ("most", "+lead", "+root_length"),
-)  # fmt: skip
-PAIRS_WITH_BEAMS = (
-    ("least", "+misfit", "+root_count"), ("most", "+agreement", "+inlier_fraction"),
-    ("most", "+root_length", "+solitude"),
-    ("least", "-misfit", "+misfit_of_many"), ("least", "-null", "+solitude"), ("most", "-root_farther", "-root_nearer"),
-)  # fmt: skip
-BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
-TASKS = {
-    SEGMENTS: (
-        Task("probability", 0.01, MODELS["probability"], LIKELY, ()),
-        Task("cautious", 1.0, MODELS["cautious"], CAREFUL, BENDS, PAIRS),
-    ),
-    RANGES: (
-        Task("probability_with_beams", 0.01, MODELS["probability_with_beams"], LIKELY_WITH_BEAMS, ()),
-        Task("cautious_with_beams", 1.0, MODELS["cautious_with_beams"], CAREFUL_WITH_BEAMS, BENDS, PAIRS_WITH_BEAMS),
-    ),
-}
+def present_task(form: str) -> Task:
+    """Return the features and pairs of the present model."""
+    part = MANIFEST["models"][form]
+    pairs = tuple((str(kind), str(one), str(other)) for kind, one, other in part["pairs"])
+    return Task(form, tuple(part["features"]), pairs, tuple(part["bends"]))
 
 
-def cross_validated(examples: Sequence[Example], task: Task, temperature: float) -> np.ndarray:
-    """Return for each answer the probability by a fit to the other folds."""
-    folds = np.array([e.fold for e in examples])
-    out = np.zeros(len(examples))
-    for here in np.unique(folds):
-        fitted = fit([e for e in examples if e.fold != here], task, temperature)
-        out[folds == here] = fitted.probabilities([e for e in examples if e.fold == here])
-    return out
+def cross_validated(answers: Answers, task: Task) -> Probabilities:
+    """Return the probabilities of each answer by a fit to the other folds."""
+    out = np.zeros((4, len(answers.right)))
+    folds = np.unique(answers.folds)
+    for k, here in enumerate(folds):
+        mine = answers.folds == here
+        one = by_model(fit(answers.where(~mine), task), answers.where(mine))
+        out[:, mine] = one.likely, one.fitted, one.careful, one.explained
+        progress(f"cross-validated as {task.form}", k + 1, len(folds))
+    return Probabilities(*out)
 
 
-def told_loss(probabilities: np.ndarray, examples: Sequence[Example], task: Task) -> float:
-    """Return the log-loss over those answers that could be told."""
-    of_those = [k for k, e in enumerate(examples) if e.told or not e.stranger]
-    return log_loss(probabilities[of_those], [examples[k] for k in of_those], task.strangers)
-
-
-def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: Sequence[Example]) -> None:
-    """Print for several thresholds of the cautious model the usable share by group and how many of those are wrong.
+def print_thresholds(title: str, p: Probabilities, examples: Sequence[Example]) -> None:
+    """Print for several thresholds of the cautious probability the usable share by group and how many are wrong.
 
     Of drawn out-of-map scans, the share that is usable although the scan shows that it is wrong.
     """
     cells, kept = [], []
     for threshold in THRESHOLDS:
-        usable = answered(examples, p, careful, threshold).usable
+        usable = answered(examples, p, threshold).usable
         row = [f"{threshold:g}"]
         for group in GROUPS:
             mine = [k for k, e in enumerate(examples) if e.group == group]
@@ -131,54 +96,30 @@ def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: S
     print_table(f"{title}, drawn worlds", ("usable from", *KEPT), kept)
 
 
-def print_changes(old: np.ndarray, new: np.ndarray, examples: Sequence[Example]) -> None:
-    """Print which answers would become usable and which would no longer be, the rest of the verdict apart."""
-    cells = []
-    for what, gained in (("gained", True), ("lost", False)):
-        row = [what]
-        for group in (*GROUPS, DRAWN_STRANGERS):
-            changed = [
-                e.right
-                for e, before, after in zip(examples, old, new, strict=True)
-                if e.group == group
-                and not e.degenerate
-                and (before >= USABLE_CAUTIOUS) != (after >= USABLE_CAUTIOUS)
-                and (after >= USABLE_CAUTIOUS) == gained
-            ]
-            row.append(f"{len(changed)} ({changed.count(False)} wrong)")
-        cells.append(row)
-    print_table(f"Answers over {USABLE_CAUTIOUS:g}, next to the present model", ("", *GROUPS, DRAWN_STRANGERS), cells)
-
-
-def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dict[str, dict[str, float]]:
-    """Print how present and new models do on one form of scans; return by model the metrics of the new ones."""
-    print(f"\n## Scans as {form}: {len(examples)} answers")
-    cells: list[tuple[str, ...]] = []
-    for temperature in TEMPERATURES:
-        losses = [told_loss(cross_validated(examples, t, temperature), examples, t) for t in tasks]
-        cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
-    print_table("Temperature of similar places, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
-    tried = [cross_validated(examples, t, ALTERNATIVE_TEMPERATURE) for t in tasks]
-    present = [Fitted(t.current, ALTERNATIVE_TEMPERATURE).probabilities(examples) for t in tasks]
-    metrics: dict[str, dict[str, float]] = {}
-    for title, found in (("present", present), ("cross-validated", tried)):
-        metrics = {t.name: {"log_loss": told_loss(p, examples, t)} for t, p in zip(tasks, found, strict=True)}
-        told = (f"{name} {some['log_loss']:.4f}" for name, some in metrics.items())
-        print(f"\nLog-loss, {title}: {', '.join(told)}")
-        metrics[tasks[0].name] |= print_answered(form, title, found, examples, tasks[-1].current)
-        print_thresholds(f"Usable share of scans as {form}, {title}", found[0], found[-1], examples)
-    print_changes(present[-1], tried[-1], examples)
+def report(task: Task, examples: Sequence[Example]) -> dict[str, float]:
+    """Print how the present and the new model do on one form of scans; return the metrics of the new one."""
+    print(f"\n## Scans as {task.form}: {len(examples)} answers")
+    answers = Answers.of(examples)
+    metrics: dict[str, float] = {}
+    found = {"present": by_model(MODELS[task.form], answers), "cross-validated": cross_validated(answers, task)}
+    for title, p in found.items():
+        here = answers.where(~answers.away)
+        metrics = {
+            "log_loss": log_loss(p.fitted, answers),
+            "log_loss_on_map": log_loss(p.likely[~answers.away], here),
+        }
+        print(f"\nLog-loss, {title}: {metrics['log_loss']:.4f}; on the map {metrics['log_loss_on_map']:.4f}")
+        metrics |= print_answered(task.form, title, answered(examples, p, USABLE_CAUTIOUS), answers, examples)
+        print_thresholds(f"Usable share of scans as {task.form}, {title}", p, examples)
     return metrics
 
 
 def print_answered(
-    form: str, title: str, found: Sequence[np.ndarray], examples: Sequence[Example], model: Model
+    form: str, title: str, verdicts: Answered, answers: Answers, examples: Sequence[Example]
 ) -> dict[str, float]:
     """Print how often the probability that is answered is right, and what each veto alone rejects; return metrics."""
-    verdicts = answered(examples, found[0], found[-1], USABLE_CAUTIOUS, model)
-    stated = np.array([not e.stranger for e in examples]) & ~np.isnan(verdicts.probability)
-    right = np.array([e.right for e in examples])
-    probability = verdicts.probability[stated]
+    stated = ~answers.away & ~np.isnan(verdicts.probability)
+    probability, right = verdicts.probability[stated], answers.right
     print_bins(f"Scans as {form} in their own map, as answered, {title}", probability, right[stated])
     print_table(
         f"Rejected by one veto alone, scans as {form}, {title}",
@@ -188,9 +129,10 @@ def print_answered(
     off = [abs(p - observed) for count, p, observed in bins(probability, right[stated]) if count >= TELLING]
     return {
         "worst_bin_points": 100.0 * max(off, default=float("nan")),
-        "usable": float(verdicts.usable.sum()),
-        "usable_wrong_in_map": float((verdicts.usable & ~right)[[not e.stranger for e in examples]].sum()),
-        "usable_out_of_map": float(verdicts.usable[[e.stranger for e in examples]].sum()),
+        "usable_right": float((verdicts.usable & right).sum()),
+        "usable_wrong_in_map": float((verdicts.usable & ~right & ~answers.away).sum()),
+        "usable_out_of_map": float((verdicts.usable & answers.away).sum()),
+        "usable_out_of_map_told": float((verdicts.usable & answers.away & answers.told).sum()),
     }
 
 
@@ -199,6 +141,7 @@ def as_document(model: Model) -> dict[str, list[float]]:
     numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
     for pair in model.pairs:
         numbers[pair.key] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
+    numbers[ON_MAP] = (model.on_map,)
     return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
 
@@ -216,14 +159,18 @@ def usual_of(examples: Sequence[Example], before: Features, form: str) -> Featur
     """Return the medians of the features of right answers; those of segments, and of ranges what only these have."""
     right = np.array([e.features for e in examples if e.right])
     medians = dict(zip(Features._fields, np.median(right, axis=0).tolist(), strict=True))
-    return Features(**medians) if form == SEGMENTS else before._replace(**{name: medians[name] for name in BEAMS})
+    if form == SEGMENTS:
+        beams = {name: getattr(before, name) for name, role in ROLES.items() if role.needs_beams}
+        return Features(**medians | beams)
+    return before._replace(**{name: medians[name] for name, role in ROLES.items() if role.needs_beams})
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
-    parser.add_argument("--form", choices=tuple(TASKS), help="only these scans; by default both")
+    parser.add_argument("--form", choices=FORMS, help="only these scans; by default both")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep answers there, and read those that are")
+    parser.add_argument("--select", action="store_true", help="select the features and pairs again")
     parser.add_argument(
         "--write",
         type=Path,
@@ -234,22 +181,26 @@ def main() -> None:
     )
     args = parser.parse_args()
     models, usual, data = dict(MODELS), USUAL, {}
-    tasks: list[Task] = []
-    metrics: dict[str, dict[str, float]] = {}
-    for form in (args.form,) if args.form else TASKS:
-        path = None if args.keep is None else args.keep / f"{form}.pickle"
-        examples = collected(path, cases(form, args.stride))
-        metrics |= report(form, TASKS[form], examples)
-        models |= {t.name: fit(examples, t, ALTERNATIVE_TEMPERATURE).model for t in TASKS[form]}
+    fitted: list[tuple[Task, list[Selected], dict[str, float]]] = []
+    for form in (args.form,) if args.form else FORMS:
+        examples = collected(args.keep, form, args.stride)
+        answers, task = Answers.of(examples), present_task(form)
+        steps: list[Selected] = []
+        if args.select:
+            task, steps = select(answers, form, candidates(form))
+            print_table(
+                f"Selected for scans as {form}", ("added", "log-loss"), [(s.added, f"{s.loss:.4f}") for s in steps]
+            )
+        fitted.append((task, steps, report(task, examples)))
+        models[form] = fit(answers, task)
         usual = usual_of(examples, usual, form)
         data[form] = data_of(examples)
-        tasks += TASKS[form]
     if args.write is None:
         for name, model in models.items():
             print(f"\n{name}: {as_document(model)}")
         return
     command = " ".join(["python -m benchmarks.calibration", *sys.argv[1:]])
-    write(args.write, models, manifest_of(command, data, tasks, metrics), usual)
+    write(args.write, models, manifest_of(command, data, fitted), usual)
     print(f"\nWritten: {args.write}")
 
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
-
-import numpy as np
+from typing import TypeVar
 
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.to_scale import search_to_scale
-from association.verdict.alternatives import probability_among, probability_by_shown, probability_with_loose_walls
+from association.verdict.alternatives import AmongAlternatives, compare_three_ways
 from association.verdict.chance import find_null_score
 from association.verdict.features import Features, add_null_score, describe_answer
 from association.verdict.models import USUAL
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
+from batch import Engine, Lost, Processes
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase
@@ -31,12 +33,41 @@ from .worlds.cases import in_map, questions
 from .worlds.outcomes import share_read
 from .worlds.tables import TOLD
 
+Item = TypeVar("Item")
+
 SEGMENTS, RANGES = "segments", "ranges"
 STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-map scans"
 # Of each drawn world and condition, of those worlds that are fitted on.
-HERE, AWAY = 32, 128
+HERE, AWAY = 48, 160
+ALONE = AmongAlternatives(1.0, 1.0, 1.0)
+BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a sequence: one item in `count`, from the one with that number on."""
+
+    number: int
+    count: int
+
+    def of(self, items: Sequence[Item]) -> Iterator[tuple[int, Item]]:
+        """Yield the items of the part, with their positions."""
+        yield from islice(enumerate(items), self.number, None, self.count)
+
+
+ALL = Part(0, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """The work of one process at a time: a part of the cases of a form, one in `stride`."""
+
+    form: str
+    stride: int
+    part: Part
+    kept_for_report: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +85,13 @@ class Example:
     fold : str
         It is reported on by a fit without that one.
     features : Features
-    gaps : (n,) how much less than the best the alternatives score, nats, 0 or less
-    counted : (n,) how far each of them counts, 0 to 1
     right, degenerate : bool
     told : bool
         True if the scan shows that the answer is not where it was taken, where the answer is wrong.
     before_null : Features
         The same with the least null score there is.
-    share, shown, loose : float
-        Probability among the alternatives: as they were scored, where what the scan does not show counts little, and
-        with walls off by more, 0 to 1.
+    among : AmongAlternatives
+        Probability among the alternatives.
     vetoes : tuple of str
         That apply, in the order of the table.
     """
@@ -73,15 +101,11 @@ class Example:
     condition: str
     fold: str
     features: Features
-    gaps: np.ndarray
-    counted: np.ndarray
     right: bool
     degenerate: bool
     told: bool
     before_null: Features = USUAL
-    share: float = 1.0
-    shown: float = 1.0
-    loose: float = 1.0
+    among: AmongAlternatives = ALONE
     vetoes: tuple[str, ...] = ()
 
     @property
@@ -127,7 +151,7 @@ class Case:
             return None
         best, pose, right = found.answer.best, found.answer.registered.pose, False
         description = describe_answer(context, found, found.answer)
-        weighed, plain = description.alternatives, Features(*description.features.item())
+        plain = Features(*description.features.item())
         described = description.features.copy()
         add_null_score(described, best, find_null_score(context, best))
         features = Features(*described.item())
@@ -141,37 +165,33 @@ class Case:
             condition=self.condition,
             fold=self.fold,
             features=features,
-            gaps=np.minimum(0.0, weighed["gap"]),
-            counted=weighed["counted"],
             right=right,
             degenerate=found.answer.estimated.degenerate,
             told=not right and (self.told is None or pose is None or self.told(pose)),
             before_null=plain,
-            share=probability_among(weighed),
-            shown=probability_by_shown(context, best, description.others),
-            loose=probability_with_loose_walls(context, found.answer, description.others),
+            among=compare_three_ways(context, found.answer, description.others, description.alternatives),
             vetoes=tuple(one.name for one in applied(replace(findings, mirrored_better=features.null_better))),
         )
 
 
-def cases(form: str, stride: int) -> Iterator[Case]:
-    """Yield all cases of a form, one in `stride`."""
-    yield from (segment_cases if form == SEGMENTS else range_cases)(stride)
-    yield from world_cases(form, stride)
+def cases(block: Block) -> Iterator[Case]:
+    """Yield the cases of a block: all that may be fitted on, or the drawn worlds that are kept for reports."""
+    if not block.kept_for_report:
+        yield from (segment_cases if block.form == SEGMENTS else range_cases)(block.stride, block.part)
+    yield from world_cases(block.form, block.stride, block.part, kept_for_report=block.kept_for_report)
 
 
-def segment_cases(stride: int) -> Iterator[Case]:
+def segment_cases(stride: int, part: Part = ALL) -> Iterator[Case]:
     """Yield floor plans and logs as segments, one in `stride`, and some of them in the maps of others."""
     plans = floor_plans(stride)
     away = other_map(plans)
-    for k, query in enumerate(plans.queries):
+    for k, query in part.of(plans.queries):
         yield _case(plans, query, query.scan, plans.index(query.map), query.level, own=True)
         yield _case(plans, query, query.scan, plans.index(away[k]), query.level, own=False)
-        progress(plans.name, k + 1, len(plans.queries))
-    yield from _log_cases(stride, lambda _, query: query.scan)
+    yield from _log_cases(stride, part, lambda _, query: query.scan)
 
 
-def range_cases(stride: int) -> Iterator[Case]:
+def range_cases(stride: int, part: Part = ALL) -> Iterator[Case]:
     """Yield the logs with their raw ranges, one scan in `stride`, and every fourth of them in the map of another."""
     raw: dict[str, Log] = {}
 
@@ -181,20 +201,19 @@ def range_cases(stride: int) -> Iterator[Case]:
         found = vectorize(raw[log.name].laser(query.number))
         return Scan(found.measured, (0.0, 0.0), found.beams)
 
-    yield from _log_cases(stride, scan_of)
+    yield from _log_cases(stride, part, scan_of)
 
 
-def _log_cases(stride: int, scan_of: Callable[[Collection, Query], Scan]) -> Iterator[Case]:
+def _log_cases(stride: int, part: Part, scan_of: Callable[[Collection, Query], Scan]) -> Iterator[Case]:
     of_logs = logs(stride)
     for k, log in enumerate(of_logs):
-        for n, query in enumerate(log.queries):
+        for n, query in part.of(log.queries):
             scan = scan_of(log, query)
             yield _case(log, query, scan, log.index(query.map), "logs", own=True)
             if n % 4 == 0:
                 other = of_logs[(k + 1 + n // 4 % (len(of_logs) - 1)) % len(of_logs)]
                 key: MapKey = next(iter(other.maps))
                 yield _case(log, query, scan, other.index(key), "logs", own=False)
-        progress(log.name, len(log.queries), len(log.queries))
 
 
 def _case(collection: Collection, query: Query, scan: Scan, index: MapIndex, group: str, *, own: bool) -> Case:
@@ -204,20 +223,19 @@ def _case(collection: Collection, query: Query, scan: Scan, index: MapIndex, gro
     )  # fmt: skip
 
 
-def world_cases(form: str, stride: int, *, kept_for_report: bool = False) -> Iterator[Case]:
+def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bool = False) -> Iterator[Case]:
     """Yield scans of those drawn worlds that may be fitted on, or of those that may not, in all conditions."""
     worlds = [name for name, family in FAMILIES.items() if family.held_out == kept_for_report]
     conditions = [name for name in CONDITIONS if name not in LEFT_OUT]
-    for n, world in enumerate(worlds):
+    for world in worlds:
         for condition in conditions:
             own = in_map(condition)
-            numbers = range(0, HERE if own else AWAY, stride)
+            numbers = [number for _, number in part.of(range(0, HERE if own else AWAY, stride))]
             for question in questions([world], [condition], numbers):
                 yield Case(
                     question.scans[form], question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
                     DRAWN if own else DRAWN_STRANGERS, condition, world, _told_by(question.case),
                 )  # fmt: skip
-        progress(f"worlds, {form}", n + 1, len(worlds))
 
 
 def _told_by(case: DrawnCase) -> Callable[[RigidTransform], bool]:
@@ -225,18 +243,47 @@ def _told_by(case: DrawnCase) -> Callable[[RigidTransform], bool]:
     return lambda pose: share_read(case, pose) < TOLD
 
 
-def collect(found: Iterator[Case]) -> list[Example]:
-    """Search everything."""
-    return [example for example in (case.example() for case in found) if example is not None]
+def examples_of(block: Block) -> list[Example]:
+    """Search the cases of a block; those without an explanation are left out."""
+    return [example for example in (case.example() for case in cases(block)) if example is not None]
 
 
-def collected(path: Path | None, found: Iterator[Case]) -> list[Example]:
-    """Search everything, or read what an earlier run kept in a file."""
+def collected(
+    folder: Path | None, form: str, stride: int, *, kept_for_report: bool = False, engine: Engine | None = None
+) -> list[Example]:
+    """Search all cases of a form, or read what an earlier run stored in a folder.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The folder of the answers; None: they are not stored.
+    form : str
+        `SEGMENTS` or `RANGES`.
+    stride : int
+        One case in so many is searched.
+    kept_for_report : bool
+        True for the drawn worlds that nothing may be fitted on.
+    engine : Engine, optional
+        By default as many processes as there are cores. The answers and their order do not depend on it.
+
+    Raises
+    ------
+    RuntimeError
+        When a block ended every worker that had it.
+    """
+    path = None if folder is None else folder / f"{'report' if kept_for_report else 'fit'}-{form}-{stride}.pickle"
     if path is not None and path.exists():
-        kept: list[Example] = pickle.loads(path.read_bytes())
-        return kept
-    examples = collect(found)
+        stored: list[Example] = pickle.loads(path.read_bytes())
+        return stored
+    blocks = [Block(form, stride, Part(k, BLOCKS), kept_for_report) for k in range(BLOCKS)]
+    found: dict[Block, list[Example]] = {}
+    for block, examples in (engine or Processes(os.cpu_count() or 1)).run(examples_of, blocks):
+        if isinstance(examples, Lost):
+            raise RuntimeError(f"lost: {block}")
+        found[block] = examples
+        progress(f"answers to {form}", len(found), BLOCKS)
+    together = [example for block in blocks for example in found[block]]
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps(examples))
-    return examples
+        path.write_bytes(pickle.dumps(together))
+    return together

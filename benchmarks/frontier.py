@@ -16,15 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from association.verdict.models import MODELS
-from association.verdict.tuning import (
-    ALTERNATIVE_TEMPERATURE,
-    USABLE_CAUTIOUS,
-    USABLE_PROBABILITY,
-)
+from association.verdict.tuning import USABLE_CAUTIOUS
 
-from .calibration import TASKS
-from .curves import Fitted
-from .examples import RANGES, SEGMENTS, Example, collected, world_cases
+from .curves import Answers
+from .examples import RANGES, SEGMENTS, Example, collected
+from .full_path import by_model
 from .pictures import COLOURS, panels, save
 from .table import print_table
 from .worlds.goals import KEPT
@@ -58,16 +54,14 @@ class Point:
 
 def frontier(form: str, examples: Sequence[Example], bars: Sequence[float] = BARS) -> list[Point]:
     """Return a point for each bar, of examples of one form."""
-    likely, careful = (
-        Fitted(MODELS[task.name], ALTERNATIVE_TEMPERATURE).probabilities(examples) for task in TASKS[form]
-    )
-    open_to = (likely >= USABLE_PROBABILITY) & ~np.array([e.degenerate for e in examples])
+    p = by_model(MODELS[form], Answers.of(examples))
+    open_to = ~np.array([e.degenerate for e in examples])
     right, told = np.array([e.right for e in examples]), np.array([e.told for e in examples])
     here = ~np.array([e.stranger for e in examples])
     conditions = np.array([e.condition for e in examples])
     found = []
     for bar in bars:
-        usable = open_to & (careful >= bar)
+        usable = open_to & (p.careful >= bar)
         kept = {
             name: 100.0 * float(np.mean((usable & right)[here & np.isin(conditions, group)]))
             for name, (group, _, _) in KEPT.items()
@@ -100,8 +94,7 @@ def main() -> None:
     args = parser.parse_args()
     found, chosen = {}, {}
     for form in (RANGES, SEGMENTS):
-        path = None if args.keep is None else args.keep / f"{form}.pickle"
-        examples = collected(path, world_cases(form, args.stride, kept_for_report=True))
+        examples = collected(args.keep, form, args.stride, kept_for_report=True)
         found[form] = frontier(form, examples)
         [chosen[form]] = frontier(form, examples, [CHOSEN[form]])
         cells = [

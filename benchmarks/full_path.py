@@ -1,4 +1,4 @@
-"""The probabilities that are answered: a model's, its alternatives' compared twice, with the vetoes."""
+"""The probabilities that are answered, by a model and among the alternatives, with the vetoes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,48 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from association.verdict.features import Features
 from association.verdict.models import USUAL, Model
-from association.verdict.tuning import NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from association.verdict.tuning import NO_MATCH_PROBABILITY
 from association.verdict.vetoes import VETOES
 
+from . import curves
+from .curves import Answers, Floats, logistic, logits
 from .examples import Example
 
-SETTLING = frozenset(veto.name for veto in VETOES if veto.settles)
+
+@dataclass(frozen=True, slots=True)
+class Probabilities:
+    """Probabilities of some answers, (n,) float64 each.
+
+    Attributes
+    ----------
+    likely : float64
+        That the answer is right, for a scan that is known to be of the map.
+    fitted : float64
+        The same, with out-of-map scans included.
+    careful : float64
+        The same, where the least comparison with the alternatives counts: it decides.
+    explained : float64
+        That this place or a similar one is right.
+    """
+
+    likely: Floats
+    fitted: Floats
+    careful: Floats
+    explained: Floats
+
+
+def by_model(model: Model, answers: Answers) -> Probabilities:
+    """Return the probabilities by a model."""
+    fixed = answers.before_null.copy()
+    fixed[:, Features._fields.index("deviation")] = USUAL.deviation
+    return Probabilities(
+        curves.likely(model, answers),
+        curves.fitted_to(model, answers),
+        curves.careful(model, answers),
+        logistic(logits(model, fixed)),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +60,7 @@ class Answered:
     probability : float64
         As answered; nan where nothing matches, or along an unobservable direction: there is none.
     passes : bool
-        True if both probabilities reach their thresholds.
+        True if the careful probability reaches its threshold.
     usable : bool
         The same, and that no veto applies.
     """
@@ -35,34 +70,11 @@ class Answered:
     usable: np.ndarray
 
 
-def answered(
-    examples: Sequence[Example], likely: np.ndarray, careful: np.ndarray, threshold: float, model: Model | None = None
-) -> Answered:
-    """Return the verdicts by two probabilities of each answer.
-
-    Parameters
-    ----------
-    examples : sequence of Example
-    likely, careful : (n,) float64
-        Probabilities for scans of the map, and with out-of-map scans included, among the alternatives as scored.
-    threshold : float
-        Of `careful`.
-    model : Model or None
-        The cautious one, by which a scan without a match is recognized; None: none is.
-    """
-    settled = np.array([bool(SETTLING & set(e.vetoes)) for e in examples], bool)
-    shares = np.array([e.share for e in examples])
-    shown = np.minimum(shares, np.array([e.shown for e in examples]))
-    likely, careful = likely * shown / shares, careful * shown / shares
-    compared = (likely >= USABLE_PROBABILITY) & (careful >= threshold) & ~settled
-    factor = np.where(compared, np.minimum(1.0, np.array([e.loose for e in examples]) / shown), 1.0)
-    likely, careful = likely * factor, careful * factor
-    found = likely.copy()
-    if model is not None:
-        fixed = [model.logit(e.before_null._replace(deviation=USUAL.deviation)) for e in examples]
-        found[1.0 / (1.0 + np.exp(-np.array(fixed))) < NO_MATCH_PROBABILITY] = np.nan
+def answered(examples: Sequence[Example], by: Probabilities, threshold: float) -> Answered:
+    """Return the verdicts by the probabilities of each answer; `threshold` is of the careful one."""
+    found = np.where(by.explained < NO_MATCH_PROBABILITY, np.nan, by.likely)
     found[[e.degenerate for e in examples]] = np.nan
-    passes = (likely >= USABLE_PROBABILITY) & (careful >= threshold)
+    passes = by.careful >= threshold
     return Answered(found, passes, passes & np.array([not e.vetoes for e in examples], bool))
 
 

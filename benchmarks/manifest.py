@@ -28,14 +28,15 @@ import association
 from association.verdict.features import Features
 from association.verdict.models import FILE, MANIFEST
 
-from .curves import Task, tellable
+from .curves import Task
 from .examples import Example
 from .queries import DATA, data_found
+from .selection import Selected
 
 ROOT = Path(association.__file__).parents[1]
 MODELS_FILE = ROOT / "association" / "verdict" / FILE
 UNKNOWN = "unknown"
-FORMAT = 1  # of the manifest
+FORMAT = 2  # of the manifest
 DEFINITION = (
     "association/verdict/features.py",
     "association/verdict/alternatives.py",
@@ -43,6 +44,7 @@ DEFINITION = (
     "association/verdict/tuning.py",
     "association/verdict/kernels/*.py",
     "association/consensus/tuning.py",
+    "association/consensus/kernels/beams.py",
     "association/consensus/kernels/scoring.py",
 )
 """The code that gives the features their values, and the score that they depend on."""
@@ -79,7 +81,7 @@ def code_of(text: str) -> str:
 
 
 def manifest_of(
-    command: str, data: dict[str, Any], tasks: Sequence[Task], metrics: dict[str, dict[str, float]]
+    command: str, data: dict[str, Any], fitted: Sequence[tuple[Task, Sequence[Selected], dict[str, float]]]
 ) -> dict[str, Any]:
     """Return the manifest of a fit.
 
@@ -89,20 +91,19 @@ def manifest_of(
         That makes the models again.
     data : dict
         By form what `data_of` returns.
-    tasks : sequence of Task
-        The models that were fitted; those that were not keep their part of the present manifest.
-    metrics : dict
-        By model and by name.
+    fitted : sequence of (Task, steps of its selection, metrics)
+        The models that were fitted; those that were not keep their part of the present manifest. Without steps the
+        features were those of the present model, and its selection stays.
     """
     models = dict(MANIFEST["models"])
-    for task in tasks:
-        models[task.name] = {
+    for task, steps, metrics in fitted:
+        selection = [f"{step.added}: {step.loss:.5f}" for step in steps]
+        models[task.form] = {
             "features": list(task.names),
             "pairs": [list(pair) for pair in task.pairs],
             "bends": list(task.bends),
-            "weight_out_of_map": task.strangers,
-            "selection": MANIFEST["models"][task.name]["selection"],
-            "metrics": metrics[task.name],
+            "selection": selection or models[task.form]["selection"],
+            "metrics": metrics,
         }
     return {
         "format": FORMAT,
@@ -118,11 +119,11 @@ def manifest_of(
 
 def data_of(examples: Sequence[Example]) -> dict[str, Any]:
     """Return what is to be known of the answers that a fit used: counts, and a digest of features and truth."""
-    used = tellable(examples)
+    used = [example for example in examples if example.told or not example.stranger]
     found = hashlib.sha256()
     for example in used:
         found.update(np.array([*example.features, example.right], np.float64).tobytes())
-        found.update(np.concatenate([example.gaps, example.counted]).astype(np.float64).tobytes())
+        found.update(np.array([example.among.mean, example.among.least], np.float64).tobytes())
     away = sum(e.stranger for e in used)
     return {
         "scans_in_map": len(used) - away,

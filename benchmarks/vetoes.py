@@ -12,22 +12,18 @@ from pathlib import Path
 import numpy as np
 
 from association.verdict.models import MODELS
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
+from association.verdict.tuning import USABLE_CAUTIOUS
 
-from .calibration import TASKS
-from .curves import Fitted
-from .examples import RANGES, SEGMENTS, Example, collected, world_cases
-from .full_path import Answered, answered, veto_rows
+from .curves import Answers
+from .examples import RANGES, SEGMENTS, Example, collected
+from .full_path import Answered, answered, by_model, veto_rows
 from .reliability import print_bins
 from .table import print_table
 
 
 def verdicts(form: str, examples: Sequence[Example]) -> Answered:
     """Return the verdicts on answers by the present models, as the product gives them."""
-    likely, careful = (
-        Fitted(MODELS[task.name], ALTERNATIVE_TEMPERATURE).probabilities(examples) for task in TASKS[form]
-    )
-    return answered(examples, likely, careful, USABLE_CAUTIOUS, MODELS[TASKS[form][-1].name])
+    return answered(examples, by_model(MODELS[form], Answers.of(examples)), USABLE_CAUTIOUS)
 
 
 def print_verdicts(form: str, examples: Sequence[Example]) -> None:
@@ -57,8 +53,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep answers there, and read those that are")
     args = parser.parse_args()
     for form in (RANGES, SEGMENTS):
-        path = None if args.keep is None else args.keep / f"{form}.pickle"
-        print_verdicts(form, collected(path, world_cases(form, args.stride, kept_for_report=True)))
+        print_verdicts(form, collected(args.keep, form, args.stride, kept_for_report=True))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from .locate import NearOptions, SearchChoice, request_body
 from .options import AsJson, MapArgument, ScanArgument, grouped
 from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
 
-TITLES = {"probability_of_pose": "Scans of this map", "cautious": "Out-of-map scans included"}
 MOST_ALTERNATIVES = 10  # that people read; --json has all
 
 
@@ -18,7 +17,8 @@ def explain(
 ) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
-    The answer is that of linefix locate. It is usable if both probabilities reach their thresholds and no veto applies.
+    The answer is that of linefix locate. It is usable if the cautious probability reaches its threshold and no veto
+    applies.
     """
     from . import here
 
@@ -39,8 +39,7 @@ def explain(
 def _print_verdict(one: Json) -> None:
     """Print a verdict, part by part."""
     if one["features"] is not None:
-        for name, title in TITLES.items():
-            _print_model(title, one["models"][name])
+        _print_model(one["model"])
         _print_taken(one["taken"])
         _print_alternatives(one)
         _print_null(one["null"])
@@ -52,17 +51,20 @@ def _print_verdict(one: Json) -> None:
     _print_probabilities(one)
 
 
-def _print_model(title: str, model: Json) -> None:
-    """Print the terms of a model, next to those of a usual right answer."""
-    print(f"\n{title}: contributions to the log odds, nats")
+def _print_model(model: Json) -> None:
+    """Print the terms of the model, next to those of a usual right answer."""
+    print("\nContributions to the log odds, nats")
     rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in model["contributions"]]
     rows.append(("sum", None, model["log_odds"], sum(term["usual"] for term in model["contributions"])))
     print_table(("feature", "value", "contribution", "usual"), rows)
-    print(f"probability by the model: {model['probability']:.4f}")
+    print(
+        f"probability by the model: {model['probability']:.4f}; if the robot is known to be on this map, with "
+        f"{model['on_map']:.3f} nats more: {model['probability_on_map']:.4f}"
+    )
 
 
 def _print_taken(taken: Json) -> None:
-    print("\nDecrease of the log odds by reason, nats (out-of-map scans included)")
+    print("\nDecrease of the log odds by reason, nats")
     print_table(("reason", "nats"), list(taken.items()))
 
 
@@ -79,8 +81,8 @@ def _print_alternatives(one: Json) -> None:
     loose = among["with_loose_walls"]
     compared = "not compared" if loose is None else f"{loose:.4f}"
     print(
-        f"probability among them: {among['as_scored']:.4f}; by what the scan shows: {among['by_shown']:.4f}; "
-        f"with walls off by more: {compared}"
+        f"probability among them as scored: {among['as_scored']:.4f}; by what the scan shows: {among['by_shown']:.4f}; "
+        f"with walls off by more: {compared}; geometric mean: {among['mean']:.4f}"
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from association import AnswerExplanation, AssociationOptions, Deadline, MapIndex, Prior, Scan, explain_verdict
-from association.verdict_explanation import ExplainedModel, VerdictExplanation
+from association.verdict_explanation import VerdictExplanation
 from registration import Segments
 from vectorization import LaserScan
 
@@ -58,7 +58,7 @@ def explain(
     >>> verdict = linefix.explain(room + other, seen).verdict
     >>> verdict.usable, [reason.code for reason in verdict.reasons]
     (False, ['similar_place'])
-    >>> len(verdict.alternatives), round(verdict.among_as_scored, 3)
+    >>> len(verdict.alternatives), round(verdict.among.mean, 3)
     (1, 0.5)
     """
     index, how = prepared(map, options)
@@ -80,26 +80,16 @@ def _verdict_json(one: VerdictExplanation) -> Json:
         "reasons": [{"code": reason.code, "message": reason.message} for reason in one.reasons],
         "vetoes": [{**asdict(veto), "origin": str(veto.origin)} for veto in one.vetoes],
         "features": None if one.features is None else dict(one.features),
-        "models": None
-        if one.usual is None or one.cautious_model is None
-        else {"probability_of_pose": _model_json(one.usual), "cautious": _model_json(one.cautious_model)},
+        "model": None if one.model is None else asdict(one.model),
         "taken": None if one.taken is None else dict(one.taken),
         "alternatives": [
             {"pose": pose_json(other.pose), "gap": other.gap, "counted": other.counted, "weight": other.weight}
             for other in one.alternatives
         ],
-        "among_alternatives": {
-            "as_scored": one.among_as_scored,
-            "by_shown": one.among_by_shown,
-            "with_loose_walls": one.among_with_loose_walls,
-        },
+        "among_alternatives": None if one.among is None else {**asdict(one.among), "mean": one.among.mean},
         "null": None if one.null is None else asdict(one.null),
         "probability_of_pose": one.probability_of_pose,
         "cautious": one.cautious,
         "explained": one.explained,
         "thresholds": None if one.thresholds is None else dict(one.thresholds),
     }
-
-
-def _model_json(model: ExplainedModel) -> Json:
-    return asdict(model)

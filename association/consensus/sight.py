@@ -25,7 +25,7 @@ from .tuning import NEUTRAL
 class BeamFractions:
     """Fractions of the beams that do not read what the map shows.
 
-    Of all beams; both 0 without beams.
+    Of all beams; 0 without beams.
 
     Attributes
     ----------
@@ -33,6 +33,10 @@ class BeamFractions:
         That read farther than the wall before them: it is not there, or the robot is not.
     nearer : float
         That read nearer: something stands before the wall.
+    passed : float
+        That passed through a wall; those that end shortly behind it count in part.
+    unmapped : float
+        That have a return where the map shows nothing, neither before it nor behind it.
     in_step : float
         Mean fraction of an exact view's beams that read the map's walls, over that of all views; 1 if no view is
         uncertain. If it is low, the other views may be placed well, and the scan's frame not.
@@ -40,6 +44,8 @@ class BeamFractions:
 
     farther: float = 0.0
     nearer: float = 0.0
+    passed: float = 0.0
+    unmapped: float = 0.0
     in_step: float = 1.0
 
 
@@ -77,10 +83,10 @@ def compare_beams(context: SearchContext, estimated: EstimatedPose) -> BeamFract
         return NO_BEAMS
     pose, index = estimated.pose, context.index
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
-    farther, nearer = beam_fractions(
+    fractions = beam_fractions(
         rays_of(context, COMPARED_BEAMS), at, index.tables.place, index.obstacles, context.workspace
     )
-    return BeamFractions(farther, nearer, _in_step(context, at))
+    return BeamFractions(*fractions, _in_step(context, at))
 
 
 def _in_step(context: SearchContext, at: Records) -> float:

@@ -11,6 +11,10 @@ Alternatives are compared three times.
   centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.
   The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A
   misfit of centimetres is therefore no evidence against a place.
+
+None of the three is right for every map. Their geometric mean, a mean of their logarithms, agrees best with how often
+answers are right; it leaves places that are equal in all three the same probability. The least of the three decides
+whether an answer is usable: one thing that may have been moved, or centimetres, are not to decide alone.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from registration.layout import Floats, Records
+from registration.values import value
 
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score_again
@@ -33,10 +38,10 @@ from .inconsistencies import absences
 from .kernels import alternatives as kernels
 from .tuning import (
     ABSENCE,
-    ALTERNATIVE_TEMPERATURE,
+    COMPARISON_WEIGHTS,
     LOOSE_ALTERNATIVES,
-    LOOSE_BEAMS,
     LOOSE_FACTOR,
+    LOOSE_TEMPERATURE,
     NO_ALTERNATIVE,
 )
 
@@ -70,7 +75,60 @@ def probability_by_shown(context: SearchContext, best: ConsensusSet, others: Seq
     near = (behind + np.minimum(rest, limits) < NO_ALTERNATIVE + ABSENCE) & (rest > limits)
     limits[near] = np.maximum(ABSENCE, absences(context, best, [others[k] for k in np.flatnonzero(near).tolist()]))
     behind += np.minimum(rest, limits)
-    return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind) / ALTERNATIVE_TEMPERATURE).sum()))
+    return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind)).sum()))
+
+
+@value(frozen=True, slots=True)
+class AmongAlternatives:
+    """The probability of the best explanation among its alternatives, by three comparisons, above 0 and up to 1.
+
+    Attributes
+    ----------
+    as_scored : float
+    by_shown : float
+        Things that the scan does not show count little.
+    with_loose_walls : float or None
+        Walls may be off by more; None on an exact map, and after the deadline.
+    """
+
+    as_scored: float
+    by_shown: float
+    with_loose_walls: float | None
+
+    @property
+    def made(self) -> tuple[float, ...]:
+        """The comparisons that were made."""
+        two = self.as_scored, self.by_shown
+        return two if self.with_loose_walls is None else (*two, self.with_loose_walls)
+
+    @property
+    def mean(self) -> float:
+        """Their geometric mean by `COMPARISON_WEIGHTS`."""
+        weights = COMPARISON_WEIGHTS[: len(self.made)]
+        nats = sum(weight * math.log(one) for weight, one in zip(weights, self.made, strict=True))
+        return math.exp(nats / sum(weights))
+
+    @property
+    def least(self) -> float:
+        """The least of them."""
+        return min(self.made)
+
+
+def compare_three_ways(
+    context: SearchContext, answer: Answer, others: Sequence[ConsensusSet], alternatives: Records
+) -> AmongAlternatives:
+    """Compare an answer with its alternatives, (k,) of `ALTERNATIVE`, in all three ways.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    return AmongAlternatives(
+        probability_among(alternatives),
+        probability_by_shown(context, answer.best, others),
+        probability_with_loose_walls(context, answer, others),
+    )
 
 
 def _shown(one: ConsensusSet) -> float:
@@ -78,10 +136,12 @@ def _shown(one: ConsensusSet) -> float:
     return float(np.maximum(0.0, one.matches["score"]).sum()) + one.posterior - one.score
 
 
-def probability_with_loose_walls(context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]) -> float:
+def probability_with_loose_walls(
+    context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]
+) -> float | None:
     """Return the probability of the best explanation among the next ones where walls may be off by more, up to 1.
 
-    1 where the map is declared to be exact to `LEAST_OFF_WALLS`, and without alternatives.
+    None where the map is declared to be exact to `LEAST_OFF_WALLS`, and after the deadline.
 
     Raises
     ------
@@ -89,7 +149,9 @@ def probability_with_loose_walls(context: SearchContext, answer: Answer, others:
         When the deadline was cancelled.
     """
     declared = context.index.sigma
-    if not others or (declared is not None and declared < LEAST_OFF_WALLS):
+    if context.deadline.passed or (declared is not None and declared < LEAST_OFF_WALLS):
+        return None
+    if not others:
         return 1.0
     if declared is None:
         sigma = _loose_sigma(answer.estimated.wall_sigma)
@@ -110,9 +172,9 @@ def _loose_sigma(wall_sigma: float) -> float:
 def _probability_of_first(explanations: Sequence[ConsensusSet], scores: Floats) -> float:
     """Return the probability of the first explanation among all, from the present scores of their segments, (k,) nats.
 
-    The prior counts in full; the beams' part, which depends on centimetres, counts by `LOOSE_BEAMS`.
+    The prior counts in full. Beams do not count: which of them read a wall depends on the centimetres that are left
+    open.
     """
-    prior_and_beams = [one.posterior - one.score + LOOSE_BEAMS * (one.score - one.by_segments) for one in explanations]
-    posteriors = scores + np.array(prior_and_beams)
-    others = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / ALTERNATIVE_TEMPERATURE)
+    posteriors = scores + np.array([one.posterior - one.score for one in explanations])
+    others = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / LOOSE_TEMPERATURE)
     return 1.0 / (1.0 + float(others.sum()))

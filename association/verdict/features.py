@@ -41,8 +41,11 @@ class Features(NamedTuple):
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`; of a drive
         the mean over its views
     agreement : fraction of directions in which the scan shows what the map does
-    read, passed : fractions of the beams that read the wall they should, and that passed through one; 0 without beams
+    read : fraction of the beams that read the wall they should; 0 without beams
+    root_passed : root of the fraction that passed through a wall, short walls less, as in the score
     root_farther, root_nearer : roots of the fractions of the beams that read farther, and nearer, than the map shows
+    root_passed_any : root of the fraction of the beams that passed through a wall, however short
+    root_unmapped : root of the fraction of the beams that end where the map shows nothing
     critical_displacement : how far the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
     critical_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
     log_significance : log10 of the significance, from `LEAST_LOG_SIGNIFICANCE`
@@ -57,6 +60,7 @@ class Features(NamedTuple):
     beyond_nearly_all : fraction of the length beyond `NEARLY_ALL`
     root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive
         that of the mean over its views
+    root_unmatched_walls : likewise of segments that are as long as walls, in part from the first of `LIKE_WALLS` on
     squared_solitude : square of `solitude`
     """
 
@@ -72,9 +76,11 @@ class Features(NamedTuple):
     longest_unmatched: float
     agreement: float
     read: float
-    passed: float
+    root_passed: float
     root_farther: float
     root_nearer: float
+    root_passed_any: float
+    root_unmapped: float
     critical_displacement: float
     critical_deviation: float
     log_significance: float
@@ -87,6 +93,7 @@ class Features(NamedTuple):
     misfit_of_many: float
     beyond_nearly_all: float
     root_unmatched: float
+    root_unmatched_walls: float
     squared_solitude: float
 
 
@@ -123,7 +130,29 @@ def describe_answer(context: SearchContext, explanations: Explanations, answer: 
     best, others = answer.best, tuple(explanations.alternatives)
     alternatives, facts = compare_alternatives(best, others), facts_of(context, answer)
     few_walls = depends_on_one_wall(context, answer, facts)
-    return Description(answer, others, alternatives, describe(best, facts, alternatives), few_walls)
+    features = describe(scores_of(context, best), best.posterior, facts, alternatives)
+    return Description(answer, others, alternatives, features, few_walls)
+
+
+def scores_of(context: SearchContext, best: ConsensusSet) -> Records:
+    """Return the scores of the best explanation, (1,) of `SET_SCORE`.
+
+    The models were fitted to scans from one place. Of a drive, the matched length is that of its mean view, and the
+    lines of sight that are blocked are counted for each view: both grow with the way.
+    """
+    scores, views = np.array([best.scores], SET_SCORE), context.scan.views
+    if views is not None and views.uncertain:
+        seen = context.lines.sightings
+        scores["length"] = _of_mean_view(context, seen[best.matched[seen["row"]]])
+        scores["blocked"] /= len(views)
+    return scores
+
+
+def _of_mean_view(context: SearchContext, seen: Records) -> float:
+    """Return the length of some sightings, (k,) of `SIGHTING`, in the mean view of a drive, metres."""
+    views = context.scan.views
+    assert views is not None
+    return float(np.bincount(seen["sensor"], seen["length"], len(views)) @ views.weights / views.weights.sum())
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:
@@ -134,6 +163,8 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
         agreement=answer.agreement,
         farther=answer.beams.farther,
         nearer=answer.beams.nearer,
+        passed=answer.beams.passed,
+        unmapped=answer.beams.unmapped,
         significance=answer.significance,
     )
     kernels.measure_leverages(answer.estimated.leverages, facts)
@@ -145,11 +176,13 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
     # what is matched.
     seen = context.lines.sightings
     seen = seen[~answer.best.matched[seen["row"]]]
-    longest, sums = np.zeros((2, len(views)))
+    longest = np.zeros(len(views))
     np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
-    np.add.at(sums, seen["sensor"], seen["length"])
-    fractions = views.weights / views.weights.sum()
-    facts["longest"], facts["unmatched"] = longest @ fractions, sums @ fractions
+    facts["longest"] = longest @ views.weights / views.weights.sum()
+    facts["unmatched"] = _of_mean_view(context, seen)
+    like_walls = seen.copy()
+    like_walls["length"] *= [kernels.like_wall(length) for length in seen["length"]]
+    facts["unmatched_walls"] = _of_mean_view(context, like_walls)
     return facts
 
 
@@ -158,13 +191,14 @@ def depends_on_one_wall(context: SearchContext, answer: Answer, facts: Records) 
     return bool(kernels.depends_on_one_wall(facts, answer.best.matches, context.with_beams))
 
 
-def describe(best: ConsensusSet, facts: Records, alternatives: Records) -> Records:
+def describe(scores: Records, posterior: float, facts: Records, alternatives: Records) -> Records:
     """Return the features of an answer among its alternatives, with the least null score there is, (1,) of `FEATURES`.
 
-    `facts` (1,) of `FACTS`, `alternatives` (k,) of `ALTERNATIVE`.
+    `scores` (1,) of `SET_SCORE`, its `posterior` in nats, `facts` (1,) of `FACTS`, `alternatives` (k,) of
+    `ALTERNATIVE`.
     """
-    features, scores = np.zeros(1, FEATURES), np.array([best.scores], SET_SCORE)
-    kernels.describe(scores, best.posterior, facts, alternatives, features)
+    features = np.zeros(1, FEATURES)
+    kernels.describe(scores, posterior, facts, alternatives, features)
     return features
 
 

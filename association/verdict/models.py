@@ -19,6 +19,7 @@ from .kernels.odds import log_odds
 
 FILE = "models.json"
 LEAST, MOST = "least", "most"  # kinds of pairs
+ON_MAP = "on_map"
 
 Floats = NDArray[np.float64]
 
@@ -89,10 +90,14 @@ class Model:
     curves : mapping
         By the name of the feature, of `Features`.
     pairs : tuple of Pair
+    on_map : float
+        Added to the logarithm of the odds where the robot is known to be on the map, nats. The rest of the model
+        includes out-of-map scans.
     """
 
     curves: Mapping[str, Curve]
     pairs: tuple[Pair, ...] = ()
+    on_map: float = 0.0
 
     def logit(self, features: Features | Floats) -> float:
         """Return the logarithm of the odds; for several models an array (n,) of the features is faster."""
@@ -131,17 +136,19 @@ def as_model(document: Mapping[str, Sequence[float]]) -> Model:
 
     An entry of a feature has its slope, then the value and the change of slope of each bend in turn. The key of a pair
     is its kind and the names of both. Its entry has its term, then for each feature the values at which it begins to
-    count and at which it counts in full.
+    count and at which it counts in full. The entry `ON_MAP` has what is added on a map that is known.
     """
-    curves, pairs = {}, []
+    curves, pairs, on_map = {}, [], 0.0
     for key, (first, *rest) in document.items():
-        if " " in key:
+        if key == ON_MAP:
+            on_map = first
+        elif " " in key:
             kind, one, other = key.split(" ")
             start, end, begin, finish = rest
             pairs.append(Pair(kind, one, other, first, ((start, end), (begin, finish))))
         else:
             curves[key] = Curve(first, tuple(zip(rest[::2], rest[1::2], strict=True)))
-    return Model(curves, tuple(pairs))
+    return Model(curves, tuple(pairs), on_map)
 
 
 def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
@@ -150,7 +157,6 @@ def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     return models, document["manifest"], Features(**document["usual"])
 
 
-# "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
-# included; each also "_with_beams". Their manifest, see `benchmarks.manifest`, and the medians of the features of right
-# answers.
+# By the form of the scan, "segments" or "ranges". Their manifest, see `benchmarks.manifest`, and the medians of the
+# features of right answers.
 MODELS, MANIFEST, USUAL = _read()

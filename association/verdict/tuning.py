@@ -2,18 +2,23 @@
 
 import math
 
+# --- Alternatives: compared in three ways -----------------------------------------------------------------------------
+
+# Weights of the comparisons in the probability: as scored, by what the scan shows, with walls off by more.
+COMPARISON_WEIGHTS = (0.8, 0.1, 0.1)  # cross-validated
+
 # --- Alternatives: compared again with walls off by more --------------------------------------------------------------
 
-# Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least,
-LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
-LOOSE_BEAMS = 0.5  # tables; and with that fraction of the beams' part, which depends on centimetres
+# Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least, and
+LOOSE_FACTOR = 4.0  # tables; times as much as they seem to be: of many similar places the one that fits best shows less
+LOOSE_TEMPERATURE = 1.5  # nats, tables; how far apart two places score that are as likely as one to e then
 LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 
 # --- Alternatives: compared again by what the scan shows --------------------------------------------------------------
 
 # The most that each thing counts which an alternative has and the scan does not show, tables: it was moved away, with a
-# probability of 1 in 55.
-ABSENCE = 4.0  # nats
+# probability of 1 in 8.
+ABSENCE = 2.0  # nats
 LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
@@ -43,6 +48,7 @@ MANY = 8  # matched segments, tables; from which on the misfit says as much as i
 NEARLY_ALL = 0.85  # of the scan's length, tables
 LONGEST_UNMATCHED = 4.0  # m, tables; a longer segment
 MOST_UNMATCHED = 4.0 * LONGEST_UNMATCHED  # m, tables; and more clutter say no more
+LIKE_WALLS = (0.8, 1.6)  # m, tables; scan lines of that length begin to count as walls, and count in full
 MAX_LEAD = 40.0  # nats, tables
 MOST_DEVIATION = 1.0  # m, tables
 UNCOUNTED_FRACTION = 0.3  # of the best value, tables; worse alternatives do not count: the search finds them by chance
@@ -56,9 +62,7 @@ UNLIKE_SYMMETRY, SYMMETRIC = (
     0.95,
 )  # tables; fractions between which a map comes to count as symmetric about a place
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
-ALTERNATIVE_TEMPERATURE = 1.5  # nats, fitted; how far apart two explanations score that are as likely as one to e
-USABLE_PROBABILITY = 0.94  # cross-validated
-USABLE_CAUTIOUS = 0.9  # cross-validated, with and without raw beams; of the same, where other buildings are included
+USABLE_CAUTIOUS = 0.9  # cross-validated, with and without raw beams; out-of-map scans are included
 # The same of views that are not exact: the models were fitted to scans from one place. Of drives of 5 m through sister
 # buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.
 USABLE_CAUTIOUS_DRIVE = 0.95

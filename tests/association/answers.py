@@ -19,7 +19,7 @@ from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.layout import LEVERAGE, MATCH
 from association.verdict.alternatives import compare_alternatives
-from association.verdict.features import Features, describe, facts_of
+from association.verdict.features import Features, describe, facts_of, scores_of
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -171,4 +171,5 @@ def explanations_of(answer: Answer | None, *others: ConsensusSet, complete: bool
 
 def features_of(context: SearchContext, answer: Answer, rivals: Sequence[ConsensusSet] = ()) -> Features:
     alternatives = compare_alternatives(answer.best, rivals)
-    return Features(*describe(answer.best, facts_of(context, answer), alternatives).item())
+    scores, facts = scores_of(context, answer.best), facts_of(context, answer)
+    return Features(*describe(scores, answer.best.posterior, facts, alternatives).item())

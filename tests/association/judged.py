@@ -37,26 +37,18 @@ SOFT = SoftPrior(INSIDE, np.eye(3))
 
 USUAL_DEVIATION = 0.03
 
-# Of every kind of feature some; of one answer each of the four says something else.
+# Of every kind of feature some; of one answer each of the two says something else.
 PLAIN: dict[str, dict[str, list[float]]] = {
-    "probability": {
-        "constant": [-5.0], "lead": [0.25, 20.0, -0.15], "solitude": [0.1], "inlier_fraction": [4.0],
-        "agreement": [3.0],
-        "deviation": [-6.0], "misfit": [-0.5, 1.0, -1.0],
-    },
-    "cautious": {
-        "constant": [-6.0], "lead": [0.1], "inlier_fraction": [5.0, 0.85, -4.0], "root_count": [0.6],
+    "segments": {
+        "constant": [-6.0], "lead": [0.1, 20.0, -0.05], "solitude": [0.02], "inlier_fraction": [5.0, 0.85, -4.0],
+        "root_count": [0.6],
         "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "log_significance": [-0.1],
         "critical_displacement": [-1.0], "null": [-1.0, 0.8, -6.0],
-        "null_gap": [0.05], "null_better": [-3.0],
+        "null_gap": [0.05], "null_better": [-3.0], "on_map": [1.0],
     },
-    "probability_with_beams": {
-        "constant": [-2.0], "lead": [0.2], "inlier_fraction": [3.0], "deviation": [-4.0], "read": [2.0],
-        "passed": [-20.0],
-    },
-    "cautious_with_beams": {
+    "ranges": {
         "constant": [-6.0], "lead": [0.1, 30.0, -0.1], "inlier_fraction": [6.0], "root_score": [0.3], "read": [6.0],
-        "passed": [-30.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0],
+        "root_passed": [-8.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0], "on_map": [1.5],
     },
 }  # fmt: skip
 
@@ -65,14 +57,14 @@ PLAIN: dict[str, dict[str, list[float]]] = {
 def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Iterator[None]:
     """Let these models decide, and these bars in place of those of `association.verdict`.
 
-    Without the second look at the alternatives, which scores them again: these are made by hand.
+    Without the comparison with loose walls, which scores alternatives again: these are made by hand.
     """
     usual = USUAL._replace(deviation=USUAL_DEVIATION)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(probabilities, "MODELS", {name: as_model(curves) for name, curves in models.items()})
         for module in (probabilities, reasons):
             patch.setattr(module, "USUAL", usual)
-        patch.setattr(alternatives, "LOOSE_ALTERNATIVES", 0)
+        patch.setattr(alternatives, "probability_with_loose_walls", lambda *_: None)
         for name, value in bars.items():
             for module in (probabilities, verdict):
                 patch.setattr(module, name, value, raising=module is verdict and not hasattr(probabilities, name))

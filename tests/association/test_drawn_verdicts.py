@@ -51,7 +51,7 @@ def test_the_verdict_changes_where_that_of_the_twin_does() -> None:
             for side in sides:
                 assert_judged(side)
             kinds.add(kind_of(*sides))
-    decided = {f"{kind}{beams}" for kind in ("explained", "right", "careful", "null") for beams in ("", " with beams")}
+    decided = {f"{kind}{beams}" for kind in ("explained", "careful", "null") for beams in ("", " with beams")}
     assert kinds >= decided | {"deviation", "mirrored with beams"}
 
 
@@ -63,8 +63,6 @@ def kind_of(one: Drawn, other: Drawn) -> str:
         return f"explained{beams}"
     if Status.DEGENERATE in (a.status, b.status):
         return "deviation"
-    if min(a.right, b.right) < tuning.USABLE_PROBABILITY <= max(a.right, b.right):
-        return f"right{beams}"
     if a.mirrored is not b.mirrored and max(a.careful, b.careful) >= bar_of(one.context):
         return f"mirrored{beams}"
     assert min(a.careful, b.careful) < bar_of(one.context) <= max(a.careful, b.careful)

@@ -13,6 +13,7 @@ from association.context import SearchContext
 from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
 from association.rank_and_estimate import search_and_rank
 from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
+from association.verdict.alternatives import AmongAlternatives
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
 
@@ -106,7 +107,7 @@ def test_a_drive_that_speaks_against_the_pose_is_not_answered() -> None:
     context, verdict = judged(drive())
     for cautious, answered in ((AGREED_CAUTIOUS, True), (AGREED_CAUTIOUS - 1e-9, False)):
         assert verdict.probabilities is not None
-        found = replace(verdict.probabilities, by_model=cautious, among_as_scored=1.0, among_with_loose_walls=None)
+        found = replace(verdict.probabilities, by_model=cautious, among=AmongAlternatives(1.0, 1.0, None))
         assert (search_last_view(context, replace(verdict, probabilities=found)).result is not None) is answered
 
 

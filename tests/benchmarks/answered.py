@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from association.verdict.models import USUAL
 from benchmarks.examples import DRAWN, DRAWN_STRANGERS, SEGMENTS, Example
 
@@ -13,8 +11,7 @@ from benchmarks.examples import DRAWN, DRAWN_STRANGERS, SEGMENTS, Example
 def example(*, right: bool = False, stranger: bool = False, told: bool = False, **more: Any) -> Example:
     """Return a usual answer."""
     group = DRAWN_STRANGERS if stranger else DRAWN
-    gaps = counted = np.zeros(0)
     return Example(
-        SEGMENTS, group, "clean", more.pop("fold", "world"), more.pop("features", USUAL), gaps, counted, right,
+        SEGMENTS, group, "clean", more.pop("fold", "world"), more.pop("features", USUAL), right,
         more.pop("degenerate", False), told=told, **more,
     )  # fmt: skip

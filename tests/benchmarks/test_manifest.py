@@ -12,13 +12,12 @@ import pytest
 from association.verdict.features import FEATURES, Features
 from association.verdict.models import MANIFEST, MODELS, USUAL
 from benchmarks import manifest
-from benchmarks.calibration import RANGES, SEGMENTS, TASKS, write
+from benchmarks.calibration import RANGES, SEGMENTS, present_task, write
 from benchmarks.examples import Example
 from benchmarks.manifest import FORMAT, MODELS_FILE, UNKNOWN, accept, code_of, data_of, digest, manifest_of
+from benchmarks.selection import Selected
 
 from .answered import example
-
-TASK_OF = {task.name: task for tasks in TASKS.values() for task in tasks}
 
 
 def test_the_features_are_those_of_the_code_in_order() -> None:
@@ -36,12 +35,10 @@ def test_the_models_are_fitted_to_the_present_code() -> None:
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_a_model_has_the_features_and_pairs_of_its_manifest_and_of_the_command(name: str) -> None:
-    part, task, model = MANIFEST["models"][name], TASK_OF[name], MODELS[name]
-    assert set(MANIFEST["models"]) == set(MODELS) == set(TASK_OF)
+    part, task, model = MANIFEST["models"][name], present_task(name), MODELS[name]
+    assert set(MANIFEST["models"]) == set(MODELS) == {SEGMENTS, RANGES}
     assert tuple(part["features"]) == task.names == tuple(model.curves)
-    assert [tuple(pair) for pair in part["pairs"]] == list(task.pairs)
-    assert [f"{kind} {one[1:]} {other[1:]}" for kind, one, other in part["pairs"]] == [p.key for p in model.pairs]
-    assert (tuple(part["bends"]), part["weight_out_of_map"]) == (task.bends, task.strangers)
+    assert [f"{kind} {one[1:]} {other[1:]}" for kind, one, other in task.pairs] == [p.key for p in model.pairs]
 
 
 def test_nothing_is_left_out() -> None:
@@ -77,19 +74,22 @@ def test_the_digest_is_of_what_defines_the_features(tmp_path: Path, monkeypatch:
 
 def test_a_fit_writes_what_it_was_made_of(tmp_path: Path) -> None:
     examples: list[Example] = [example(right=True), example(right=False), example(stranger=True, told=True)]
-    task = TASKS[SEGMENTS][0]
-    made = manifest_of("COMMAND", {SEGMENTS: data_of(examples)}, [task], {task.name: {"log_loss": 0.1}})
+    task, metrics = present_task(SEGMENTS), {"log_loss": 0.1}
+    made = manifest_of("COMMAND", {SEGMENTS: data_of(examples)}, [(task, [Selected("lead", 0.25)], metrics)])
     write(tmp_path / "models.json", dict(MODELS), made, USUAL)
     document: Any = json.loads((tmp_path / "models.json").read_text())
     assert document["models"] == json.loads(MODELS_FILE.read_text())["models"]
     found = document["manifest"]
-    assert set(found) >= set(MANIFEST) - {"written_in"}
+    assert set(found) == set(MANIFEST)
     assert (found["command"], found["code"]["digest"], found["code"]["accepted"]) == ("COMMAND", digest(), [])
     data = found["data"][SEGMENTS]
     assert (data["scans_in_map"], data["scans_out_of_map"], data["right"]) == (2, 1, 1)
     assert len(data["answers_sha256"]) == 64
-    assert found["models"][task.name]["metrics"] == {"log_loss": 0.1}
+    assert found["models"][SEGMENTS]["metrics"] == metrics
+    assert found["models"][SEGMENTS]["selection"] == ["lead: 0.25000"]
     assert found["data"][RANGES] == MANIFEST["data"][RANGES], "what was not fitted again keeps its part"
+    again = manifest_of("COMMAND", {}, [(task, [], metrics)])
+    assert again["models"][SEGMENTS]["selection"] == MANIFEST["models"][SEGMENTS]["selection"]
 
 
 def test_other_answers_have_another_digest() -> None:

@@ -45,7 +45,7 @@ def test_the_thresholds_of_all_stages_are_found() -> None:
     root = Path(association.__file__).parents[1]
     assert files == {path.relative_to(root).with_suffix("") for path in (root / "association").rglob("tuning.py")}
     assert len(found) <= MOST
-    assert (named("MANY").compiled, named("USABLE_PROBABILITY").compiled) == (True, False)
+    assert (named("MANY").compiled, named("USABLE_CAUTIOUS").compiled) == (True, False)
     assert named("NULL_FRACTIONS").value == tuning.NULL_FRACTIONS
     assert named("UNLIKE_SYMMETRY").value == tuning.UNLIKE_SYMMETRY
 
@@ -62,7 +62,7 @@ def test_a_threshold_moves_by_a_fifth(value: float, less: float, more: float) ->
 
 
 def test_every_reader_sees_the_moved_value_and_the_former_one_afterwards() -> None:
-    one, before = named("USABLE_PROBABILITY"), tuning.USABLE_PROBABILITY
+    one, before = named("USABLE_CAUTIOUS"), tuning.USABLE_CAUTIOUS
     assert probabilities in readers(one.name)
     with moved(one, 0.5):
         assert {vars(module)[one.name] for module in (*readers(one.name), tuning)} == {0.5}
@@ -103,9 +103,7 @@ def test_a_threshold_that_decides_changes_answers_and_one_for_work_does_not() ->
 
 
 def test_a_value_that_is_not_possible_is_reported() -> None:
-    ((_, both),) = effects(
-        [in_room()], [Threshold("association.verdict.tuning", "USABLE_PROBABILITY", (0.9, 0.9), False)]
-    )
+    ((_, both),) = effects([in_room()], [Threshold("association.verdict.tuning", "USABLE_CAUTIOUS", (0.9, 0.9), False)])
     assert all(one.failed.startswith("TypeError") for one in both)
     assert in_room().answer().usable, "the former value is back"
 

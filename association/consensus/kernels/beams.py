@@ -87,10 +87,14 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, obstacles: Place, ray:
 
 
 @kernel
-def beam_fractions(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace) -> tuple[float, float]:
-    """Return the fractions of the beams that read farther, and nearer, than the map shows from the first pose.
+def beam_fractions(
+    rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace
+) -> tuple[float, float, float, float]:
+    """Return the fractions of the beams that do not read what the map shows from the first pose, (1,).
 
-    Beams without a return, and beams for which the map shows nothing, are not compared. `poses` (1,).
+    These are the fractions that read farther, and nearer; that passed through a wall or a point, which a beam does in
+    full at twice `NEAR` behind it, and not at all at `NEAR`; and that have a return where the map shows nothing. Beams
+    without a return are not compared.
     """
     beams = rays.beams
     pose = poses[0]
@@ -99,6 +103,8 @@ def beam_fractions(rays: Rays, poses: Records, place: Place, obstacles: Place, w
     s = math.sin(pose.theta)
     farther = 0
     nearer = 0
+    passed = 0.0
+    unmapped = 0
     for i in range(len(beams)):
         if math.isinf(beams[i].range):
             continue
@@ -106,13 +112,15 @@ def beam_fractions(rays: Rays, poses: Records, place: Place, obstacles: Place, w
         ray.limit = min(rays.reach, beams[i].range + WALL_BEHIND)
         across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
+            unmapped += 1
             continue
+        passed += min(1.0, max(0.0, across / NEAR - 1.0))
         if across > FARTHER_BY and w < len(place.walls):
             farther += 1
         elif across < -NEAR:
             nearer += 1
     n = max(1, len(beams))
-    return farther / n, nearer / n
+    return farther / n, nearer / n, passed / n, unmapped / n
 
 
 @kernel

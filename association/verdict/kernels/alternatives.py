@@ -7,7 +7,7 @@ from registration.layout import Record, Records
 
 from ...consensus.tuning import USUAL_WALLS
 from ...tuning import RIVAL_SHARE
-from ..tuning import ALTERNATIVE_TEMPERATURE, UNCOUNTED_FRACTION
+from ..tuning import UNCOUNTED_FRACTION
 from .odds import fraction_between
 
 
@@ -55,4 +55,4 @@ def tempered_evidence(alternatives: Records, temperature: float) -> float:
 @kernel
 def probability_among(alternatives: Records) -> float:
     """Return the probability of the best explanation among those that are about as good, above 0 and up to 1."""
-    return 1.0 / (1.0 + tempered_evidence(alternatives, ALTERNATIVE_TEMPERATURE))
+    return 1.0 / (1.0 + tempered_evidence(alternatives, 1.0))

@@ -14,6 +14,7 @@ from ..tuning import (
     LEAST_CROWD,
     LEAST_LOG_SIGNIFICANCE,
     LEAST_MISFIT,
+    LIKE_WALLS,
     LONGEST_UNMATCHED,
     MANY,
     MAX_LEAD,
@@ -55,9 +56,11 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.longest_unmatched = min(fact.longest, LONGEST_UNMATCHED)
     out.agreement = fact.agreement
     out.read = best.read
-    out.passed = best.passed
+    out.root_passed = math.sqrt(best.passed)
     out.root_farther = math.sqrt(fact.farther)
     out.root_nearer = math.sqrt(fact.nearer)
+    out.root_passed_any = math.sqrt(fact.passed)
+    out.root_unmapped = math.sqrt(fact.unmapped)
     out.critical_displacement = min(fact.critical_displacement, MOST_DEVIATION)
     out.critical_deviation = min(fact.critical_deviation, MOST_DEVIATION)
     out.log_significance = max(LEAST_LOG_SIGNIFICANCE, math.log10(fact.significance))
@@ -70,6 +73,7 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.misfit_of_many = misfit * min(best.count, MANY) / MANY
     out.beyond_nearly_all = max(0.0, best.fraction - NEARLY_ALL)
     out.root_unmatched = math.sqrt(min(fact.unmatched, MOST_UNMATCHED))
+    out.root_unmatched_walls = math.sqrt(min(fact.unmatched_walls, MOST_UNMATCHED))
     out.squared_solitude = crowd * crowd
 
 
@@ -81,14 +85,25 @@ def by_segments(best: Record) -> float:
 
 @kernel
 def measure_unmatched(scan: Records, matches: Records, facts: Records) -> None:
-    """Write to `facts` (1,) how long the longest scan line that is not matched is, and all of them together, metres."""
+    """Write the lengths of the scan lines that are not matched, metres, to `facts` (1,).
+
+    These are the longest; all of them together; and together those that are as long as walls.
+    """
     fact = facts[0]
     fact.longest = 0.0
     fact.unmatched = 0.0
+    fact.unmatched_walls = 0.0
     for i in range(len(scan)):
         left = (1.0 - part_of_match(matches[i])) * scan[i].length
         fact.longest = max(fact.longest, left)
         fact.unmatched += left
+        fact.unmatched_walls += left * like_wall(scan[i].length)
+
+
+@kernel
+def like_wall(length: float) -> float:
+    """Return how far a scan line of a length, metres, counts as one of a wall, 0 to 1: furniture is shorter."""
+    return min(1.0, max(0.0, (length - LIKE_WALLS[0]) / (LIKE_WALLS[1] - LIKE_WALLS[0])))
 
 
 @kernel

@@ -41,9 +41,9 @@ def logistic(logit: float) -> float:
 
 
 @kernel
-def probability(odds: Odds, features: Records) -> float:
-    """Return the probability that a model sees in features, (1,) of `FEATURES`."""
-    return logistic(log_odds(odds, features.view(np.float64)))
+def probability(odds: Odds, features: Records, more: float) -> float:
+    """Return the probability by a model of features, (1,) of `FEATURES`, and by `more` nats in its log odds."""
+    return logistic(log_odds(odds, features.view(np.float64)) + more)
 
 
 @kernel

@@ -14,8 +14,7 @@ from association.consensus.tuning import BEAMS_PASSED, BEAMS_READ, CONTRADICTION
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.tuning import RIVAL_SHARE
-from association.verdict import tuning
-from association.verdict.alternatives import probability_with_loose_walls
+from association.verdict import alternatives, tuning
 from association.verdict.chance import NullScore, find_null_score
 from association.verdict.inconsistencies import absences
 from registration.kernels import MAX_DEVIATION
@@ -51,9 +50,9 @@ def evidence(answer: Answer, rivals: list[ConsensusSet], temperature: float) -> 
     return total
 
 
-def shared(context: SearchContext, answer: Answer, rivals: list[ConsensusSet]) -> float:
-    """Return the probability of the answer among the others: as scored, or by what the scan shows if that is less."""
-    as_scored = 1.0 / (1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE))
+def shared(context: SearchContext, answer: Answer, rivals: list[ConsensusSet]) -> tuple[float, float]:
+    """Compare as scored, by what is shown, and with loose walls: geometric mean and least of the probabilities."""
+    as_scored = 1.0 / (1.0 + evidence(answer, rivals, 1.0))
     total = 0.0
     for rival in rivals:
         by_matches = sum(max(0.0, float(a)) for a in answer.best.matches["score"])
@@ -61,8 +60,11 @@ def shared(context: SearchContext, answer: Answer, rivals: list[ConsensusSet]) -
         by_prior = (answer.best.posterior - answer.best.score) - (rival.posterior - rival.score)
         rest = (answer.best.score - rival.score) - by_matches
         limit = max(tuning.ABSENCE, float(absences(context, answer.best, [rival])[0]))
-        total += math.exp(-max(0.0, by_matches + by_prior + min(limit, rest)) / tuning.ALTERNATIVE_TEMPERATURE)
-    return min(as_scored, 1.0 / (1.0 + total))
+        total += math.exp(-max(0.0, by_matches + by_prior + min(limit, rest)))
+    loose = alternatives.probability_with_loose_walls(context, answer, rivals)
+    compared = [as_scored, 1.0 / (1.0 + total), *([] if loose is None else [loose])]
+    weights = tuning.COMPARISON_WEIGHTS[: len(compared)]
+    return float(np.exp(np.average(np.log(compared), weights=weights))), min(compared)
 
 
 def root(x: float) -> float:
@@ -102,9 +104,11 @@ def features(
         "longest_unmatched": min(max([0.0, *clutter]), tuning.LONGEST_UNMATCHED),
         "agreement": answer.agreement,
         "read": best.read,
-        "passed": best.passed,
+        "root_passed": best.passed**0.5,
         "root_farther": answer.beams.farther**0.5,
         "root_nearer": answer.beams.nearer**0.5,
+        "root_passed_any": answer.beams.passed**0.5,
+        "root_unmapped": answer.beams.unmapped**0.5,
         "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),
         "critical_deviation": min(max([0.0, *(one[2] for one in leverages)]), tuning.MOST_DEVIATION),
         "log_significance": max(tuning.LEAST_LOG_SIGNIFICANCE, math.log10(answer.significance)),
@@ -117,6 +121,10 @@ def features(
         "misfit_of_many": misfit * min(1.0, count / tuning.MANY),
         "beyond_nearly_all": max(0.0, best.fraction - tuning.NEARLY_ALL),
         "root_unmatched": min(sum(clutter), tuning.MOST_UNMATCHED) ** 0.5,
+        "root_unmatched_walls": min(
+            sum(clutter * np.interp(clutter, tuning.LIKE_WALLS, (0.0, 1.0))), tuning.MOST_UNMATCHED
+        )
+        ** 0.5,
         "squared_solitude": math.log(crowd) ** 2,
     }
 
@@ -125,6 +133,8 @@ def logit(model: Document, numbers: Numbers) -> float:
     """Add up the curves: a line from 0 to the value, steeper or less steep beyond each bend. Then the pairs."""
     total = 0.0
     for name, (slope, *bends) in model.items():
+        if name == "on_map":
+            continue
         if " " in name:
             kind, *both = name.split()
             ends = [bends[:2], bends[2:]]
@@ -191,17 +201,14 @@ def judge(
     ):
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
-    likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
+    likely = not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
-        share = shared(context, answer, rivals)
-        less = min(1.0, probability_with_loose_walls(context, answer, rivals) / share)
-        chances = replace(chances, right=less * chances.right, careful=less * chances.careful)
-        if chances.careful >= bar_of(context):
-            numbers = features(context, answer, rivals, find_null_score(context, best))
-            careful = logistic(logit(cautious_of(context, models), numbers))
-            better = numbers["null_better"] >= tuning.MIRRORED_BETTER
-            chances = replace(chances, careful=less * share * careful, asked=True, mirrored=better)
-        likely = likely and chances.right >= tuning.USABLE_PROBABILITY and not chances.mirrored
+        numbers = features(context, answer, rivals, find_null_score(context, best))
+        careful = logistic(logit(model_of(context, models), numbers))
+        better = numbers["null_better"] >= tuning.MIRRORED_BETTER
+        _, least = shared(context, answer, rivals)
+        chances = replace(chances, careful=least * careful, asked=True, mirrored=better)
+        likely = not chances.mirrored
     status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
     if free:
         status = Status.DEGENERATE
@@ -226,8 +233,8 @@ def judge(
     )
 
 
-def cautious_of(context: SearchContext, models: Mapping[str, Document]) -> Document:
-    return models["cautious" if context.scan.beams is None else "cautious_with_beams"]
+def model_of(context: SearchContext, models: Mapping[str, Document]) -> Document:
+    return models["segments" if context.scan.beams is None else "ranges"]
 
 
 def _chances(
@@ -237,9 +244,9 @@ def _chances(
     answer = explanations.answer
     assert answer is not None
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]
-    numbers, cautious = features(context, answer, rivals), cautious_of(context, models)
-    usual = models["probability" if context.scan.beams is None else "probability_with_beams"]
-    share = shared(context, answer, rivals)
+    numbers, model = features(context, answer, rivals), model_of(context, models)
+    (on_map,) = model["on_map"]
+    mean, least = shared(context, answer, rivals)
     return Judged(
         Status.NO_MATCH,
         False,
@@ -247,7 +254,7 @@ def _chances(
         False,
         None,
         None,
-        right=logistic(logit(usual, numbers)) * share,
-        careful=logistic(logit(cautious, numbers)) * share,
-        explained=logistic(logit(cautious, {**numbers, "deviation": usual_deviation})),
+        right=logistic(logit(model, numbers) + on_map) * mean,
+        careful=logistic(logit(model, numbers)) * least,
+        explained=logistic(logit(model, {**numbers, "deviation": usual_deviation})),
     )

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from association import AssociationResult
+from association import AssociationResult, Deadline
 from association.consensus.consensus_set import ConsensusSet
 from association.consensus.tuning import BEAMS_READ
 from association.context import SearchContext
 from association.explanations import Answer
 from association.rank_and_estimate import search_and_rank
 from association.verdict.alternatives import (
+    AmongAlternatives,
     compare_alternatives,
     probability_among,
     probability_by_shown,
     probability_with_loose_walls,
 )
-from association.verdict.tuning import ABSENCE, ALTERNATIVE_TEMPERATURE, LOOSE_BEAMS
+from association.verdict.tuning import ABSENCE, LOOSE_TEMPERATURE
 from registration import Segments
 
 from ..scenes import INSIDE, ROOM, answer_of, beams_of, context_of, equal_rooms, index_of, pose, scan_of, seen
@@ -39,13 +41,19 @@ def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Ans
     return context, found.answer, tuple(found.alternatives)
 
 
+def with_loose_walls(context: SearchContext, answer: Answer, rivals: tuple[ConsensusSet, ...]) -> float:
+    found = probability_with_loose_walls(context, answer, rivals)
+    assert found is not None
+    return found
+
+
 def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
     """By its costs one room stands out in most drawings; by what both miss by more than centimetres in few."""
     close, loose = [], []
     for seed in range(24):
         context, answer, rivals = explained(seed)
         close.append(probability_among(compare_alternatives(answer.best, rivals)) > 0.95)
-        loose.append(probability_with_loose_walls(context, answer, rivals) > 0.95)
+        loose.append(with_loose_walls(context, answer, rivals) > 0.95)
     assert sum(close) > 0.7 * len(close)
     assert sum(loose) < 0.3 * len(close)
 
@@ -55,41 +63,57 @@ def test_that_the_answer_fits_well_shows_not_that_walls_are_where_they_are_drawn
     context, answer, rivals = explained(0)
     well = replace(answer, estimated=replace(answer.estimated, wall_sigma=0.001))
     assert probability_among(compare_alternatives(answer.best, rivals)) > 0.95
-    assert probability_with_loose_walls(context, well, rivals) < 0.9
+    assert with_loose_walls(context, well, rivals) < 0.9
     ill = replace(answer, estimated=replace(answer.estimated, wall_sigma=0.1))
-    assert probability_with_loose_walls(context, ill, rivals) < probability_with_loose_walls(context, well, rivals)
+    assert with_loose_walls(context, ill, rivals) < with_loose_walls(context, well, rivals)
 
 
 def test_alone_or_where_walls_are_known_to_be_there_is_no_second_look() -> None:
     context, answer, _ = explained(0)
-    assert probability_with_loose_walls(context, answer, ()) == 1.0
-    assert probability_with_loose_walls(*explained(0, sigma=0.005)) == 1.0
+    assert with_loose_walls(context, answer, ()) == 1.0
+    assert probability_with_loose_walls(*explained(0, sigma=0.005)) is None
+
+
+def test_after_the_deadline_there_is_no_second_look() -> None:
+    context, answer, rivals = explained(0)
+    late = replace(context, deadline=Deadline(time.monotonic() - 1.0))
+    assert probability_with_loose_walls(late, answer, rivals) is None
+
+
+def test_three_comparisons_count_by_their_geometric_mean() -> None:
+    """By their weights. Places that are equal in all keep the same probability, whether two or three were made."""
+    for one, mean, least in (
+        (AmongAlternatives(0.9, 0.6, 0.3), 0.9**0.8 * 0.6**0.1 * 0.3**0.1, 0.3),
+        (AmongAlternatives(0.9, 0.4, None), 0.9 ** (8.0 / 9.0) * 0.4 ** (1.0 / 9.0), 0.4),
+        (AmongAlternatives(0.5, 0.5, 0.5), 0.5, 0.5),
+        (AmongAlternatives(0.5, 0.5, None), 0.5, 0.5),
+        (AmongAlternatives(1.0, 1.0, 1.0), 1.0, 1.0),
+    ):
+        assert (one.mean, one.least) == pytest.approx((mean, least))
 
 
 def test_walls_that_are_declared_to_be_off_by_centimetres_have_a_second_look() -> None:
     """As those of a map of which nothing is known."""
-    assert probability_with_loose_walls(*explained(0, sigma=0.025)) < 1.0
-    assert probability_with_loose_walls(*explained(0)) < 1.0
+    assert with_loose_walls(*explained(0, sigma=0.025)) < 1.0
+    assert with_loose_walls(*explained(0)) < 1.0
 
 
-def test_of_what_beams_say_a_share_counts() -> None:
+def test_what_beams_say_does_not_count_where_walls_may_be_off() -> None:
     context, answer, rivals = explained(0)
     plain = probability_with_loose_walls(context, answer, rivals)
     read = replace(
         answer.best, read=0.1, score=answer.best.score + 0.1 * BEAMS_READ, posterior=answer.best.posterior + 10.0
     )
-    by_beams = probability_with_loose_walls(context, replace(answer, best=read), rivals)
-    odds = by_beams / (1.0 - by_beams) / (plain / (1.0 - plain))
-    assert odds == pytest.approx(math.exp(LOOSE_BEAMS * 0.1 * BEAMS_READ / ALTERNATIVE_TEMPERATURE), rel=1e-6)
+    assert probability_with_loose_walls(context, replace(answer, best=read), rivals) == plain
 
 
 def test_what_a_prior_says_counts_whole() -> None:
     context, answer, rivals = explained(0)
-    plain = probability_with_loose_walls(context, answer, rivals)
+    plain = with_loose_walls(context, answer, rivals)
     liked = replace(answer.best, posterior=answer.best.posterior + 1.0)
-    by_prior = probability_with_loose_walls(context, replace(answer, best=liked), rivals)
+    by_prior = with_loose_walls(context, replace(answer, best=liked), rivals)
     odds = by_prior / (1.0 - by_prior) / (plain / (1.0 - plain))
-    assert odds == pytest.approx(math.exp(1.0 / ALTERNATIVE_TEMPERATURE), rel=1e-6)
+    assert odds == pytest.approx(math.exp(1.0 / LOOSE_TEMPERATURE), rel=1e-6)
 
 
 CUPBOARD = np.array([[4.6, 0.6, 4.6, 2.6], [4.6, 2.6, 7.2, 2.6], [7.2, 2.6, 7.2, 0.6], [7.2, 0.6, 4.6, 0.6]])
@@ -125,12 +149,12 @@ def test_what_the_scan_does_not_show_counts_up_to_a_limit() -> None:
     """Of two explanations with equal matches; any number of beams counts as one thing that may be gone."""
     context, answer, _ = explained(0)
     equal = replace(answer.best, score=answer.best.score - 40.0, posterior=answer.best.posterior - 40.0)
-    limited = 1.0 / (1.0 + math.exp(-ABSENCE / ALTERNATIVE_TEMPERATURE))
+    limited = 1.0 / (1.0 + math.exp(-ABSENCE))
     assert probability_by_shown(context, answer.best, [equal]) == pytest.approx(limited)
     fewer = equal.matches.copy()
     fewer["score"][0] = 0.0
     gap = float(answer.best.matches["score"][0]) + ABSENCE
-    expected = 1.0 / (1.0 + math.exp(-gap / ALTERNATIVE_TEMPERATURE))
+    expected = 1.0 / (1.0 + math.exp(-gap))
     assert probability_by_shown(context, answer.best, [replace(equal, matches=fewer)]) == pytest.approx(expected)
     assert probability_by_shown(context, answer.best, []) == 1.0
 

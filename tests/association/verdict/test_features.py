@@ -60,9 +60,11 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         longest_unmatched=3.0,
         agreement=0.85,
         read=0.5,
-        passed=0.04,
+        root_passed=0.2,
         root_farther=0.3,
         root_nearer=0.4,
+        root_passed_any=0.3,
+        root_unmapped=0.5,
         critical_displacement=0.25,
         critical_deviation=0.4,
         log_significance=-9.0,
@@ -75,11 +77,12 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         misfit_of_many=math.log(2.0) * 5.0 / 8.0,
         beyond_nearly_all=0.05,
         root_unmatched=math.sqrt(6.5),
+        root_unmatched_walls=math.sqrt(3.0 + 2.0 + 0.875 * 1.5),
         squared_solitude=math.log(crowd) ** 2,
     )
     estimated = estimated_of(registered_room(), leverages_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
     got = features_beside(
-        answer_with(best, estimated=estimated, agreement=0.85, beams=BeamFractions(0.09, 0.16)), rivals
+        answer_with(best, estimated=estimated, agreement=0.85, beams=BeamFractions(0.09, 0.16, 0.09, 0.25)), rivals
     )
     assert got._asdict() == pytest.approx(expected._asdict())
 
@@ -165,13 +168,13 @@ def test_the_gap_to_the_mirrored_scan_has_an_end_and_an_answer_without_score_non
 
 
 def test_twins_share_the_chance() -> None:
-    """One that scores 1.5 nats less is one to e as likely; one that scores more is as likely and no more."""
+    """One that scores a nat less is one to e as likely; one that scores more is as likely and no more."""
     best = ranked(50.0)
     assert probability_among(compare_alternatives(best, [])) == 1.0
     assert probability_among(compare_alternatives(best, [ranked(50.0)] * 3)) == pytest.approx(0.25)
     assert probability_among(compare_alternatives(best, [ranked(80.0)])) == pytest.approx(0.5)
-    assert probability_among(compare_alternatives(best, [ranked(48.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
-    assert probability_among(compare_alternatives(best, [ranked(52.0, -3.5)])) == pytest.approx(
+    assert probability_among(compare_alternatives(best, [ranked(49.0)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
+    assert probability_among(compare_alternatives(best, [ranked(52.0, -3.0)])) == pytest.approx(
         1.0 / (1.0 + math.exp(-1.0))
     ), "with the prior"
 
@@ -187,7 +190,7 @@ def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: 
     assert features.lead == pytest.approx(lead, abs=0.01)
     assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=0.01)
     assert probability_among(compare_alternatives(answer.best, [rival])) == pytest.approx(
-        1.0 / (1.0 + math.exp(-lead / tuning.ALTERNATIVE_TEMPERATURE)), abs=0.002
+        1.0 / (1.0 + math.exp(-lead)), abs=0.002
     )
     assert features_beside(answer, [ranked(40.0, chi_square=cost)]).lead == pytest.approx(10.0)
     nearest = features_beside(answer, [ranked(42.0, chi_square=cost), rival])

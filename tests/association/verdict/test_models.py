@@ -18,12 +18,14 @@ from association.verdict.models import (
     MANIFEST,
     MODELS,
     MOST,
+    ON_MAP,
     USUAL,
     Curve,
     Model,
     Pair,
     as_model,
 )
+from association.verdict.roles import ROLES
 
 from ..reference import verdict as twin
 
@@ -33,7 +35,7 @@ def names_of(model: Model) -> set[str]:
 
 
 COUNTED = Features(*(0.1 * k + 0.5 for k in range(len(Features._fields))))
-NAMES = {"probability", "cautious", "probability_with_beams", "cautious_with_beams"}
+NAMES = {"segments", "ranges"}
 
 
 @pytest.mark.parametrize(
@@ -99,9 +101,10 @@ def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
     document = json.loads((Path(association.__file__).parent / "verdict" / FILE).read_text())
     assert set(MODELS) == set(document["models"]) == set(MANIFEST["models"]) == NAMES
     curves = document["models"][name]
-    assert {name for key in curves for name in key.removeprefix(LEAST).removeprefix(MOST).split()} <= set(
-        Features._fields
-    )
+    assert [MODELS[name].on_map] == curves[ON_MAP]
+    assert MODELS[name].on_map > 0.0
+    features = {name for key in curves for name in key.removeprefix(LEAST).removeprefix(MOST).split()}
+    assert features - {ON_MAP} <= set(Features._fields)
     expected = twin.logit(curves, COUNTED._asdict())
     assert MODELS[name].logit(COUNTED) == pytest.approx(expected)
     assert all(math.isfinite(number) for curve in curves.values() for number in curve)
@@ -110,11 +113,6 @@ def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
 
 def test_beams_speak_only_where_there_are_beams() -> None:
     """A scan without has 0 for both of their shares, which is not what it read."""
-    for name in ("probability", "cautious"):
-        assert not {"read", "passed", "root_farther", "root_nearer"} & names_of(MODELS[name])
-
-
-def test_the_mirrored_scan_counts_only_where_other_buildings_are_reckoned_with() -> None:
-    """The probability does not have it: it is searched only for what would be usable."""
-    for name in ("probability", "probability_with_beams"):
-        assert not any(feature.startswith("null") for feature in names_of(MODELS[name]))
+    with_beams = {name for name, role in ROLES.items() if role.needs_beams}
+    assert not with_beams & names_of(MODELS["segments"])
+    assert with_beams & names_of(MODELS["ranges"])

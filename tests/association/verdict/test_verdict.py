@@ -23,9 +23,9 @@ from ..answers import answer_with, estimated_of, explanations_of, ranked, regist
 from ..judged import AROUND, BESIDE, LIKELY, PLAIN, SOFT, Drawn, Numbers, crossing, judged_by
 from ..scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_of, seen
 
-SURE = {name: {"constant": [30.0]} for name in PLAIN}  # by which every answer is right
+SURE = {name: {"constant": [30.0], "on_map": [0.0]} for name in PLAIN}  # by which every answer is right
 THROUGH = AssociationOptions(exhaustive=True)
-BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6}
+WITH_LOOSE_WALLS = alternatives.probability_with_loose_walls  # as it is before the models are replaced
 
 
 @pytest.fixture(autouse=True)
@@ -38,49 +38,38 @@ def leading(lead: float, *, with_beams: bool = False) -> Drawn:
     return Drawn(room(with_beams), LIKELY._replace(rival=LIKELY.score - lead))
 
 
-@pytest.mark.parametrize(
-    ("model", "with_beams", "bar"),
-    [
-        ("probability", False, 0.7),
-        ("probability_with_beams", True, 0.7),
-        ("cautious", False, 0.6),
-        ("cautious_with_beams", True, 0.6),
-    ],
-)
-def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar: float) -> None:
-    """Of either probability; by the models for scans with beams, or those for scans without."""
-    with judged_by({**SURE, model: {"constant": [-3.0], "lead": [0.2]}}, **BARS):
+@pytest.mark.parametrize(("form", "with_beams"), [("segments", False), ("ranges", True)])
+def test_an_answer_is_usable_from_the_limit_on(form: str, with_beams: bool) -> None:
+    """By the model for scans with beams, or that for scans without; however probable it is on a map that is known."""
+    with judged_by({**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}}, USABLE_CAUTIOUS=0.6):
         low, high = crossing(lambda lead: leading(lead, with_beams=with_beams).verdict.status, 40.0, 60)
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
         usable = leading(high, with_beams=with_beams).verdict
     assert usable.usable
     # At the limit a similar place that is so far behind takes from the chance what is left of it.
-    share = 1.0 / (1.0 + math.exp(-high / tuning.ALTERNATIVE_TEMPERATURE))
-    chance = share / (1.0 + math.exp(3.0 - 0.2 * high))
-    assert chance == pytest.approx(bar)
-    assert usable.probability == pytest.approx(chance if model.startswith("probability") else share)
+    share = 1.0 / (1.0 + math.exp(-high))
+    assert share / (1.0 + math.exp(3.0 - 0.2 * high)) == pytest.approx(0.6)
+    assert usable.probability == pytest.approx(share)
 
 
 def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its stated score is 40 nats less, at the same place: scored again, it counts as much.
+    """Its stated score is 40 nats less, at the same place: scored again, it counts as much, in one of three looks.
 
-    Only what would be usable is looked at again.
+    The mean of the three is the probability, and the least decides.
     """
     with judged_by(SURE):
         assert leading(40.0).verdict.usable
-        monkeypatch.setattr(alternatives, "LOOSE_ALTERNATIVES", tuning.LOOSE_ALTERNATIVES)
+        monkeypatch.setattr(alternatives, "probability_with_loose_walls", WITH_LOOSE_WALLS)
         got = leading(40.0).verdict
-        for unusable in (replace(leading(40.0), thin=True), replace(leading(40.0), degenerate=True)):
-            assert unusable.verdict.cautious == pytest.approx(1.0)
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
-    assert got.probability == pytest.approx(0.5)
+    assert got.probability == pytest.approx(0.5**0.1)
     assert "similar_place" in [reason.code for reason in got.reasons]
 
 
 def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
     """By a prior that likes the place little, it leads by less than similar places do, but there is none."""
     best, other = ranked(9.0, prior=-4.0), ranked(8.0, prior=-4.0, at=pose(9.0, 9.0))
-    with judged_by({**SURE, "cautious": {"constant": [-1.5], "lead": [0.2]}}):
+    with judged_by({**SURE, "segments": {"constant": [-1.5], "lead": [0.2], "on_map": [30.0]}}):
         alone, beside = (judge(room(), explanations_of(answer_with(best), *others)) for others in ((), (other,)))
     assert alone.status is beside.status is Status.AMBIGUOUS
     assert (alone.margin, beside.margin) == (None, 1.0)
@@ -90,7 +79,7 @@ def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
 
 def test_the_probability_is_that_for_scans_of_the_map() -> None:
     """The cautious probability decides whether the answer is usable, and is not returned."""
-    with judged_by({**SURE, "probability": {"constant": [3.0]}, "cautious": {"constant": [0.0]}}):
+    with judged_by({**SURE, "segments": {"constant": [0.0], "on_map": [3.0]}}):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(1.0 / (1.0 + math.exp(-3.0)))
@@ -100,9 +89,9 @@ def test_twins_share_both_probabilities() -> None:
     with judged_by(SURE):
         assert leading(0.0).verdict.probability == pytest.approx(0.5)
         assert leading(0.0).verdict.status is Status.AMBIGUOUS
-        with judged_by(SURE, USABLE_PROBABILITY=0.4, USABLE_CAUTIOUS=0.6):
+        with judged_by(SURE, USABLE_CAUTIOUS=0.6):
             assert leading(0.0).verdict.status is Status.AMBIGUOUS
-        with judged_by(SURE, USABLE_PROBABILITY=0.4, USABLE_CAUTIOUS=0.4):
+        with judged_by(SURE, USABLE_CAUTIOUS=0.4):
             assert leading(0.0).verdict.status is Status.OK
 
 
@@ -110,9 +99,8 @@ def test_twins_share_both_probabilities() -> None:
 def test_what_explains_the_scan_no_better_than_other_buildings_is_no_match(explained: float, status: Status) -> None:
     """Neither a similar place next to it nor a loose position makes it one; those are other questions."""
     constant = math.log(explained / (1.0 - explained))
-    loose = {"constant": [constant], "deviation": [-100.0, 0.03, 0.0]}
-    loose["constant"] = [constant + 100.0 * 0.03]
-    with judged_by({**SURE, "cautious": loose}):
+    loose = {"constant": [constant + 100.0 * 0.03], "deviation": [-100.0, 0.03, 0.0], "on_map": [3.0]}
+    with judged_by({**SURE, "segments": loose}):
         for numbers in (LIKELY, LIKELY._replace(rival=LIKELY.score), LIKELY._replace(deviation=0.4)):
             got = Drawn(room(), numbers).verdict
             assert got.status is status
@@ -136,18 +124,18 @@ def test_a_position_that_is_open_has_no_probability(with_beams: bool) -> None:
 def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
     """Whatever the status is, but never of an answer that is usable."""
     bar = tuning.ELSEWHERE_PROBABILITY + more
-    cautious = {"constant": [math.log(bar / (1.0 - bar))]}
-    with judged_by({**SURE, "cautious": cautious}):
+    cautious = {"constant": [math.log(bar / (1.0 - bar))], "on_map": [30.0]}
+    with judged_by({**SURE, "segments": cautious}):
         for one in (leading(40.0), replace(leading(40.0), degenerate=True)):
             assert ("not_on_map" in [reason.code for reason in one.verdict.reasons]) is (more < 0.0)
-    with judged_by({**SURE, "cautious": cautious}, USABLE_CAUTIOUS=0.05):
+    with judged_by({**SURE, "segments": cautious}, USABLE_CAUTIOUS=0.05):
         assert leading(40.0).verdict.reasons == ()
 
 
 def test_at_every_limit_itself_an_answer_is_usable() -> None:
     """All chances are one half, and so are the limits."""
-    even = {name: {"constant": [0.0]} for name in PLAIN}
-    names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
+    even = {name: {"constant": [0.0], "on_map": [0.0]} for name in PLAIN}
+    names = ("USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
     alone = explanations_of(answer_with(ranked()))
     assert alone.answer is not None
     with judged_by(even, **dict.fromkeys(names, 0.5)):
@@ -156,9 +144,8 @@ def test_at_every_limit_itself_an_answer_is_usable() -> None:
         for in_step, usable in ((tuning.LEAST_IN_STEP, True), (tuning.LEAST_IN_STEP - 1e-9, False)):
             beams = replace(alone.answer.beams, in_step=in_step)
             assert judge(room(), replace(alone, answer=replace(alone.answer, beams=beams))).usable is usable
-    for name in names[:2]:
-        with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
-            assert judge(room(), alone).status is Status.AMBIGUOUS
+    with judged_by(even, **dict.fromkeys(names, 0.5) | {"USABLE_CAUTIOUS": math.nextafter(0.5, 1.0)}):
+        assert judge(room(), alone).status is Status.AMBIGUOUS
     with judged_by(even, **dict.fromkeys(names, 0.5) | {"NO_MATCH_PROBABILITY": math.nextafter(0.5, 1.0)}):
         assert judge(room(), alone).status is Status.NO_MATCH
 
@@ -184,19 +171,14 @@ def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatc
     assert asked_of(sure, monkeypatch) == [most], "no other null takes anything from it"
     assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons use it"
     for matters, share in ((most + 0.01, most), (1.01, 1.0), (0.96, 0.95), (0.71, 0.0)):
-        with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -1000.0]}}):
+        with judged_by({**SURE, "segments": {"constant": [5.0], "null": [0.0, matters, -1000.0], "on_map": [0.0]}}):
             assert asked_of(sure, monkeypatch) == [share]
-    monkeypatch.setattr(probabilities, "probability_with_loose_walls", lambda *_: 0.92)
-    for probable, asked in ((0.93, [0.0]), (0.91, [most])):
-        with judged_by(SURE, USABLE_PROBABILITY=probable):
-            assert asked_of(sure, monkeypatch) == asked, "it is still not usable, and the reasons use it"
-    monkeypatch.undo()
     better = Drawn(room(prior=AROUND), LIKELY, beyond=((LIKELY.score - LIKELY.rival + 10.0, False),))
     loose = replace(sure, numbers=LIKELY._replace(deviation=0.51))
     for one in (leading(0.0), replace(sure, degenerate=True), replace(sure, thin=True), loose, better):
         assert asked_of(one, monkeypatch) == []
-    for model in ("probability", "cautious"):
-        with judged_by({**SURE, model: {"constant": [0.0]}}):
+    for on_map in (0.0, 30.0):
+        with judged_by({**SURE, "segments": {"constant": [0.0], "on_map": [on_map]}}):
             assert asked_of(sure, monkeypatch) == []
 
 
@@ -209,7 +191,7 @@ def test_where_the_bar_is_next_to_one_every_null_matters(monkeypatch: pytest.Mon
 
 def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> None:
     """An answer with 20 nats, which the mirrored scan of ROOM has as well; it says nothing of an answer with 110."""
-    with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, 0.9, -100.0]}}):
+    with judged_by({**SURE, "segments": {"constant": [5.0], "null": [0.0, 0.9, -100.0], "on_map": [1.0]}}):
         strong, weak = (Drawn(room(), LIKELY._replace(score=s, rival=s - 30.0)).verdict for s in (110.0, 20.0))
     assert strong.usable
     assert weak.status is Status.AMBIGUOUS
@@ -252,7 +234,7 @@ def test_an_incomplete_search_is_never_usable() -> None:
     [
         (candidates, "search"),
         (probabilities, "find_null_score"),
-        (probabilities, "probability_with_loose_walls"),
+        (alternatives, "probability_with_loose_walls"),
         (verdict, "with_lines_of_sight"),
         (report, "with_lines_of_sight"),
         (report, "missing_segments"),
