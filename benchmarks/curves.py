@@ -74,8 +74,7 @@ class Answers:
     among, least : float64
         Probability of the answer among its alternatives: the mean, and the least of three comparisons.
     right, away, fixed : bool
-        True if the answer is right; if the scan is of another building, so that no answer is right; if the walls fix the
-        pose.
+        True if the answer is right; if the scan is of another building; if the walls fix the pose.
     told : bool
         True if the answer is right, or if the scan shows that it is wrong.
     weights : float64

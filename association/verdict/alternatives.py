@@ -27,8 +27,10 @@ import numpy as np
 from registration.layout import Floats, Records
 from registration.values import value
 
+from ..consensus.beams import rays_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score_again
+from ..consensus.tuning import MOST_BEAMS, NEAR
 from ..context import SearchContext
 from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
@@ -36,10 +38,12 @@ from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .inconsistencies import absences
 from .kernels import alternatives as kernels
+from .kernels.absences import loose_beams
 from .tuning import (
     ABSENCE,
     COMPARISON_WEIGHTS,
     LOOSE_ALTERNATIVES,
+    LOOSE_BEAMS,
     LOOSE_FACTOR,
     LOOSE_TEMPERATURE,
     NO_ALTERNATIVE,
@@ -160,21 +164,26 @@ def probability_with_loose_walls(
     lines = ScanLines.of(context.scan, sigma, context.options, context.lines.given)
     explanations = (answer.best, *others[:LOOSE_ALTERNATIVES])
     scores = score_again(context.instead(context.scan, lines), explanations)
-    return _probability_of_first(explanations, scores)
+    priors = [one.posterior - one.score for one in explanations]
+    posteriors = scores + priors + _loose_beams(context, explanations, math.hypot(sigma, MODEL_OFFSET))
+    weights = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / LOOSE_TEMPERATURE)
+    return 1.0 / (1.0 + float(weights.sum()))
+
+
+def _loose_beams(context: SearchContext, explanations: Sequence[ConsensusSet], sigma: float) -> Floats:
+    """Return the beams' part of each score, (k,) nats, where a beam reads a wall within some of its deviations.
+
+    Centimetres are left open then, but not whether a thing is there. 0 without beams, and where rays cannot be
+    followed.
+    """
+    if not context.with_beams or not context.can_look:
+        return np.zeros(len(explanations))
+    rays, index, wider = rays_of(context, MOST_BEAMS), context.index, max(1.0, LOOSE_BEAMS * sigma / NEAR)
+    place, obstacles, work = index.tables.place, index.obstacles, context.workspace
+    return np.array([loose_beams(rays, one.estimate, place, obstacles, work, wider) for one in explanations])
 
 
 def _loose_sigma(wall_sigma: float) -> float:
     """Return the standard deviation of a wall's offset beyond `MODEL_OFFSET`, metres, for an estimate of its whole."""
     loose = max(LOOSE_WALLS, LOOSE_FACTOR * wall_sigma)
     return math.sqrt(loose * loose - MODEL_OFFSET * MODEL_OFFSET)
-
-
-def _probability_of_first(explanations: Sequence[ConsensusSet], scores: Floats) -> float:
-    """Return the probability of the first explanation among all, from the present scores of their segments, (k,) nats.
-
-    The prior counts in full. Beams do not count: which of them read a wall depends on the centimetres that are left
-    open.
-    """
-    posteriors = scores + np.array([one.posterior - one.score for one in explanations])
-    others = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / LOOSE_TEMPERATURE)
-    return 1.0 / (1.0 + float(others.sum()))

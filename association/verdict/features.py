@@ -48,7 +48,6 @@ class Features(NamedTuple):
     root_unmapped : root of the fraction of the beams that end where the map shows nothing
     critical_displacement : how far the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
     critical_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
-    log_significance : log10 of the significance, from `LEAST_LOG_SIGNIFICANCE`
     null : score of the mirrored scan over the answer's, from `NULL_FRACTION` to `MOST_NULL`; the least where the map
         is symmetric about the place
     null_gap : root of what the answer's score has over the mirrored scan's, in nats, up to that of `MAX_GAP`; likewise
@@ -57,7 +56,6 @@ class Features(NamedTuple):
     blocked : root of the penalty of lines of sight, nats
     walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
-    beyond_nearly_all : fraction of the length beyond `NEARLY_ALL`
     root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive
         that of the mean over its views
     root_unmatched_walls : likewise of segments that are as long as walls, in part from the first of `LIKE_WALLS` on
@@ -83,7 +81,6 @@ class Features(NamedTuple):
     root_unmapped: float
     critical_displacement: float
     critical_deviation: float
-    log_significance: float
     null: float
     null_gap: float
     null_better: float
@@ -91,7 +88,6 @@ class Features(NamedTuple):
     blocked: float
     walls: float
     misfit_of_many: float
-    beyond_nearly_all: float
     root_unmatched: float
     root_unmatched_walls: float
     squared_solitude: float
@@ -165,7 +161,6 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
         nearer=answer.beams.nearer,
         passed=answer.beams.passed,
         unmapped=answer.beams.unmapped,
-        significance=answer.significance,
     )
     kernels.measure_leverages(answer.estimated.leverages, facts)
     views = context.scan.views

@@ -11,6 +11,7 @@ COMPARISON_WEIGHTS = (0.8, 0.1, 0.1)  # cross-validated
 
 # Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least, and
 LOOSE_FACTOR = 4.0  # tables; times as much as they seem to be: of many similar places the one that fits best shows less
+LOOSE_BEAMS = 3.0  # tables; standard deviations of the walls within which a beam reads one then
 LOOSE_TEMPERATURE = 1.5  # nats, tables; how far apart two places score that are as likely as one to e then
 LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 
@@ -45,7 +46,6 @@ LEAST_SIGNIFICANCE = 1e-300  # rounding
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
 MANY = 8  # matched segments, tables; from which on the misfit says as much as it can
-NEARLY_ALL = 0.85  # of the scan's length, tables
 LONGEST_UNMATCHED = 4.0  # m, tables; a longer segment
 MOST_UNMATCHED = 4.0 * LONGEST_UNMATCHED  # m, tables; and more clutter say no more
 LIKE_WALLS = (0.8, 1.6)  # m, tables; scan lines of that length begin to count as walls, and count in full
@@ -55,7 +55,6 @@ UNCOUNTED_FRACTION = 0.3  # of the best value, tables; worse alternatives do not
 CROWD_TEMPERATURE = 4.0  # nats, tables
 LEAST_CROWD = -12.0
 MAX_GAP = 60.0  # nats, tables
-LEAST_LOG_SIGNIFICANCE = -30.0  # log10, tables; smaller values say no more
 MOST_NULL = 1.2  # tables; a null above it says no more
 UNLIKE_SYMMETRY, SYMMETRIC = (
     0.7,

@@ -42,7 +42,7 @@ PLAIN: dict[str, dict[str, list[float]]] = {
     "segments": {
         "constant": [-6.0], "lead": [0.1, 20.0, -0.05], "solitude": [0.02], "inlier_fraction": [5.0, 0.85, -4.0],
         "root_count": [0.6],
-        "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "log_significance": [-0.1],
+        "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "walls": [0.1],
         "critical_displacement": [-1.0], "null": [-1.0, 0.8, -6.0],
         "null_gap": [0.05], "null_better": [-3.0], "on_map": [1.0],
     },

@@ -199,12 +199,12 @@ def test_exact_views_are_put_to_scale_together(latest_first: bool) -> None:
 
 
 def test_views_that_are_not_exact_are_as_they_were_sent() -> None:
-    """Their odometry error may be a scale factor as well."""
+    """Their odometry error may be a scale factor as well. The last one alone, which is exact, has too few walls."""
     ends = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
     spread = np.diag([0.02**2, 0.02**2, 0.02**2])
     views = [
-        View(scan_of(ends[::2], viewpoint=(0.0, 0.0))),
-        View(scan_of(ends[1::2], viewpoint=(0.0, 0.0)), HERE, spread),
+        View(scan_of(ends[:2], viewpoint=(0.0, 0.0))),
+        View(scan_of(ends[2:], viewpoint=(0.0, 0.0)), HERE, spread),
     ]
     assert told(associate(index_of(1.02 * WALLS), assemble(views), None, AssociationOptions(oriented=False))) == []
 

@@ -57,18 +57,20 @@ def test_the_numbers_add_up(linefix: Linefix, on: str, usable: bool) -> None:
     verdict, answer = found["verdict"], found["answer"]
     assert (verdict["usable"], answer["usable"]) == (usable, usable)
     assert list(verdict["features"]) == list(Features._fields)
-    among = verdict["among_alternatives"]
-    share = min(value for value in among.values() if value is not None)
+    among, model = verdict["among_alternatives"], verdict["model"]
+    mean = among.pop("mean")
+    least = min(value for value in among.values() if value is not None)
     assert among["as_scored"] == pytest.approx(1.0 / (1.0 + sum(one["weight"] for one in verdict["alternatives"])))
-    for name, model in verdict["models"].items():
-        terms = [term["nats"] for term in model["contributions"]]
-        assert model["log_odds"] == pytest.approx(sum(terms))
-        assert model["probability"] == pytest.approx(1.0 / (1.0 + math.exp(-model["log_odds"])))
-        assert verdict[name] == pytest.approx(share * model["probability"])
+    assert least <= mean <= max(among.values())
+    assert model["log_odds"] == pytest.approx(sum(term["nats"] for term in model["contributions"]))
+    assert model["probability"] == pytest.approx(1.0 / (1.0 + math.exp(-model["log_odds"])))
+    on_map = 1.0 / (1.0 + math.exp(-model["log_odds"] - model["on_map"]))
+    assert model["probability_on_map"] == pytest.approx(on_map)
+    assert verdict["cautious"] == pytest.approx(least * model["probability"])
+    assert verdict["probability_of_pose"] == pytest.approx(mean * on_map)
     assert verdict["probability_of_pose"] == answer["probability"]
-    reached = all(verdict[name] >= verdict["thresholds"][name] for name in ("probability_of_pose", "cautious"))
-    assert reached is usable
-    assert (among["with_loose_walls"] is None, verdict["null"] is None) == (not usable, not usable)
+    assert (verdict["cautious"] >= verdict["thresholds"]["cautious"]) is usable
+    assert (verdict["null"] is None) is not usable
 
 
 def test_a_veto_that_applies_is_shown(linefix: Linefix, folder: Path) -> None:

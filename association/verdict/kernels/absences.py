@@ -43,6 +43,28 @@ def read_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work:
 
 
 @kernel
+def loose_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace, wider: float) -> float:
+    """Return the beams' part of the score at the first of the poses, nats, with tolerances `wider` times as wide."""
+    beams = rays.beams
+    walls = obstacles.walls
+    pose = poses[0]
+    ray = work.scratch[0].ray
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    total = 0.0
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
+            continue
+        put_beam(ray, beams[i], c, s, pose)
+        ray.limit = min(rays.reach, beams[i].range + BEHIND)
+        across, w = across_wall(ray, beams[i].range, place, obstacles)
+        if w >= 0:
+            read, passed = evidence_of_beam(across / wider, walls[w])
+            total += BEAMS_READ * read - BEAMS_PASSED * passed
+    return total / max(1, len(beams))
+
+
+@kernel
 def limit_by_things(rays: Rays, here: Floats, there: Floats, reach: float, limit: float) -> float:
     """Return what beams count against an alternative, nats, where each thing counts `limit` at most.
 

@@ -12,7 +12,6 @@ from ..tuning import (
     CROWD_TEMPERATURE,
     FEW_WALLS,
     LEAST_CROWD,
-    LEAST_LOG_SIGNIFICANCE,
     LEAST_MISFIT,
     LIKE_WALLS,
     LONGEST_UNMATCHED,
@@ -21,7 +20,6 @@ from ..tuning import (
     MOST_DEVIATION,
     MOST_MISFIT,
     MOST_UNMATCHED,
-    NEARLY_ALL,
     NULL_FRACTION,
     OFFSET_OF_FEW,
 )
@@ -63,7 +61,6 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.root_unmapped = math.sqrt(fact.unmapped)
     out.critical_displacement = min(fact.critical_displacement, MOST_DEVIATION)
     out.critical_deviation = min(fact.critical_deviation, MOST_DEVIATION)
-    out.log_significance = max(LEAST_LOG_SIGNIFICANCE, math.log10(fact.significance))
     out.null = NULL_FRACTION
     out.null_gap = root_gap((1.0 - NULL_FRACTION) * best.score)
     out.null_better = 0.0
@@ -71,7 +68,6 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.blocked = math.sqrt(best.blocked)
     out.walls = math.sqrt(fact.walls)
     out.misfit_of_many = misfit * min(best.count, MANY) / MANY
-    out.beyond_nearly_all = max(0.0, best.fraction - NEARLY_ALL)
     out.root_unmatched = math.sqrt(min(fact.unmatched, MOST_UNMATCHED))
     out.root_unmatched_walls = math.sqrt(min(fact.unmatched_walls, MOST_UNMATCHED))
     out.squared_solitude = crowd * crowd

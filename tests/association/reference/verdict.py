@@ -111,7 +111,6 @@ def features(
         "root_unmapped": answer.beams.unmapped**0.5,
         "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),
         "critical_deviation": min(max([0.0, *(one[2] for one in leverages)]), tuning.MOST_DEVIATION),
-        "log_significance": max(tuning.LEAST_LOG_SIGNIFICANCE, math.log10(answer.significance)),
         "null": counted,
         "null_gap": root(gap),
         "null_better": max(0.0, share - 1.0),
@@ -119,7 +118,6 @@ def features(
         "blocked": best.blocked**0.5,
         "walls": len(leverages) ** 0.5,
         "misfit_of_many": misfit * min(1.0, count / tuning.MANY),
-        "beyond_nearly_all": max(0.0, best.fraction - tuning.NEARLY_ALL),
         "root_unmatched": min(sum(clutter), tuning.MOST_UNMATCHED) ** 0.5,
         "root_unmatched_walls": min(
             sum(clutter * np.interp(clutter, tuning.LIKE_WALLS, (0.0, 1.0))), tuning.MOST_UNMATCHED

@@ -11,7 +11,6 @@ import pytest
 
 from association import AssociationResult, Deadline
 from association.consensus.consensus_set import ConsensusSet
-from association.consensus.tuning import BEAMS_READ
 from association.context import SearchContext
 from association.explanations import Answer
 from association.rank_and_estimate import search_and_rank
@@ -98,13 +97,20 @@ def test_walls_that_are_declared_to_be_off_by_centimetres_have_a_second_look() -
     assert with_loose_walls(*explained(0)) < 1.0
 
 
-def test_what_beams_say_does_not_count_where_walls_may_be_off() -> None:
-    context, answer, rivals = explained(0)
-    plain = probability_with_loose_walls(context, answer, rivals)
-    read = replace(
-        answer.best, read=0.1, score=answer.best.score + 0.1 * BEAMS_READ, posterior=answer.best.posterior + 10.0
-    )
-    assert probability_with_loose_walls(context, replace(answer, best=read), rivals) == plain
+def test_beams_within_the_error_of_the_walls_do_not_separate_rooms_but_a_thing_does() -> None:
+    """Two rooms are equal; then one of them has a post."""
+    rooms = np.vstack([ROOM, ROOM + np.tile([12.0, 0.0], 2)])
+    post = np.array([[5.3, 2.5, 5.0, 2.8], [5.0, 2.8, 4.7, 2.5], [4.7, 2.5, 5.0, 2.2], [5.0, 2.2, 5.3, 2.5]])
+    found = []
+    for walls in (rooms, np.vstack([rooms, post])):
+        index = index_of(walls)
+        context = context_of(index, scan_of(seen(ROOM, INSIDE)[0], 0.02, (0.0, 0.0), beams_of(index, INSIDE)))
+        explained = search_and_rank(context)
+        assert explained.answer is not None
+        found.append(with_loose_walls(context, explained.answer, tuple(explained.alternatives)))
+    equal, with_post = found
+    assert equal == pytest.approx(0.5, abs=0.05)
+    assert with_post > 0.8
 
 
 def test_what_a_prior_says_counts_whole() -> None:

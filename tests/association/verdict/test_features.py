@@ -67,7 +67,6 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         root_unmapped=0.5,
         critical_displacement=0.25,
         critical_deviation=0.4,
-        log_significance=-9.0,
         null=0.7,
         null_gap=math.sqrt(0.3 * 80.0),
         null_better=0.0,
@@ -75,7 +74,6 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         blocked=2.0,
         walls=math.sqrt(3.0),
         misfit_of_many=math.log(2.0) * 5.0 / 8.0,
-        beyond_nearly_all=0.05,
         root_unmatched=math.sqrt(6.5),
         root_unmatched_walls=math.sqrt(3.0 + 2.0 + 0.875 * 1.5),
         squared_solitude=math.log(crowd) ** 2,
@@ -96,10 +94,9 @@ def test_features_say_no_more_beyond_their_limits() -> None:
     worse = features_beside(answer_with(ranked(30.0)), [ranked(50.0)])
     assert (worse.lead, worse.solitude) == pytest.approx((-20.0, 0.0), abs=1e-5)
     nothing = features_beside(answer_with(ranked(matched=0, fraction=0.0, misfit=0.0), significance=1e-300), [])
-    assert (nothing.root_count, nothing.inverse_count, nothing.beyond_nearly_all) == (0.0, 1.0, 0.0)
+    assert (nothing.root_count, nothing.inverse_count) == (0.0, 1.0)
     assert nothing.misfit == math.log(tuning.LEAST_MISFIT)
     assert (nothing.longest_unmatched, nothing.root_unmatched) == (tuning.LONGEST_UNMATCHED, 4.0)
-    assert nothing.log_significance == tuning.LEAST_LOG_SIGNIFICANCE
     assert (nothing.critical_displacement, nothing.critical_deviation, nothing.walls) == (0.0, 0.0, 0.0)
     whole = features_beside(answer_with(ranked(fraction=1.0, misfit=1e9)), [])
     assert (whole.longest_unmatched, whole.root_unmatched) == (0.0, 0.0)
