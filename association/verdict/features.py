@@ -21,7 +21,7 @@ from .alternatives import compare_alternatives
 from .chance import NullScore
 from .kernels import features as kernels
 from .kernels.null_features import write_null_features
-from .tuning import LONGEST_UNMATCHED
+from .tuning import LIKE_WALLS, LONGEST_UNMATCHED
 
 
 class Features(NamedTuple):
@@ -176,7 +176,7 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
     facts["longest"] = longest @ views.weights / views.weights.sum()
     facts["unmatched"] = _of_mean_view(context, seen)
     like_walls = seen.copy()
-    like_walls["length"] *= [kernels.like_wall(length) for length in seen["length"]]
+    like_walls["length"] *= np.interp(seen["length"], LIKE_WALLS, (0.0, 1.0))
     facts["unmatched_walls"] = _of_mean_view(context, like_walls)
     return facts
 
