@@ -116,7 +116,7 @@ def test_a_pose_is_carried_from_scan_to_scan_so_that_odometry_may_drift() -> Non
 
 
 def test_poses_are_carried_from_scans_that_changes_make_usable() -> None:
-    """The map does not have the outline of the hall; a change adds it."""
+    """The map does not have the outline of the hall; a change adds it. Before, one of the rooms' scans is usable."""
     old, new = Segments.derived(TODAY.endpoints[12:]), TODAY.endpoints[:12]
     begun = _Update.of(MapIndex.build(old, 0.005), days([*IN_HALL, *places_in(SECOND)]), Deadline())
     first, none = finished(begun.localize()), np.zeros(0, dtype=np.intp)
@@ -124,7 +124,7 @@ def test_poses_are_carried_from_scans_that_changes_make_usable() -> None:
     draft = Draft(added.code, (), new, added.sigma, none, none)
     found = finished(begun.search_others([(draft, added)], first, first))
     rooms_first, rooms_then = ([one.located for one in some if one.number % 10 > 4] for some in (first, found))
-    assert not any(rooms_first)
+    assert sum(rooms_first) <= 1
     assert sum(rooms_then) >= 12
 
 
