@@ -17,8 +17,7 @@ def explain(
 ) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
-    The answer is that of linefix locate. It is usable if the cautious probability reaches its threshold and no veto
-    applies.
+    The answer is that of linefix locate. It is usable if both probabilities reach their thresholds and no veto applies.
     """
     from . import here
 

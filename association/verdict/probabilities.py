@@ -14,7 +14,7 @@ from .features import Description, Features, add_null_score
 from .kernels.null_features import allowed_null
 from .kernels.odds import probability
 from .models import MODELS, USUAL, Model
-from .tuning import USABLE_CAUTIOUS, USABLE_CAUTIOUS_DRIVE
+from .tuning import USABLE_CAUTIOUS, USABLE_CAUTIOUS_DRIVE, USABLE_PROBABILITY
 from .vetoes import Veto
 
 
@@ -64,8 +64,8 @@ class Probabilities:
 
     @property
     def suffice(self) -> bool:
-        """Return whether the cautious probability reaches its threshold."""
-        return self.cautious >= self.least_cautious
+        """Return whether both probabilities reach their thresholds."""
+        return self.right >= USABLE_PROBABILITY and self.cautious >= self.least_cautious
 
 
 def work_out_probabilities(context: SearchContext, description: Description, vetoes: tuple[Veto, ...]) -> Probabilities:

@@ -61,6 +61,7 @@ UNLIKE_SYMMETRY, SYMMETRIC = (
     0.95,
 )  # tables; fractions between which a map comes to count as symmetric about a place
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
+USABLE_PROBABILITY = 0.94  # cross-validated
 USABLE_CAUTIOUS = 0.9  # cross-validated, with and without raw beams; out-of-map scans are included
 # The same of views that are not exact: the models were fitted to scans from one place. Of drives of 5 m through sister
 # buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.

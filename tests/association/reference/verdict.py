@@ -199,14 +199,14 @@ def judge(
     ):
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
-    likely = not elsewhere and not thin
+    likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
         numbers = features(context, answer, rivals, find_null_score(context, best))
         careful = logistic(logit(model_of(context, models), numbers))
         better = numbers["null_better"] >= tuning.MIRRORED_BETTER
         _, least = shared(context, answer, rivals)
         chances = replace(chances, careful=least * careful, asked=True, mirrored=better)
-        likely = not chances.mirrored
+        likely = likely and not chances.mirrored
     status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
     if free:
         status = Status.DEGENERATE

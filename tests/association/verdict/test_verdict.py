@@ -41,7 +41,11 @@ def leading(lead: float, *, with_beams: bool = False) -> Drawn:
 @pytest.mark.parametrize(("form", "with_beams"), [("segments", False), ("ranges", True)])
 def test_an_answer_is_usable_from_the_limit_on(form: str, with_beams: bool) -> None:
     """By the model for scans with beams, or that for scans without; however probable it is on a map that is known."""
-    with judged_by({**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}}, USABLE_CAUTIOUS=0.6):
+    with judged_by(
+        {**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}},
+        USABLE_CAUTIOUS=0.6,
+        USABLE_PROBABILITY=0.5,
+    ):
         low, high = crossing(lambda lead: leading(lead, with_beams=with_beams).verdict.status, 40.0, 60)
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
         usable = leading(high, with_beams=with_beams).verdict
@@ -91,7 +95,7 @@ def test_twins_share_both_probabilities() -> None:
         assert leading(0.0).verdict.status is Status.AMBIGUOUS
         with judged_by(SURE, USABLE_CAUTIOUS=0.6):
             assert leading(0.0).verdict.status is Status.AMBIGUOUS
-        with judged_by(SURE, USABLE_CAUTIOUS=0.4):
+        with judged_by(SURE, USABLE_PROBABILITY=0.4, USABLE_CAUTIOUS=0.4):
             assert leading(0.0).verdict.status is Status.OK
 
 
@@ -135,7 +139,7 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
 def test_at_every_limit_itself_an_answer_is_usable() -> None:
     """All chances are one half, and so are the limits."""
     even = {name: {"constant": [0.0], "on_map": [0.0]} for name in PLAIN}
-    names = ("USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
+    names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
     alone = explanations_of(answer_with(ranked()))
     assert alone.answer is not None
     with judged_by(even, **dict.fromkeys(names, 0.5)):
@@ -144,8 +148,9 @@ def test_at_every_limit_itself_an_answer_is_usable() -> None:
         for in_step, usable in ((tuning.LEAST_IN_STEP, True), (tuning.LEAST_IN_STEP - 1e-9, False)):
             beams = replace(alone.answer.beams, in_step=in_step)
             assert judge(room(), replace(alone, answer=replace(alone.answer, beams=beams))).usable is usable
-    with judged_by(even, **dict.fromkeys(names, 0.5) | {"USABLE_CAUTIOUS": math.nextafter(0.5, 1.0)}):
-        assert judge(room(), alone).status is Status.AMBIGUOUS
+    for name in names[:2]:
+        with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
+            assert judge(room(), alone).status is Status.AMBIGUOUS
     with judged_by(even, **dict.fromkeys(names, 0.5) | {"NO_MATCH_PROBABILITY": math.nextafter(0.5, 1.0)}):
         assert judge(room(), alone).status is Status.NO_MATCH
 
