@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from association.verdict.models import MODELS
-from association.verdict.tuning import USABLE_CAUTIOUS
+from association.verdict.tuning import USABLE_CAUTIOUS, USABLE_PROBABILITY
 
 from .curves import Answers
 from .examples import RANGES, SEGMENTS, Example, collected
@@ -55,7 +55,7 @@ class Point:
 def frontier(form: str, examples: Sequence[Example], bars: Sequence[float] = BARS) -> list[Point]:
     """Return a point for each bar, of examples of one form."""
     p = by_model(MODELS[form], Answers.of(examples))
-    open_to = ~np.array([e.degenerate for e in examples])
+    open_to = (p.likely >= USABLE_PROBABILITY) & ~np.array([e.degenerate for e in examples])
     right, told = np.array([e.right for e in examples]), np.array([e.told for e in examples])
     here = ~np.array([e.stranger for e in examples])
     conditions = np.array([e.condition for e in examples])

@@ -36,9 +36,8 @@ from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
-from .inconsistencies import absences
+from .inconsistencies import absences, readings_of
 from .kernels import alternatives as kernels
-from .kernels.absences import loose_beams
 from .tuning import (
     ABSENCE,
     COMPARISON_WEIGHTS,
@@ -178,9 +177,8 @@ def _loose_beams(context: SearchContext, explanations: Sequence[ConsensusSet], s
     """
     if not context.with_beams or not context.can_look:
         return np.zeros(len(explanations))
-    rays, index, wider = rays_of(context, MOST_BEAMS), context.index, max(1.0, LOOSE_BEAMS * sigma / NEAR)
-    place, obstacles, work = index.tables.place, index.obstacles, context.workspace
-    return np.array([loose_beams(rays, one.estimate, place, obstacles, work, wider) for one in explanations])
+    rays, wider = rays_of(context, MOST_BEAMS), max(1.0, LOOSE_BEAMS * sigma / NEAR)
+    return np.array([readings_of(context, rays, one, wider)[:, 0].sum() for one in explanations])
 
 
 def _loose_sigma(wall_sigma: float) -> float:

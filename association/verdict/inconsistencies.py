@@ -30,15 +30,17 @@ def absences(context: SearchContext, best: ConsensusSet, others: Sequence[Consen
     if not len(others) or not context.with_beams or not context.can_look or context.deadline.passed:
         return np.zeros(len(others))
     rays = rays_of(context, MOST_BEAMS)
-    here = _readings(context, rays, best)
-    return np.array([limit_by_things(rays, here, _readings(context, rays, one), MERGE_GAP, ABSENCE) for one in others])
+    here = readings_of(context, rays, best)
+    return np.array(
+        [limit_by_things(rays, here, readings_of(context, rays, one), MERGE_GAP, ABSENCE) for one in others]
+    )
 
 
-def _readings(context: SearchContext, rays: Rays, one: ConsensusSet) -> Floats:
-    """Return for each beam what `read_beams` writes of it at a pose, (n, 2)."""
+def readings_of(context: SearchContext, rays: Rays, one: ConsensusSet, wider: float = 1.0) -> Floats:
+    """Return for each beam what `read_beams` writes of it at a pose, (n, 2), with tolerances `wider` times as wide."""
     readings = np.zeros((len(rays.beams), 2))
     index = context.index
-    read_beams(rays, one.estimate, index.tables.place, index.obstacles, context.workspace, readings)
+    read_beams(rays, one.estimate, index.tables.place, index.obstacles, context.workspace, wider, readings)
     return readings
 
 

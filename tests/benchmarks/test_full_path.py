@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from association.verdict.models import MODELS, USUAL
-from association.verdict.tuning import USABLE_CAUTIOUS
+from association.verdict.tuning import USABLE_CAUTIOUS, USABLE_PROBABILITY
 from benchmarks.curves import Answers
 from benchmarks.full_path import Probabilities, answered, by_model, veto_rows
 
@@ -25,20 +25,22 @@ SURE = both()
 
 
 @pytest.mark.parametrize(
-    ("careful", "vetoes", "usable"),
+    ("likely", "careful", "vetoes", "passes", "usable"),
     [
-        (USABLE_CAUTIOUS, (), True),
-        (USABLE_CAUTIOUS - 0.01, (), False),
-        (0.99, ("off_scale",), False),
-        (0.99, ("few_walls",), False),
+        (USABLE_PROBABILITY, USABLE_CAUTIOUS, (), True, True),
+        (USABLE_PROBABILITY - 0.01, 0.99, (), False, False),
+        (0.99, USABLE_CAUTIOUS - 0.01, (), False, False),
+        (0.99, 0.99, ("off_scale",), True, False),
+        (0.99, 0.99, ("few_walls",), True, False),
     ],
 )
-def test_an_answer_is_judged_as_by_the_verdict(careful: float, vetoes: tuple[str, ...], usable: bool) -> None:
-    """The careful probability decides and the vetoes; the likely one is answered."""
-    got = answered([example(right=True, vetoes=vetoes)], both(0.97, careful), USABLE_CAUTIOUS)
-    assert got.probability.tolist() == [0.97]
-    assert got.passes.tolist() == [careful >= USABLE_CAUTIOUS]
-    assert got.usable.tolist() == [usable]
+def test_an_answer_is_judged_as_by_the_verdict(
+    likely: float, careful: float, vetoes: tuple[str, ...], passes: bool, usable: bool
+) -> None:
+    """Both probabilities decide, and the vetoes; the likely one is answered."""
+    got = answered([example(right=True, vetoes=vetoes)], both(likely, careful), USABLE_CAUTIOUS)
+    assert got.probability.tolist() == [likely]
+    assert (got.passes.tolist(), got.usable.tolist()) == ([passes], [usable])
 
 
 def test_without_a_pose_that_is_fixed_there_is_no_probability() -> None:

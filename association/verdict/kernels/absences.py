@@ -14,10 +14,13 @@ from ..tuning import LEAST_OF_BEAM
 
 
 @kernel
-def read_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace, readings: Floats) -> None:
+def read_beams(
+    rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace, wider: float, readings: Floats
+) -> None:
     """Write for each beam its part of the score at the first of the poses, nats, and where the map stops it, metres.
 
-    `readings` (n, 2). The second is the range of the beam where it does not pass through a wall.
+    `readings` (n, 2). The second is the range of the beam where it does not pass through a wall. The tolerances are
+    `wider` times as wide as in the score.
     """
     beams = rays.beams
     walls = obstacles.walls
@@ -35,33 +38,11 @@ def read_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work:
         across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
             continue
-        read, passed = evidence_of_beam(across, walls[w])
+        read, passed = evidence_of_beam(across / wider, walls[w])
         readings[i, 0] = (BEAMS_READ * read - BEAMS_PASSED * passed) / len(beams)
-        if across > CERTAIN:
+        if across > CERTAIN * wider:
             incidence = max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx))
             readings[i, 1] = beams[i].range - across / incidence
-
-
-@kernel
-def loose_beams(rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace, wider: float) -> float:
-    """Return the beams' part of the score at the first of the poses, nats, with tolerances `wider` times as wide."""
-    beams = rays.beams
-    walls = obstacles.walls
-    pose = poses[0]
-    ray = work.scratch[0].ray
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
-    total = 0.0
-    for i in range(len(beams)):
-        if math.isinf(beams[i].range):
-            continue
-        put_beam(ray, beams[i], c, s, pose)
-        ray.limit = min(rays.reach, beams[i].range + BEHIND)
-        across, w = across_wall(ray, beams[i].range, place, obstacles)
-        if w >= 0:
-            read, passed = evidence_of_beam(across / wider, walls[w])
-            total += BEAMS_READ * read - BEAMS_PASSED * passed
-    return total / max(1, len(beams))
 
 
 @kernel
