@@ -286,7 +286,7 @@ def _evaluated(found: Probabilities) -> ExplainedModel:
         Contribution(name, values.get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None)
         for name, nats in terms.items()
     )
-    return ExplainedModel(contributions, sum(terms.values()), found.by_model, model.on_map, found.on_map)
+    return ExplainedModel(contributions, sum(terms.values()), found.by_model, model.on_map, found.by_model_on_map)
 
 
 def _weighed(context: SearchContext, description: Description) -> tuple[WeighedAlternative, ...]:

@@ -81,7 +81,7 @@ def _print_alternatives(one: Json) -> None:
     compared = "not compared" if loose is None else f"{loose:.4f}"
     print(
         f"probability among them as scored: {among['as_scored']:.4f}; by what the scan shows: {among['by_shown']:.4f}; "
-        f"with walls off by more: {compared}; geometric mean: {among['mean']:.4f}"
+        f"with walls off by more: {compared}; weighted mean: {among['mean']:.4f}"
     )
 
 

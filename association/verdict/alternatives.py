@@ -12,9 +12,9 @@ Alternatives are compared three times.
   The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A
   misfit of centimetres is therefore no evidence against a place.
 
-None of the three is right for every map. Their geometric mean, a mean of their logarithms, agrees best with how often
-answers are right; it leaves places that are equal in all three the same probability. The least of the three decides
-whether an answer is usable: one thing that may have been moved, or centimetres, are not to decide alone.
+None of the three is right for every map. A weighted mean of their logarithms agrees best with how often answers are
+right; it leaves places that are equal in all three the same probability. The least of the three decides whether an
+answer is usable: one thing that may have been moved, or centimetres, must not decide alone.
 """
 
 from __future__ import annotations

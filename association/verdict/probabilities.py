@@ -30,7 +30,7 @@ class Probabilities:
         With the null score where it was needed and matters.
     explained : float
         That this place or a similar one is right, wherever along an unobservable direction; out-of-map scans included.
-    on_map, by_model : float
+    by_model_on_map, by_model : float
         By the model, before the alternatives: for a scan that is known to be of this map, without the null score; and
         with out-of-map scans included.
     among : AmongAlternatives
@@ -45,7 +45,7 @@ class Probabilities:
     model: Model
     features: Features
     explained: float
-    on_map: float
+    by_model_on_map: float
     by_model: float
     among: AmongAlternatives
     null: NullScore | None
@@ -55,7 +55,7 @@ class Probabilities:
     @property
     def right(self) -> float:
         """Return the probability that the pose is right, given that the robot is on this map."""
-        return self.on_map * self.among.mean
+        return self.by_model_on_map * self.among.mean
 
     @property
     def cautious(self) -> float:
@@ -101,7 +101,7 @@ def _at_first(context: SearchContext, description: Description) -> Probabilities
         model=model,
         features=Features(*described.item()),
         explained=probability(model.odds, _as_if_fixed(described), 0.0),
-        on_map=probability(model.odds, described, model.on_map),
+        by_model_on_map=probability(model.odds, described, model.on_map),
         by_model=probability(model.odds, described, 0.0),
         among=compare_three_ways(context, description.answer, description.others, description.alternatives),
         null=None,
