@@ -176,13 +176,13 @@ ALTERNATIVE = fields((_F, "gap counted"))
 # Facts of an answer in addition to its score: the position's deviation along its weakest direction, and by how much it
 # would move without one wall and its deviation then, m; how many walls hold a match; fraction of directions in which
 # the scan shows what the map does; fractions of the beams that read farther, and nearer, than the map shows, that
-# passed through a wall, and that end where the map shows nothing; length of the longest segment that is not matched, of
-# all of these, and of those that are as long as walls, m.
+# passed through a wall; length of the longest segment that is not matched, and of all of these that are as long as
+# walls, m.
 FACTS = fields(
     (
         _F,
-        "weakest critical_displacement critical_deviation walls agreement farther nearer passed unmapped "
-        "longest unmatched unmatched_walls",
+        "weakest critical_displacement critical_deviation walls agreement farther nearer passed longest "
+        "unmatched_walls",
     )
 )
 

@@ -35,8 +35,6 @@ class BeamFractions:
         That read nearer: something stands before the wall.
     passed : float
         That passed through a wall; those that end shortly behind it count in part.
-    unmapped : float
-        That have a return where the map shows nothing, neither before it nor behind it.
     in_step : float
         Mean fraction of an exact view's beams that read the map's walls, over that of all views; 1 if no view is
         uncertain. If it is low, the other views may be placed well, and the scan's frame not.
@@ -45,7 +43,6 @@ class BeamFractions:
     farther: float = 0.0
     nearer: float = 0.0
     passed: float = 0.0
-    unmapped: float = 0.0
     in_step: float = 1.0
 
 

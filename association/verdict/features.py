@@ -33,32 +33,27 @@ class Features(NamedTuple):
     lead : over the best other explanation, nats
     solitude : minus the log of the others' tempered evidence, of what may have been missed the less
     inlier_fraction : of the scan's length that is matched
-    root_count : square root of the number of matched segments
-    root_length : square root of their length, sqrt(m)
+    root_length : square root of the length of the matched segments, sqrt(m)
     deviation : standard deviation of the position along its weakest direction, m, up to `MOST_DEVIATION`
     misfit : log of the mean squared offset over what the scan's sigmas expect
-    inverse_count : one over the number of matched segments
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`; of a drive
         the mean over its views
     agreement : fraction of directions in which the scan shows what the map does
-    read : fraction of the beams that read the wall they should; 0 without beams
     root_passed : root of the fraction that passed through a wall, short walls less, as in the score
     root_farther, root_nearer : roots of the fractions of the beams that read farther, and nearer, than the map shows
     root_passed_any : root of the fraction of the beams that passed through a wall, however short
-    root_unmapped : root of the fraction of the beams that end where the map shows nothing
     critical_displacement : how far the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
     critical_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
     null : score of the mirrored scan over the answer's, from `NULL_FRACTION` to `MOST_NULL`; the least where the map
         is symmetric about the place
     null_gap : root of what the answer's score has over the mirrored scan's, in nats, up to that of `MAX_GAP`; likewise
     null_better : by how much the mirrored scan's score over the answer's is above 1, symmetric or not, at most
-    root_score : root of the score by segments, nats
     blocked : root of the penalty of lines of sight, nats
     walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
-    root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive
-        that of the mean over its views
-    root_unmatched_walls : likewise of segments that are as long as walls, in part from the first of `LIKE_WALLS` on
+    root_unmatched_walls : square root of the length of the segments that are not matched and are as long as walls, in
+        part from the first of `LIKE_WALLS` on, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive the mean over its
+        views
     squared_solitude : square of `solitude`
     """
 
@@ -66,29 +61,23 @@ class Features(NamedTuple):
     lead: float
     solitude: float
     inlier_fraction: float
-    root_count: float
     root_length: float
     deviation: float
     misfit: float
-    inverse_count: float
     longest_unmatched: float
     agreement: float
-    read: float
     root_passed: float
     root_farther: float
     root_nearer: float
     root_passed_any: float
-    root_unmapped: float
     critical_displacement: float
     critical_deviation: float
     null: float
     null_gap: float
     null_better: float
-    root_score: float
     blocked: float
     walls: float
     misfit_of_many: float
-    root_unmatched: float
     root_unmatched_walls: float
     squared_solitude: float
 
@@ -160,7 +149,6 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
         farther=answer.beams.farther,
         nearer=answer.beams.nearer,
         passed=answer.beams.passed,
-        unmapped=answer.beams.unmapped,
     )
     kernels.measure_leverages(answer.estimated.leverages, facts)
     views = context.scan.views
@@ -174,10 +162,8 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
     longest = np.zeros(len(views))
     np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
     facts["longest"] = longest @ views.weights / views.weights.sum()
-    facts["unmatched"] = _of_mean_view(context, seen)
-    like_walls = seen.copy()
-    like_walls["length"] *= np.interp(seen["length"], LIKE_WALLS, (0.0, 1.0))
-    facts["unmatched_walls"] = _of_mean_view(context, like_walls)
+    seen["length"] *= np.interp(seen["length"], LIKE_WALLS, (0.0, 1.0))
+    facts["unmatched_walls"] = _of_mean_view(context, seen)
     return facts
 
 

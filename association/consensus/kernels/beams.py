@@ -89,12 +89,11 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, obstacles: Place, ray:
 @kernel
 def beam_fractions(
     rays: Rays, poses: Records, place: Place, obstacles: Place, work: Workspace
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float]:
     """Return the fractions of the beams that do not read what the map shows from the first pose, (1,).
 
-    These are the fractions that read farther, and nearer; that passed through a wall or a point, which a beam does in
-    full at twice `NEAR` behind it, and not at all at `NEAR`; and that have a return where the map shows nothing. Beams
-    without a return are not compared.
+    These are the fractions that read farther, and nearer; and that passed through a wall or a point, which a beam does
+    in full at twice `NEAR` behind it, and not at all at `NEAR`. Beams without a return are not compared.
     """
     beams = rays.beams
     pose = poses[0]
@@ -104,7 +103,6 @@ def beam_fractions(
     farther = 0
     nearer = 0
     passed = 0.0
-    unmapped = 0
     for i in range(len(beams)):
         if math.isinf(beams[i].range):
             continue
@@ -112,7 +110,6 @@ def beam_fractions(
         ray.limit = min(rays.reach, beams[i].range + WALL_BEHIND)
         across, w = across_wall(ray, beams[i].range, place, obstacles)
         if w < 0:
-            unmapped += 1
             continue
         passed += min(1.0, max(0.0, across / NEAR - 1.0))
         if across > FARTHER_BY and w < len(place.walls):
@@ -120,7 +117,7 @@ def beam_fractions(
         elif across < -NEAR:
             nearer += 1
     n = max(1, len(beams))
-    return farther / n, nearer / n, passed / n, unmapped / n
+    return farther / n, nearer / n, passed / n
 
 
 @kernel

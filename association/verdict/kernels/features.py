@@ -4,10 +4,9 @@ import math
 
 from compiled import kernel
 from registration.kernels import MAX_DEVIATION
-from registration.layout import Record, Records
+from registration.layout import Records
 
 from ...consensus.kernels.matching import part_of_match
-from ...consensus.tuning import BEAMS_PASSED, BEAMS_READ
 from ..tuning import (
     CROWD_TEMPERATURE,
     FEW_WALLS,
@@ -46,53 +45,39 @@ def describe(scores: Records, posterior: float, facts: Records, alternatives: Re
     out.lead = min(lead, MAX_LEAD)
     out.solitude = -crowd
     out.inlier_fraction = best.fraction
-    out.root_count = math.sqrt(best.count)
     out.root_length = math.sqrt(best.length)
     out.deviation = min(fact.weakest, MOST_DEVIATION)
     out.misfit = misfit
-    out.inverse_count = 1.0 / max(1.0, best.count)
     out.longest_unmatched = min(fact.longest, LONGEST_UNMATCHED)
     out.agreement = fact.agreement
-    out.read = best.read
     out.root_passed = math.sqrt(best.passed)
     out.root_farther = math.sqrt(fact.farther)
     out.root_nearer = math.sqrt(fact.nearer)
     out.root_passed_any = math.sqrt(fact.passed)
-    out.root_unmapped = math.sqrt(fact.unmapped)
     out.critical_displacement = min(fact.critical_displacement, MOST_DEVIATION)
     out.critical_deviation = min(fact.critical_deviation, MOST_DEVIATION)
     out.null = NULL_FRACTION
     out.null_gap = root_gap((1.0 - NULL_FRACTION) * best.score)
     out.null_better = 0.0
-    out.root_score = math.sqrt(max(0.0, by_segments(best)))
     out.blocked = math.sqrt(best.blocked)
     out.walls = math.sqrt(fact.walls)
     out.misfit_of_many = misfit * min(best.count, MANY) / MANY
-    out.root_unmatched = math.sqrt(min(fact.unmatched, MOST_UNMATCHED))
     out.root_unmatched_walls = math.sqrt(min(fact.unmatched_walls, MOST_UNMATCHED))
     out.squared_solitude = crowd * crowd
-
-
-@kernel
-def by_segments(best: Record) -> float:
-    """Return a score without the beams' part, nats."""
-    return best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed
 
 
 @kernel
 def measure_unmatched(scan: Records, matches: Records, facts: Records) -> None:
     """Write the lengths of the scan lines that are not matched, metres, to `facts` (1,).
 
-    These are the longest; all of them together; and together those that are as long as walls.
+    These are the longest, and together those that are as long as walls.
     """
     fact = facts[0]
     fact.longest = 0.0
-    fact.unmatched = 0.0
     fact.unmatched_walls = 0.0
     for i in range(len(scan)):
         left = (1.0 - part_of_match(matches[i])) * scan[i].length
         fact.longest = max(fact.longest, left)
-        fact.unmatched += left
         fact.unmatched_walls += left * like_wall(scan[i].length)
 
 

@@ -70,20 +70,17 @@ def beam_evidence(rays: Rays, pose: RigidTransform, place: Place, obstacles: Pla
     return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams))
 
 
-def beam_fractions(
-    rays: Rays, pose: RigidTransform, place: Place, obstacles: Place
-) -> tuple[float, float, float, float]:
+def beam_fractions(rays: Rays, pose: RigidTransform, place: Place, obstacles: Place) -> tuple[float, float, float]:
     """Count the beams that read farther than the walls of the map, and nearer than it shows.
 
-    Then those that pass through what it shows, by the distance behind it, and those that end where it shows nothing.
+    Then those that pass through what it shows, by the distance behind it.
     """
     found = list(offsets(rays, pose, place, obstacles, WALL_BEHIND))
     n = max(1, len(rays.beams))
     farther = sum(across > FARTHER_BY and w < len(place.walls) for across, w, _ in found)
     nearer = sum(across < -NEAR for across, _, _ in found)
     passed = sum(float(np.interp(across, (NEAR, 2.0 * NEAR), (0.0, 1.0))) for across, _, _ in found)
-    unmapped = int(np.isfinite(rays.beams["range"]).sum()) - len(found)
-    return farther / n, nearer / n, passed / n, unmapped / n
+    return farther / n, nearer / n, passed / n
 
 
 def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:

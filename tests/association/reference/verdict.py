@@ -10,7 +10,7 @@ import numpy as np
 
 from association import HardPrior, Status
 from association.consensus.consensus_set import ConsensusSet
-from association.consensus.tuning import BEAMS_PASSED, BEAMS_READ, CONTRADICTION, USUAL_WALLS
+from association.consensus.tuning import CONTRADICTION, USUAL_WALLS
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.tuning import RIVAL_SHARE
@@ -83,7 +83,6 @@ def features(
     nearest = max((worth(rival) for rival in rivals), default=-math.inf)
     crowd = evidence(answer, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
     misfit = math.log(sorted((tuning.LEAST_MISFIT, best.misfit, tuning.MOST_MISFIT))[1])
-    by_segments = best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed
     share, counts = 0.0, 1.0
     if null is not None:
         share = min(tuning.MOST_NULL, null.score / best.score)
@@ -96,29 +95,23 @@ def features(
         "lead": min(tuning.MAX_LEAD, worth(best) - nearest if rivals else best.posterior),
         "solitude": -math.log(crowd),
         "inlier_fraction": best.fraction,
-        "root_count": count**0.5,
         "root_length": best.length**0.5,
         "deviation": min(answer.estimated.weakest, tuning.MOST_DEVIATION),
         "misfit": misfit,
-        "inverse_count": 1.0 / count if count else 1.0,
         "longest_unmatched": min(max([0.0, *clutter]), tuning.LONGEST_UNMATCHED),
         "agreement": answer.agreement,
-        "read": best.read,
         "root_passed": best.passed**0.5,
         "root_farther": answer.beams.farther**0.5,
         "root_nearer": answer.beams.nearer**0.5,
         "root_passed_any": answer.beams.passed**0.5,
-        "root_unmapped": answer.beams.unmapped**0.5,
         "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),
         "critical_deviation": min(max([0.0, *(one[2] for one in leverages)]), tuning.MOST_DEVIATION),
         "null": counted,
         "null_gap": root(gap),
         "null_better": max(0.0, share - 1.0),
-        "root_score": root(max(0.0, by_segments)),
         "blocked": best.blocked**0.5,
         "walls": len(leverages) ** 0.5,
         "misfit_of_many": misfit * min(1.0, count / tuning.MANY),
-        "root_unmatched": min(sum(clutter), tuning.MOST_UNMATCHED) ** 0.5,
         "root_unmatched_walls": min(
             sum(clutter * np.interp(clutter, tuning.LIKE_WALLS, (0.0, 1.0))), tuning.MOST_UNMATCHED
         )

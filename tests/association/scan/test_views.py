@@ -320,7 +320,7 @@ def test_a_drive_whose_last_view_does_not_fit_is_not_gone_by() -> None:
     assert (verdict.status, [one.code for one in verdict.reasons][:1]) == (Status.AMBIGUOUS, ["map_mismatch"])
 
 
-@pytest.mark.parametrize(("covariance", "longest", "together"), [(STEP, 1.0, 1.0), (None, 1.5, 3.0)])
+@pytest.mark.parametrize(("covariance", "longest", "together"), [(STEP, 1.0, 0.5), (None, 1.5, 2.0)])
 def test_what_is_on_no_wall_counts_by_view_of_a_drive(
     covariance: Floats | None, longest: float, together: float
 ) -> None:
@@ -337,4 +337,4 @@ def test_what_is_on_no_wall_counts_by_view_of_a_drive(
     assert answer is not None
     features = features_of(context, answer)
     assert features.longest_unmatched == pytest.approx(longest, abs=0.01)
-    assert features.root_unmatched**2 == pytest.approx(together, abs=0.02)
+    assert features.root_unmatched_walls**2 == pytest.approx(together, abs=0.02)

@@ -52,35 +52,29 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         lead=4.0,
         solitude=-math.log(crowd),
         inlier_fraction=0.9,
-        root_count=math.sqrt(5.0),
         root_length=5.0,
         deviation=0.3,
         misfit=math.log(2.0),
-        inverse_count=0.2,
         longest_unmatched=3.0,
         agreement=0.85,
-        read=0.5,
         root_passed=0.2,
         root_farther=0.3,
         root_nearer=0.4,
         root_passed_any=0.3,
-        root_unmapped=0.5,
         critical_displacement=0.25,
         critical_deviation=0.4,
         null=0.7,
         null_gap=math.sqrt(0.3 * 80.0),
         null_better=0.0,
-        root_score=math.sqrt(80.0 - 50.0 + 2.0),
         blocked=2.0,
         walls=math.sqrt(3.0),
         misfit_of_many=math.log(2.0) * 5.0 / 8.0,
-        root_unmatched=math.sqrt(6.5),
         root_unmatched_walls=math.sqrt(3.0 + 2.0 + 0.875 * 1.5),
         squared_solitude=math.log(crowd) ** 2,
     )
     estimated = estimated_of(registered_room(), leverages_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
     got = features_beside(
-        answer_with(best, estimated=estimated, agreement=0.85, beams=BeamFractions(0.09, 0.16, 0.09, 0.25)), rivals
+        answer_with(best, estimated=estimated, agreement=0.85, beams=BeamFractions(0.09, 0.16, 0.09)), rivals
     )
     assert got._asdict() == pytest.approx(expected._asdict())
 
@@ -94,17 +88,14 @@ def test_features_say_no_more_beyond_their_limits() -> None:
     worse = features_beside(answer_with(ranked(30.0)), [ranked(50.0)])
     assert (worse.lead, worse.solitude) == pytest.approx((-20.0, 0.0), abs=1e-5)
     nothing = features_beside(answer_with(ranked(matched=0, fraction=0.0, misfit=0.0), significance=1e-300), [])
-    assert (nothing.root_count, nothing.inverse_count) == (0.0, 1.0)
     assert nothing.misfit == math.log(tuning.LEAST_MISFIT)
-    assert (nothing.longest_unmatched, nothing.root_unmatched) == (tuning.LONGEST_UNMATCHED, 4.0)
+    assert (nothing.longest_unmatched, nothing.root_unmatched_walls) == (tuning.LONGEST_UNMATCHED, 4.0)
     assert (nothing.critical_displacement, nothing.critical_deviation, nothing.walls) == (0.0, 0.0, 0.0)
     whole = features_beside(answer_with(ranked(fraction=1.0, misfit=1e9)), [])
-    assert (whole.longest_unmatched, whole.root_unmatched) == (0.0, 0.0)
+    assert (whole.longest_unmatched, whole.root_unmatched_walls) == (0.0, 0.0)
     assert whole.misfit == whole.misfit_of_many == math.log(tuning.MOST_MISFIT)
     loose = features_beside(hinging(leverages_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
     assert (loose.deviation, loose.critical_displacement, loose.critical_deviation) == (tuning.MOST_DEVIATION,) * 3
-    by_beams = features_beside(hinging(score=40.0, read=0.9), [])
-    assert by_beams.root_score == 0.0
 
 
 @given(

@@ -20,12 +20,12 @@ from ..scenes import CORRIDOR, INSIDE, ROOM, answer_of, equal_rooms, index_of, m
 
 USUAL_ONE = Features(*([0.0] * len(Features._fields)))
 # One feature of each reason, from which every unit takes a nat.
-MODEL = as_model({name: [-1.0] for name in ("lead", "critical_displacement", "inlier_fraction", "root_count", "null")})
+MODEL = as_model({name: [-1.0] for name in ("lead", "critical_displacement", "inlier_fraction", "root_length", "null")})
 ONE_OF = {
     "similar_place": "lead",
     "single_wall": "critical_displacement",
     "map_mismatch": "inlier_fraction",
-    "insufficient_evidence": "root_count",
+    "insufficient_evidence": "root_length",
 }
 ONE_OF["not_on_map"] = "null"
 NOTHING: Mapping[str, float] = {}
@@ -87,11 +87,11 @@ def test_several_features_of_a_reason_count_together() -> None:
 
 
 def test_what_is_far_behind_is_no_twin() -> None:
-    model = as_model({"solitude": [1.0], "root_count": [1.0]})
+    model = as_model({"solitude": [1.0], "root_length": [1.0]})
     standing = Doubts(Status.AMBIGUOUS)
 
     def codes_at(lead: float, *, alone: bool = False) -> list[str]:
-        features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0)
+        features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_length=-2.0)
         return [reason.code for reason in reasons_of(replace(standing, alone=alone), features, model)]
 
     assert codes_at(NO_ALTERNATIVE) == ["similar_place", "insufficient_evidence"]
