@@ -86,7 +86,7 @@ def ranked(
         "inside": True,
         "chi_square": 6.0,
         "one_step_chi_square": 9.0,
-        "length": 30.0,
+        "length": 3.75 * matched,
         "fraction": 0.9,
         "misfit": 1.0,
         "blocked": 0.0,

@@ -41,13 +41,14 @@ USUAL_DEVIATION = 0.03
 PLAIN: dict[str, dict[str, list[float]]] = {
     "segments": {
         "constant": [-6.0], "lead": [0.1, 20.0, -0.05], "solitude": [0.02], "inlier_fraction": [5.0, 0.85, -4.0],
-        "root_length": [0.9], "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "walls": [0.1],
+        "root_length": [0.31], "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "walls": [0.1],
         "critical_displacement": [-1.0], "null": [-1.0, 0.8, -6.0],
         "null_gap": [0.05], "null_better": [-3.0], "on_map": [1.0],
     },
     "ranges": {
         "constant": [-6.0], "lead": [0.1, 30.0, -0.1], "inlier_fraction": [6.0], "root_length": [1.0],
-        "root_nearer": [-6.0], "root_passed": [-8.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0], "on_map": [1.5],
+        "root_nearer": [-6.0], "root_passed": [-8.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0],
+        "on_map": [1.5],
     },
 }  # fmt: skip
 
