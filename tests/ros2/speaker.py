@@ -29,7 +29,9 @@ def speak(name: str) -> None:
     while not ended.wait(0.05):
         publisher.publish(String(name))
         for message in subscription.take():
-            print(name, message.data, flush=True)
+            # The processes share a pipe, and print writes each word by itself where Python does not buffer.
+            sys.stdout.write(f"{name} {message.data}\n")
+            sys.stdout.flush()
 
 
 for name, variables in json.loads(sys.argv[1]).items():
