@@ -23,7 +23,7 @@ from .verdict.models import USUAL
 from .verdict.probabilities import Probabilities
 from .verdict.reasons import taken_by_reason
 from .verdict.roles import ROLES
-from .verdict.tuning import NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from .verdict.tuning import NO_MATCH_PROBABILITY, USABLE_CAUTIOUS
 from .verdict.verdict import Verdict
 from .verdict.vetoes import VETOES, Origin
 
@@ -136,7 +136,7 @@ class VetoOutcome:
 class VerdictExplanation:
     """The numbers behind the verdict on an answer.
 
-    The answer is usable if ``probability_of_pose`` and ``cautious`` reach their thresholds and no veto applies. The
+    The answer is usable if ``cautious`` reaches its threshold and no veto applies. The
     first one is the probability by the model, on a map that is known, times the mean of those among the alternatives;
     the second one that by the model times the least of them.
 
@@ -164,7 +164,7 @@ class VerdictExplanation:
     explained : float or None
         Probability that this place or a similar one is right.
     thresholds : mapping of str to float
-        Of ``probability_of_pose``, ``cautious`` and ``explained``.
+        Of ``cautious`` and ``explained``.
     """
 
     status: Status
@@ -271,11 +271,7 @@ def _with_numbers(
         probability_of_pose=found.right,
         cautious=found.cautious,
         explained=found.explained,
-        thresholds={
-            "probability_of_pose": USABLE_PROBABILITY,
-            "cautious": found.least_cautious,
-            "explained": NO_MATCH_PROBABILITY,
-        },
+        thresholds={"cautious": USABLE_CAUTIOUS, "explained": NO_MATCH_PROBABILITY},
     )
 
 

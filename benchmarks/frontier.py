@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from association.verdict.models import MODELS
-from association.verdict.tuning import USABLE_CAUTIOUS, USABLE_PROBABILITY
+from association.verdict.tuning import USABLE_CAUTIOUS
 
 from .curves import Answers
 from .examples import RANGES, SEGMENTS, Example, collected
@@ -25,8 +25,7 @@ from .pictures import COLOURS, panels, save
 from .table import print_table
 from .worlds.goals import KEPT
 
-BARS = (0.0, 0.3, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.88, 0.9, 0.92, 0.94, 0.96, 0.97, 0.98, 0.99, 0.995)
-CHOSEN = {RANGES: USABLE_CAUTIOUS, SEGMENTS: USABLE_CAUTIOUS}
+BARS = (0.0, 0.3, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 0.995)
 STRANGE = ("unmapped", "sister")  # the conditions whose scans are hardest to tell
 
 
@@ -55,7 +54,7 @@ class Point:
 def frontier(form: str, examples: Sequence[Example], bars: Sequence[float] = BARS) -> list[Point]:
     """Return a point for each bar, of examples of one form."""
     p = by_model(MODELS[form], Answers.of(examples))
-    open_to = (p.likely >= USABLE_PROBABILITY) & ~np.array([e.degenerate for e in examples])
+    open_to = ~np.array([e.degenerate for e in examples])
     right, told = np.array([e.right for e in examples]), np.array([e.told for e in examples])
     here = ~np.array([e.stranger for e in examples])
     conditions = np.array([e.condition for e in examples])
@@ -96,7 +95,7 @@ def main() -> None:
     for form in (RANGES, SEGMENTS):
         examples = collected(args.keep, form, args.stride, kept_for_report=True)
         found[form] = frontier(form, examples)
-        [chosen[form]] = frontier(form, examples, [CHOSEN[form]])
+        [chosen[form]] = frontier(form, examples, [USABLE_CAUTIOUS])
         cells = [
             (f"{p.bar:g}", *(f"{share:.1f}" for share in p.kept.values()), f"{p.let_in:.2f}", f"{p.wrong:.2f}")
             for p in found[form]

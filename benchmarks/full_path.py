@@ -9,7 +9,7 @@ import numpy as np
 
 from association.verdict.features import Features
 from association.verdict.models import USUAL, Model
-from association.verdict.tuning import NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from association.verdict.tuning import NO_MATCH_PROBABILITY
 from association.verdict.vetoes import VETOES
 
 from . import curves
@@ -60,7 +60,7 @@ class Answered:
     probability : float64
         As answered; nan where nothing matches, or along an unobservable direction: there is none.
     passes : bool
-        True if both probabilities reach their thresholds.
+        True if the cautious probability reaches its threshold.
     usable : bool
         The same, and that no veto applies.
     """
@@ -74,7 +74,7 @@ def answered(examples: Sequence[Example], by: Probabilities, threshold: float) -
     """Return the verdicts by the probabilities of each answer; `threshold` is of the careful one."""
     found = np.where(by.explained < NO_MATCH_PROBABILITY, np.nan, by.likely)
     found[[e.degenerate for e in examples]] = np.nan
-    passes = (by.likely >= USABLE_PROBABILITY) & (by.careful >= threshold)
+    passes = by.careful >= threshold
     return Answered(found, passes, passes & np.array([not e.vetoes for e in examples], bool))
 
 

@@ -17,7 +17,8 @@ def explain(
 ) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
-    The answer is that of linefix locate. It is usable if both probabilities reach their thresholds and no veto applies.
+    The answer is that of linefix locate. It is usable if the cautious probability reaches its threshold and no veto
+    applies.
     """
     from . import here
 
@@ -99,7 +100,7 @@ def _print_null(null: Json | None) -> None:
 
 
 def _print_probabilities(one: Json) -> None:
-    """Print the probabilities next to their thresholds, and what follows."""
+    """Print the probabilities that decide next to their thresholds, and what follows."""
     if one["thresholds"] is not None:
         print("\nProbabilities")
         rows = [

@@ -14,7 +14,7 @@ from .features import Description, Features, add_null_score
 from .kernels.null_features import allowed_null
 from .kernels.odds import probability
 from .models import MODELS, USUAL, Model
-from .tuning import USABLE_CAUTIOUS, USABLE_CAUTIOUS_DRIVE, USABLE_PROBABILITY
+from .tuning import USABLE_CAUTIOUS
 from .vetoes import Veto
 
 
@@ -38,8 +38,6 @@ class Probabilities:
         Of the mirrored scan; None where that was not searched.
     null_above : float
         Fraction of the answer's score below which the mirrored scan was not searched; 0 where all was.
-    least_cautious : float
-        The threshold of `cautious`.
     """
 
     model: Model
@@ -50,7 +48,6 @@ class Probabilities:
     among: AmongAlternatives
     null: NullScore | None
     null_above: float
-    least_cautious: float
 
     @property
     def right(self) -> float:
@@ -64,8 +61,8 @@ class Probabilities:
 
     @property
     def suffice(self) -> bool:
-        """Return whether both probabilities reach their thresholds."""
-        return self.right >= USABLE_PROBABILITY and self.cautious >= self.least_cautious
+        """Return whether the cautious probability reaches its threshold; `right` is never less."""
+        return self.cautious >= USABLE_CAUTIOUS
 
 
 def work_out_probabilities(context: SearchContext, description: Description, vetoes: tuple[Veto, ...]) -> Probabilities:
@@ -106,7 +103,6 @@ def _at_first(context: SearchContext, description: Description) -> Probabilities
         among=compare_three_ways(context, description.answer, description.others, description.alternatives),
         null=None,
         null_above=0.0,
-        least_cautious=least_cautious(context),
     )
 
 
@@ -116,7 +112,7 @@ def _with_null_score(
     """Search the mirrored scan; if the answer is `certain` otherwise, only as far as the null score may change that."""
     described, best, least = description.features.copy(), description.answer.best, 0.0
     if certain:
-        bar = found.least_cautious / found.among.least
+        bar = USABLE_CAUTIOUS / found.among.least
         least = allowed_null(found.model.odds, described.copy(), best.score, bar)
     null = find_null_score(context, best, least)
     add_null_score(described, best, null)
@@ -132,10 +128,3 @@ def _as_if_fixed(described: Records) -> Records:
     fixed = described.copy()
     fixed["deviation"] = USUAL.deviation
     return fixed
-
-
-def least_cautious(context: SearchContext) -> float:
-    """Return the least cautious probability of a usable answer."""
-    if context.scan.views is not None and context.scan.views.uncertain:
-        return USABLE_CAUTIOUS_DRIVE
-    return USABLE_CAUTIOUS

@@ -16,7 +16,7 @@ from .features import Description, describe_answer
 from .inconsistencies import displaced_walls, turn_during_scan
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import REASON_MESSAGES, Doubts, reasons_of
-from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_CAUTIOUS
 from .unobservable import beyond_tolerance, choose_along_direction
 from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 
@@ -213,7 +213,7 @@ def _reasons(
         status,
         vetoes,
         not_on_map=found.explained < ELSEWHERE_PROBABILITY and not on_map,
-        similar_place=found.among.least < USABLE_PROBABILITY,
+        similar_place=found.among.least < USABLE_CAUTIOUS,
         alone=not description.others,
     )
     return reasons_of(doubts, found.features, found.model)

@@ -63,8 +63,6 @@ def kind_of(one: Drawn, other: Drawn) -> str:
         return f"explained{beams}"
     if Status.DEGENERATE in (a.status, b.status):
         return "deviation"
-    if min(a.right, b.right) < tuning.USABLE_PROBABILITY <= max(a.right, b.right):
-        return f"right{beams}"
     if a.mirrored is not b.mirrored and max(a.careful, b.careful) >= bar_of(one.context):
         return f"mirrored{beams}"
     assert min(a.careful, b.careful) < bar_of(one.context) <= max(a.careful, b.careful)

@@ -192,7 +192,7 @@ def judge(
     ):
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
-    likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
+    likely = not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
         numbers = features(context, answer, rivals, find_null_score(context, best))
         careful = logistic(logit(model_of(context, models), numbers))

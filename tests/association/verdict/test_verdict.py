@@ -44,7 +44,6 @@ def test_an_answer_is_usable_from_the_limit_on(form: str, with_beams: bool) -> N
     with judged_by(
         {**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}},
         USABLE_CAUTIOUS=0.6,
-        USABLE_PROBABILITY=0.5,
     ):
         low, high = crossing(lambda lead: leading(lead, with_beams=with_beams).verdict.status, 40.0, 60)
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
@@ -95,7 +94,7 @@ def test_twins_share_both_probabilities() -> None:
         assert leading(0.0).verdict.status is Status.AMBIGUOUS
         with judged_by(SURE, USABLE_CAUTIOUS=0.6):
             assert leading(0.0).verdict.status is Status.AMBIGUOUS
-        with judged_by(SURE, USABLE_PROBABILITY=0.4, USABLE_CAUTIOUS=0.4):
+        with judged_by(SURE, USABLE_CAUTIOUS=0.4):
             assert leading(0.0).verdict.status is Status.OK
 
 
@@ -139,7 +138,7 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
 def test_at_every_limit_itself_an_answer_is_usable() -> None:
     """All chances are one half, and so are the limits."""
     even = {name: {"constant": [0.0], "on_map": [0.0]} for name in PLAIN}
-    names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
+    names = ("USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
     alone = explanations_of(answer_with(ranked()))
     assert alone.answer is not None
     with judged_by(even, **dict.fromkeys(names, 0.5)):
@@ -148,11 +147,9 @@ def test_at_every_limit_itself_an_answer_is_usable() -> None:
         for in_step, usable in ((tuning.LEAST_IN_STEP, True), (tuning.LEAST_IN_STEP - 1e-9, False)):
             beams = replace(alone.answer.beams, in_step=in_step)
             assert judge(room(), replace(alone, answer=replace(alone.answer, beams=beams))).usable is usable
-    for name in names[:2]:
+    for name, status in (("USABLE_CAUTIOUS", Status.AMBIGUOUS), ("NO_MATCH_PROBABILITY", Status.NO_MATCH)):
         with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
-            assert judge(room(), alone).status is Status.AMBIGUOUS
-    with judged_by(even, **dict.fromkeys(names, 0.5) | {"NO_MATCH_PROBABILITY": math.nextafter(0.5, 1.0)}):
-        assert judge(room(), alone).status is Status.NO_MATCH
+            assert judge(room(), alone).status is status
 
 
 def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
