@@ -83,7 +83,7 @@ def test_a_new_opening_shortens_its_wall_on_both_sides() -> None:
     hall = segments(RACK, PILLAR)
     recess = [[0, 0, 5, 0], [5, 0, 5, -2], [5, -2, 6.5, -2], [6.5, -2, 6.5, 0], [6.5, 0, 12, 0]]
     today = Segments.from_array(np.array([*recess, *OUTLINE[1:], *RACK, *PILLAR], dtype=float))
-    found = updated(hall, *visits(today, today, today))
+    found = updated(hall, *visits(*[today] * 6))
     short = [one for one in found.changes if one.code == "shortened"]
     assert [one.segments for one in short] == [(0,)]
     assert np.abs(short[0].new - [[0, 0, 5, 0], [6.5, 0, 12, 0]]).max() < 0.35

@@ -69,11 +69,11 @@ def test_a_visit_counts_though_most_of_its_scans_are_off_the_map() -> None:
     """As where the map shows a part of the building."""
     other = Segments.from_array(np.array([[0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10], [11, 10, 0, 10],
                                           [0, 10, 0, 0]], dtype=float))  # fmt: skip
-    scans = [*days(TODAY), *days(other), *days(other)]
-    found = map_quality.update(index(), scans)
+    with_a_cart = MapIndex.build(segments(RACK, PILLAR, box(6.0, 5.0, 7.2, 5.8)), 0.005)
+    found = map_quality.update(with_a_cart, [*days(HALL), *days(other) * 2])
     assert found.refused_visits == ()
     assert [one.code for one in found.changes] == ["removed"]
-    (refused, *_) = map_quality.update(index(), [*days(TODAY), *days(other) * 4]).refused_visits
+    (refused, *_) = map_quality.update(with_a_cart, [*days(HALL), *days(other) * 6]).refused_visits
     assert "that the map shows the places" in refused.message
 
 
