@@ -136,9 +136,9 @@ class VetoOutcome:
 class VerdictExplanation:
     """The numbers behind the verdict on an answer.
 
-    The answer is usable if ``cautious`` reaches its threshold and no veto applies. The
-    first one is the probability by the model, on a map that is known, times the mean of those among the alternatives;
-    the second one that by the model times the least of them.
+    The answer is usable if ``cautious`` reaches its threshold and no veto applies. It is the probability by the model
+    times the least of those among the alternatives. ``probability_of_pose`` is that by the model for a scan of the map
+    times the mean of them.
 
     Attributes
     ----------
