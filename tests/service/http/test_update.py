@@ -13,7 +13,7 @@ import pytest
 from registration import RigidTransform, Segments
 from service.schemas import examples
 from simulation import scan
-from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, segments
+from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, box, segments
 
 URL = "/v1/maps/updated:update"
 APPLY = "/v1/maps:apply"
@@ -44,18 +44,18 @@ def days(*walls: Segments) -> list[dict[str, Any]]:
 
 def test_a_removed_rack_is_proposed_not_stored_and_accepted_by_put(client: httpx.Client) -> None:
     today = segments(PILLAR)
-    answer = client.post(URL, json={"visits": days(today, today), "client_ref": 7})
+    answer = client.post(URL, json={"visits": days(today, today, today), "client_ref": 7})
     assert answer.status_code == 200, answer.text
     found = answer.json()
     assert [(one["code"], one["segments"], one["new"]) for one in found["changes"]] == [
         ("removed", [12, 13, 14, 15], [])
     ]
     told = found["changes"][0]["evidence"]
-    assert (told["visits"], told["from"], told["to"]) == (2, "day 0", "day 1")
+    assert (told["visits"], told["from"], told["to"]) == (3, "day 0", "day 2")
     assert found["changes"][0]["accepted"]
     assert found["map"]["segments"] == today.endpoints.tolist()
     assert (found["map"]["frame_id"], found["map"]["meta"], found["map"]["sigma"]) == ("hall", {"floor": 3}, 0.005)
-    assert (found["scans"], found["held_back"]["scans"], found["complete"], found["client_ref"]) == (16, 2, True, 7)
+    assert (found["scans"], found["held_back"]["scans"], found["complete"], found["client_ref"]) == (24, 2, True, 7)
     assert found["sharpened"] == {"segments": [], "ends": [], "sigma": []}
     assert found["usable_after"] >= found["usable_before"] > 8
 
@@ -134,10 +134,13 @@ def test_an_unknown_map_is_404(client: httpx.Client) -> None:
 
 def test_the_accepted_changes_of_a_proposal_are_applied_without_its_scans(client: httpx.Client) -> None:
     """As the update itself would have done, which was sent the same refusals."""
+    crowded = segments(RACK, PILLAR, box(9.1, 4.4, 9.7, 5.0))
+    client.put("/v1/maps/updated", json={"segments": crowded.endpoints.tolist(), "sigma": 0.005}).raise_for_status()
     old = client.get("/v1/maps/updated").json()
-    today, taken = segments(), days(segments(), segments())
+    today = segments(RACK)
+    taken = days(today, today)
     found = client.post(URL, json={"visits": taken}).json()
-    assert sorted(one["segments"] for one in found["changes"]) == [[12, 13, 14, 15], [16, 17, 18, 19]]
+    assert sorted(one["segments"] for one in found["changes"]) == [[16, 17, 18, 19], [20, 21, 22, 23]]
     body = {"map": old, "changes": found["changes"], "sharpened": found["sharpened"], "client_ref": "page"}
     whole = client.post(APPLY, json=body)
     assert whole.status_code == 200, whole.text

@@ -19,8 +19,8 @@ from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, box, se
 
 from .plan import Plan, shown
 
-CRATE = box(9.1, 4.4, 9.7, 5.0)
-OLD, TODAY = segments(RACK, PILLAR), segments(PILLAR, CRATE)
+CRATE, SHELF, TABLE = box(9.1, 4.4, 9.7, 5.0), box(10.2, 6.6, 11.6, 7.4), box(0.5, 5.6, 1.5, 6.6)
+OLD, TODAY = segments(RACK, PILLAR, SHELF, TABLE), segments(PILLAR, SHELF, TABLE, CRATE)
 DAYS = ("monday", "tuesday", "wednesday")
 BOUNDS = (0.0, 0.0, 13.0, 9.0)
 REMOVED, ADDED = [0xD5, 0x5E, 0x00], [0x00, 0x9E, 0x73]
