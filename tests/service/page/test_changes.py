@@ -19,12 +19,12 @@ from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, box, se
 
 from .plan import Plan, shown
 
-CRATE, SHELF, TABLE = box(9.1, 4.4, 9.7, 5.0), box(10.2, 6.6, 11.6, 7.4), box(0.5, 5.6, 1.5, 6.6)
-OLD, TODAY = segments(RACK, PILLAR, SHELF, TABLE), segments(PILLAR, SHELF, TABLE, CRATE)
+CRATE = box(9.1, 4.4, 9.5, 4.8)
+OLD, TODAY = segments(RACK, PILLAR), segments(RACK, CRATE)
 DAYS = ("monday", "tuesday", "wednesday")
 BOUNDS = (0.0, 0.0, 13.0, 9.0)
 REMOVED, ADDED = [0xD5, 0x5E, 0x00], [0x00, 0x9E, 0x73]
-RACK_SIDE, CRATE_SIDE = (2.5, 3.0), (9.1, 4.7)  # m; on one wall of each
+PILLAR_SIDE, CRATE_SIDE = (8.6, 3.3), (9.1, 4.6)  # m; on one wall of each
 
 
 def ranges_of(walls: Segments, seed: int) -> list[tuple[RigidTransform, list[float]]]:
@@ -58,7 +58,7 @@ def payload(name: str, content: Any) -> FilePayload:
 
 @pytest.fixture
 def proposal(client: httpx.Client) -> Iterator[dict[str, Any]]:
-    """The proposal for a stored hall: the rack is gone, and a crate is new."""
+    """The proposal for a stored hall: the pillar is gone, and a crate is new."""
     document = {"segments": OLD.endpoints.tolist(), "sigma": 0.005}
     client.put("/v1/maps/page-hall", json=document).raise_for_status()
     visits = [visit(day, k) for k, day in enumerate(DAYS)]
@@ -89,13 +89,13 @@ def test_changes_have_colours_evidence_and_a_map_with_the_accepted_ones(
     expect(page.locator("#legend")).to_contain_text("removed")
     near = [drawn(page).colour(CRATE_SIDE[0], CRATE_SIDE[1] + 0.02 * k)[:3] for k in range(-5, 6)]
     assert ADDED in near
-    near = [drawn(page).colour(RACK_SIDE[0], RACK_SIDE[1] + 0.02 * k)[:3] for k in range(-10, 11)]
+    near = [drawn(page).colour(PILLAR_SIDE[0], PILLAR_SIDE[1] + 0.02 * k)[:3] for k in range(-10, 11)]
     assert REMOVED in near  # dashed
 
     told = next(one for one in proposal["changes"] if one["code"] == "removed")["evidence"]
     beams, places, visits = (told[name] for name in ("beams_through", "poses", "visits"))
     evidence = f"{beams} beams pass through the old walls; from {places} places on {visits} visits"
-    page.mouse.move(*drawn(page).at(*RACK_SIDE))
+    page.mouse.move(*drawn(page).at(*PILLAR_SIDE))
     expect(page.locator("#hover")).to_contain_text(evidence)
     page.mouse.move(*drawn(page).at(6.0, 6.0))
     expect(page.locator("#hover")).to_be_hidden()
