@@ -29,7 +29,7 @@ def speak(name: str) -> None:
     while not ended.wait(0.05):
         publisher.publish(String(name))
         for message in subscription.take():
-            # All processes write to one pipe, and print writes each word by itself where Python does not buffer.
+            # print() writes word after word if Python does not buffer: lines of two processes would mix.
             sys.stdout.write(f"{name} {message.data}\n")
             sys.stdout.flush()
 
