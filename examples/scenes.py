@@ -77,7 +77,7 @@ def flat() -> Scene:
 def office() -> Scene:
     """Draw an office floor with a robot among furniture that is on no map."""
     floor = offices(np.random.default_rng(7), OfficePlan(rooms=5, corridors=2))
-    pose = floor.poses[4]
+    pose = floor.poses[5]
     boxes = [_box(pose.x + 1.1, pose.y - 0.9, 0.6, 0.4, 0.3), _box(pose.x - 1.0, pose.y + 1.2, 0.8, 0.5, -0.2)]
     return Scene(
         "An office",
