@@ -61,7 +61,7 @@ UNLIKE_SYMMETRY, SYMMETRIC = (
     0.95,
 )  # tables; fractions between which a map comes to count as symmetric about a place
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
-# Cross-validated: with it at most 0.7 % of the out-of-map scans that can be told are usable (mirrored ones 0.2 %), and
+# Cross-validated: with it at most 0.7 % of the out-of-map scans that can be told are usable (mirrored ones 0.3 %), and
 # of the usable answers to scans of the map at most 0.1 % are wrong.
 USABLE_CAUTIOUS = 0.95
 # Fraction of the beams of a drive's exact views that read the walls, over that of all views. Of 2,823 right drives in

@@ -13,7 +13,6 @@ from association.verdict import tuning
 
 from .judged import PLAIN, Drawn, drawn, judged_by
 from .kernels.drawn import SEEDS
-from .reference.verdict import bar_of
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -63,7 +62,7 @@ def kind_of(one: Drawn, other: Drawn) -> str:
         return f"explained{beams}"
     if Status.DEGENERATE in (a.status, b.status):
         return "deviation"
-    if a.mirrored is not b.mirrored and max(a.careful, b.careful) >= bar_of(one.context):
+    if a.mirrored is not b.mirrored and max(a.careful, b.careful) >= tuning.USABLE_CAUTIOUS:
         return f"mirrored{beams}"
-    assert min(a.careful, b.careful) < bar_of(one.context) <= max(a.careful, b.careful)
+    assert min(a.careful, b.careful) < tuning.USABLE_CAUTIOUS <= max(a.careful, b.careful)
     return f"null{beams}" if a.asked and b.asked else f"careful{beams}"

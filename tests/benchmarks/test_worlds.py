@@ -153,6 +153,13 @@ def test_wrong_answers_and_strangers_are_counted() -> None:
     assert not could_be_told(replace(AWAY, read=0.98))
 
 
+def test_equal_units_are_counted_and_new_kinds_are_not_compared_with_former_figures() -> None:
+    flats = [replace(one, world="mirrored_flats") for one in (ANSWER, ANSWER, ANSWER, WRONG)]
+    terraces = [replace(WRONG, world="terraces")] * 4
+    assert judged([*flats, *terraces, ANSWER], "ranges:   in buildings of equal units") == "62.50 (5 of 8)"
+    assert judged([*flats, *terraces], "ranges: clean") == judged(flats, "ranges: clean")
+
+
 def test_covariances_are_judged_by_right_answers_of_many_and_of_few_walls() -> None:
     found = [ANSWER] * 18 + [replace(ANSWER, nees=9.0)] * 2 + [WRONG] * 5
     found += [replace(ANSWER, walls=2, nees=1.0)] * 20

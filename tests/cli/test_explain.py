@@ -69,8 +69,7 @@ def test_the_numbers_add_up(linefix: Linefix, on: str, usable: bool) -> None:
     assert verdict["cautious"] == pytest.approx(least * model["probability"])
     assert verdict["probability_of_pose"] == pytest.approx(mean * on_map)
     assert verdict["probability_of_pose"] == answer["probability"]
-    reached = verdict["cautious"] >= verdict["thresholds"]["cautious"]
-    assert reached is usable
+    assert (verdict["cautious"] >= verdict["thresholds"]["cautious"]) is usable
     assert (verdict["null"] is None) is not usable
 
 

@@ -165,11 +165,6 @@ class Judged:
     mirrored: bool = False
 
 
-def bar_of(context: SearchContext) -> float:
-    """Return what the careful chance has to reach."""
-    return tuning.USABLE_CAUTIOUS
-
-
 def judge(
     context: SearchContext, explanations: Explanations, models: Mapping[str, Document], usual_deviation: float
 ) -> Judged:
@@ -193,14 +188,14 @@ def judge(
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
     likely = not elsewhere and not thin
-    if likely and not free and chances.careful >= bar_of(context):
+    if likely and not free and chances.careful >= tuning.USABLE_CAUTIOUS:
         numbers = features(context, answer, rivals, find_null_score(context, best))
         careful = logistic(logit(model_of(context, models), numbers))
         better = numbers["null_better"] >= tuning.MIRRORED_BETTER
         _, least = shared(context, answer, rivals)
         chances = replace(chances, careful=least * careful, asked=True, mirrored=better)
         likely = likely and not chances.mirrored
-    status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
+    status = Status.OK if likely and chances.careful >= tuning.USABLE_CAUTIOUS else Status.AMBIGUOUS
     if free:
         status = Status.DEGENERATE
     if chances.explained < tuning.NO_MATCH_PROBABILITY:

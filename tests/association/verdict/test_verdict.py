@@ -41,10 +41,7 @@ def leading(lead: float, *, with_beams: bool = False) -> Drawn:
 @pytest.mark.parametrize(("form", "with_beams"), [("segments", False), ("ranges", True)])
 def test_an_answer_is_usable_from_the_limit_on(form: str, with_beams: bool) -> None:
     """By the model for scans with beams, or that for scans without; however probable it is on a map that is known."""
-    with judged_by(
-        {**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}},
-        USABLE_CAUTIOUS=0.6,
-    ):
+    with judged_by({**SURE, form: {"constant": [-3.0], "lead": [0.2], "on_map": [30.0]}}, USABLE_CAUTIOUS=0.6):
         low, high = crossing(lambda lead: leading(lead, with_beams=with_beams).verdict.status, 40.0, 60)
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
         usable = leading(high, with_beams=with_beams).verdict
