@@ -7,7 +7,8 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -22,6 +23,9 @@ from service.schemas import examples
 from tests.running import PATIENCE, RunningService, children_of, client_of, is_running, running, until
 from tests.service.searches import searched_briefly, searched_for, store_hard_map
 
+# A worker that dies sooner after the start of the one before it ends the service: the server takes it for a crash loop.
+CRASH_LOOP_SECONDS = 5.5
+
 POSTS = 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}'
 
 
@@ -31,6 +35,19 @@ def workers_of(service: RunningService) -> set[int]:
         for pid in children_of(service.process.pid)
         if is_running(pid) and b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
     }
+
+
+def age_of(pid: int) -> float:
+    """Return for how long a process has run, s."""
+    began = int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[19]) / os.sysconf("SC_CLK_TCK")
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - began
+
+
+def kill(service: RunningService, pids: Iterable[int]) -> None:
+    """Kill workers, when that is no crash loop."""
+    until(lambda: min(map(age_of, workers_of(service))) > CRASH_LOOP_SECONDS + 0.5)
+    for pid in pids:
+        os.kill(pid, signal.SIGKILL)
 
 
 def anew(service: RunningService, method: str, path: str, body: bytes | None = None) -> httpx.Response:
@@ -99,8 +116,7 @@ def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> No
     assert all(f"{POSTS} {before + 40}" in text for text in texts)
     # A worker that is killed takes none of its counts with it, but all that it had running.
     started = ready(pair)
-    for pid in workers_of(pair):
-        os.kill(pid, signal.SIGKILL)
+    kill(pair, workers_of(pair))
     until(lambda: ready(pair) == started + 2)
     assert pair.count(POSTS) == before + 40
     until(lambda: pair.count("linefix_workers_ready") == 2.0)
@@ -109,7 +125,7 @@ def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> No
 def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: RunningService) -> None:
     before, started = workers_of(pair), ready(pair)
     assert len(before) == 2
-    os.kill(min(before), signal.SIGKILL)
+    kill(pair, [min(before)])
     statuses: list[int] = []
 
     def replaced() -> bool:
@@ -122,6 +138,17 @@ def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: Ru
     after = workers_of(pair)
     assert len(after) == 2
     assert len(after & before) == 1
+
+
+def test_a_worker_that_dies_at_once_again_ends_the_service(tmp_path: Path) -> None:
+    """So that what started the service sees it: a worker that cannot start must not be started for ever."""
+    with running(tmp_path, workers=2, searches=2) as service:
+        until(lambda: ready(service) == 2)
+        kill(service, [min(workers_of(service))])
+        until(lambda: min(map(age_of, workers_of(service))) < 1.0)
+        os.kill(min(workers_of(service), key=age_of), signal.SIGKILL)
+        assert service.ended() == 1
+        assert "crash loop" in service.log()
 
 
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
