@@ -121,7 +121,7 @@ def run_stages(context: SearchContext, began: float) -> Stages:
     if last.result is not None:
         return Stages(found, verdict, last, last.result)
     verdict = verdict if last.complete else verdict.cut_short()
-    result = report(found.context, found.explanations, verdict, found.factor, found.offset)
+    result = report(found, verdict)
     result = with_causes(result, find_causes(context, found.explanations, verdict, began))
     return Stages(found, verdict, last, result)
 

@@ -89,7 +89,7 @@ def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     judged = judge(found.context, found.explanations, off_scale=found.off_scale)
     if not judged.usable or not _agree(judged.pose, verdict.pose):
         return LastView(None, judged.complete, found, judged)
-    result = report(found.context, found.explanations, judged, found.factor, found.offset)
+    result = report(found, judged)
     if not result.usable:
         return LastView(None, complete=False)
     return LastView(_of_the_drive(context, result, own), True, found, judged)

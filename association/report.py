@@ -13,7 +13,6 @@ from registration import Ambiguity
 
 from .causes import Cause
 from .consensus.acceptance import correspondences, overlaps_at
-from .consensus.common_offset import CommonOffset
 from .consensus.consensus_set import ConsensusSet, matches_of
 from .consensus.estimation import EstimatedPose, estimate_poses, slices_between_looks
 from .consensus.kernels.measures import paper_measures
@@ -23,24 +22,19 @@ from .context import SearchContext
 from .explanations import Answer, Explanations
 from .layout import POSE_AMONG_WALLS
 from .result import Alternative, AssociationDiagnostics, AssociationResult, Correspondence, CriticalWall, Status
-from .to_scale import Factor
+from .to_scale import ScaledSearch
 from .tuning import CRITICAL_DISPLACEMENT
 from .verdict.alternatives import compare_alternatives
 from .verdict.verdict import Verdict
-from .warnings import warnings_of, warnings_of_causes
+from .warnings import warnings_of, warnings_of_causes, warnings_of_map
 
 
-def report(
-    context: SearchContext,
-    explanations: Explanations,
-    verdict: Verdict,
-    factor: Factor | None = None,
-    offset: CommonOffset | None = None,
-) -> AssociationResult:
-    """Put an answer together; `factor` is the one by which the scan was put to scale, `offset` that of all its walls.
+def report(found: ScaledSearch, verdict: Verdict) -> AssociationResult:
+    """Put an answer together of a search and the verdict on it.
 
     If the deadline passes before it is put together, the answer is not complete, and so not usable.
     """
+    context, explanations = found.context, found.explanations
     answer = None if verdict.status is Status.NO_MATCH else explanations.answer
     others = explanations.ranked if answer is None else explanations.others
     alternatives = _alternatives(context, explanations, others, verdict)
@@ -67,7 +61,7 @@ def report(
         reasons=verdict.reasons,
         alternatives=alternatives,
         search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict, factor, offset),
+        warnings=(*warnings_of(context, explanations.search, verdict), *warnings_of_map(found)),
     )
 
 

@@ -35,6 +35,7 @@ WarningCode = Literal[
     "search_incomplete",
     "map_scale",
     "common_offset",
+    "map_distorted",
     "last_view_only",
     "mirrored",
     "reversed",

@@ -18,6 +18,7 @@ from registration.values import value
 from .consensus.acceptance import register_accepted
 from .consensus.common_offset import CommonOffset, fit_common_offset
 from .consensus.consensus_set import ConsensusSet
+from .consensus.distortion import Distortion, fit_distortion
 from .consensus.ranking import rank_candidates
 from .consensus.similarity import Similarity, fit_similarity, fit_trimmed_similarity
 from .context import SearchContext
@@ -81,6 +82,8 @@ class ScaledSearch:
         True if it is as it was sent, and its consensus set is off by more than `MOST_FACTOR`.
     offset : CommonOffset or None
         That all walls of the answer share, where it is beyond noise and explains the scan without a factor.
+    distortion : Distortion or None
+        Of the map around the answer, where it is beyond noise and no offset explains it.
     """
 
     context: SearchContext
@@ -89,6 +92,7 @@ class ScaledSearch:
     factor: Factor | None = None
     off_scale: bool = False
     offset: CommonOffset | None = None
+    distortion: Distortion | None = None
 
     @property
     def score(self) -> float:
@@ -119,6 +123,7 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
     3. Search the scan at that factor, until the factor is right.
     4. Search for alternatives at other scales, each at the one that fits it best.
     5. Add the uncertainty of the factor to the pose's covariance.
+    6. If walls show that the map is distorted, estimate the pose together with that.
 
     Parameters
     ----------
@@ -133,10 +138,15 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
     """
     first = ScaledSearch(context, as_sent, as_sent)
     if not _may_be_off(first):
-        return first
+        return _with_distortion(first)
     with_offset = _with_common_offset(first)
     if with_offset is not None:
         return with_offset
+    return _with_distortion(_with_factor(first))
+
+
+def _with_factor(first: ScaledSearch) -> ScaledSearch:
+    """Return the search with the factor by which scan and map differ; the same where there is none."""
     similarity = _similarity(first)
     found = _search_with_factor(first, similarity)
     if found.factor is None:
@@ -290,6 +300,27 @@ def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
     answer = _moved(found.context, answer, similarity.pose, similarity.covariance)
     factor = Factor(factor.value * similarity.factor, similarity.deviation)
     return replace(found, explanations=replace(found.explanations, answer=answer), factor=factor)
+
+
+def _with_distortion(found: ScaledSearch) -> ScaledSearch:
+    """Return the search with a pose that was estimated together with the distortion of the map, if walls show one.
+
+    The same where the pose is not fixed, where the map is declared to be exact or off by more than maps usually are,
+    where more than a pose was solved for, or less, and where the scan was not taken from one place.
+    """
+    context, answer, sensor = found.context, found.explanations.answer, found.context.scan.viewpoint
+    if answer is None or answer.estimated.views is not None or context.options.estimator != "joint" or sensor is None:
+        return found
+    declared = context.index.sigma
+    if declared is not None and not LEAST_OFF_WALLS <= declared <= LOOSE_WALLS:
+        return found
+    if answer.estimated.free or answer.estimated.degenerate:
+        return found
+    distortion = fit_distortion(context, answer.best, answer.estimated, sensor, to_scale=found.factor is not None)
+    if distortion is None:
+        return found
+    answer = _moved(context, answer, distortion.pose, distortion.covariance)
+    return replace(found, explanations=replace(found.explanations, answer=answer), distortion=distortion)
 
 
 def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:

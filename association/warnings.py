@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,12 +11,13 @@ from registration import Beams
 
 from .causes import Cause, Mistake
 from .consensus.common_offset import CommonOffset
+from .consensus.distortion import Distortion
 from .context import SearchContext
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
 from .scan.extents import extent, inner_extent
 from .scan.kernels.extents import facing_away
-from .to_scale import Factor
+from .to_scale import Factor, ScaledSearch
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .units import UNIT_NAMES, unit_mistake
 from .verdict.verdict import Verdict
@@ -35,24 +37,28 @@ NOT_IN_ORDER = (
 )
 
 
-def warnings_of(
-    context: SearchContext,
-    search: SearchReport,
-    verdict: Verdict,
-    factor: Factor | None = None,
-    offset: CommonOffset | None = None,
-) -> tuple[AssociationWarning, ...]:
-    """List the warnings about scan, search and map."""
+def warnings_of(context: SearchContext, search: SearchReport, verdict: Verdict) -> tuple[AssociationWarning, ...]:
+    """List the warnings about scan and search."""
     found = _of_scan(context) | {
         "prior_contradicted": "A clearly better pose lies where the prior excludes it. Check the prior, or search "
         "without it."
         if verdict.contradicted
         else None,
         "search_incomplete": None if search.complete else _incomplete(context),
-        "map_scale": None if factor is None else _off_scale(factor),
-        "common_offset": None if offset is None else _offset(offset, context.index.sigma or 0.0),
     }
     return _listed(found)
+
+
+def warnings_of_map(found: ScaledSearch) -> tuple[AssociationWarning, ...]:
+    """List the warnings about the map around an answer."""
+    factor, offset, distortion = found.factor, found.offset, found.distortion
+    return _listed(
+        {
+            "map_scale": None if factor is None else _off_scale(factor),
+            "common_offset": None if offset is None else _offset(offset, found.context.index.sigma or 0.0),
+            "map_distorted": None if distortion is None else _distorted(distortion),
+        }
+    )
 
 
 def warnings_of_causes(causes: Sequence[Cause]) -> tuple[AssociationWarning, ...]:
@@ -122,6 +128,17 @@ def _offset(offset: CommonOffset, sigma: float) -> str | None:
         f"All walls are {100.0 * abs(offset.offset):.1f} cm (+-{100.0 * offset.deviation:.1f} cm) {side} than the map "
         "has them. The pose is corrected for this offset. Check the range bias of the laser, and whether the map has "
         "the faces of walls or their centre lines."
+    )
+
+
+def _distorted(distortion: Distortion) -> str | None:
+    """Describe a distortion that is beyond doubt, and as great as a factor that a scan would be searched with."""
+    if not distortion.large:
+        return None
+    return (
+        f"The map is distorted here: along {math.degrees(distortion.direction):.0f} degrees it is "
+        f"{100.0 * distortion.strain:.1f} % (+-{100.0 * distortion.deviation:.1f} %) longer than across. The pose is "
+        "corrected for this. Check the map against the building, or survey the building again."
     )
 
 

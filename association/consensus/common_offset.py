@@ -8,18 +8,18 @@ on the lengths, and it moves the pose where the scan sees one side only.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from registration import RigidTransform
-from registration.layout import Floats, Records
+from registration.layout import Floats
 from registration.values import value
 
 from ..context import SearchContext
-from ..tuning import FACTOR_DEVIATIONS, LOOSE_WALLS, ROUGHNESS
+from ..tuning import FACTOR_DEVIATIONS, LOOSE_WALLS
 from .consensus_set import ConsensusSet
-from .tuning import ESTIMATION_ROUNDS, ROUGH_FRACTION
+from .matched_lines import MatchedLines
+from .tuning import ESTIMATION_ROUNDS
 
 UNKNOWNS = 5  # x, y, heading, offset, factor
 
@@ -69,17 +69,17 @@ def fit_common_offset(context: SearchContext, best: ConsensusSet, wall_sigma: fl
     sides = _sides(context, best)
     if sides is None:
         return None
-    lines = _Lines.of(context, best, sides, wall_sigma)
+    lines = MatchedLines.of(context, best, wall_sigma)
     pose, offset = best.pose, 0.0
     for _ in range(ESTIMATION_ROUNDS):
-        normal, right = lines.normal_equations(pose, offset)
+        normal, right = _normal_equations(lines, sides, pose, offset)
         covariance = np.linalg.pinv(normal[:4, :4], hermitian=True)
         x, y, turn, more = (covariance @ right[:4]).tolist()
         pose, offset = RigidTransform(pose.x + x, pose.y + y, pose.theta + turn), offset + more
     deviation = math.sqrt(covariance[3, 3])
     if not abs(offset) > FACTOR_DEVIATIONS * deviation:
         return None
-    normal, right = lines.normal_equations(pose, offset)
+    normal, right = _normal_equations(lines, sides, pose, offset)
     with_factor = np.linalg.pinv(normal, hermitian=True)
     factor = 1.0 + float((with_factor @ right)[4])
     of_pose = covariance[:3, :3].astype(np.float64)
@@ -98,50 +98,12 @@ def _sides(context: SearchContext, best: ConsensusSet) -> Floats | None:
     return np.where(left >= 0.0, 1.0, -1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class _Lines:
-    """The matched lines of a consensus set, (n,) each.
-
-    `sides` is 1 where the free side of the wall is its left, else -1; `inverse` (n, n) is that of the covariance of
-    the lines' offsets, 1/m^2; `slopes` has the information of the sines of their angles to the walls.
-    """
-
-    rows: Records
-    walls: Records
-    shifts: Floats
-    sides: Floats
-    inverse: Floats
-    slopes: Floats
-
-    @classmethod
-    def of(cls, context: SearchContext, best: ConsensusSet, sides: Floats, wall_sigma: float) -> _Lines:
-        """Gather them; the walls' own errors have the deviation `wall_sigma`."""
-        matched = best.matched
-        rows, matches = context.lines.rows[matched], best.matches[matched]
-        numbers = matches["wall"]
-        ties = context.index.ties[numbers]
-        tied = (ties[:, None] >= 0.0) & (ties >= 0.0)
-        one_wall = np.where(tied, np.exp(-np.abs(ties[:, None] - ties)), numbers[:, None] == numbers)
-        variances = 1.0 / rows["weight"] - ROUGHNESS**2 + ROUGH_FRACTION * wall_sigma**2
-        inverse = np.linalg.inv(np.diag(variances) + wall_sigma**2 * one_wall)
-        walls = context.index.walls.rows[numbers]
-        return cls(rows, walls, matches["shift"], sides, inverse, rows["spread"] / variances)
-
-    def normal_equations(self, pose: RigidTransform, offset: float) -> tuple[Floats, Floats]:
-        """Return the normal matrix (5, 5), and the right side (5,), of x, y, heading, offset and factor."""
-        rows, walls = self.rows, self.walls
-        c, s = math.cos(pose.theta), math.sin(pose.theta)
-        x, y = c * rows["centroid_x"] - s * rows["centroid_y"], s * rows["centroid_x"] + c * rows["centroid_y"]
-        along, across = walls["dx"] * x + walls["dy"] * y, walls["dx"] * y - walls["dy"] * x
-        to_wall = walls["offset"] + self.shifts - walls["dx"] * pose.y + walls["dy"] * pose.x
-        residuals = across - to_wall - self.sides * offset
-        columns = np.stack([-walls["dy"], walls["dx"], along, -self.sides, across], axis=1)
-        dx, dy = c * rows["dx"] - s * rows["dy"], s * rows["dx"] + c * rows["dy"]
-        sines, cosines = walls["dx"] * dy - walls["dy"] * dx, walls["dx"] * dx + walls["dy"] * dy
-        normal = columns.T @ self.inverse @ columns
-        right = -columns.T @ self.inverse @ residuals
-        normal[2, 2] += self.slopes @ cosines**2
-        right[2] -= self.slopes @ (cosines * sines)
-        normal[3, 3] += 1.0 / LOOSE_WALLS**2
-        right[3] -= offset / LOOSE_WALLS**2
-        return normal, right
+def _normal_equations(lines: MatchedLines, sides: Floats, pose: RigidTransform, offset: float) -> tuple[Floats, Floats]:
+    """Return the normal matrix (5, 5), and the right side (5,), of x, y, heading, offset and factor."""
+    at = lines.at(pose)
+    columns = np.stack([*at.of_pose.T, -sides, at.across], axis=1)
+    of_angles = np.pad(at.angle_of_pose, ((0, 0), (0, 2)))
+    normal, right = lines.normal_equations(at.offsets - sides * offset, columns, at.sines, of_angles)
+    normal[3, 3] += 1.0 / LOOSE_WALLS**2
+    right[3] -= offset / LOOSE_WALLS**2
+    return normal, right

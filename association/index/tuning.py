@@ -64,7 +64,7 @@ CROSSINGS_A_CHAIN = (80, 500, 4_000)
 MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
 FEW_CHAINS = 500  # at least so many chains count; tables: in a room all pairs are listed
 CROSSING_SAMPLE = 128  # chains by which these numbers are estimated; measured: to a fifth, by 32 to a third;
-CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
+CROSSING_SAMPLE_LOOKS = 2_000_000  # with so many looks at most: up to half a second where lines cross everywhere
 
 # --- Likelihood field -------------------------------------------------------------------------------------------------
 

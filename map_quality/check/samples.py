@@ -139,11 +139,11 @@ def _judged(context: SearchContext, found: ScaledSearch) -> tuple[AssociationRes
     By these ways are compared: any may be made up for by a factor. Usable is in each what its answer is.
     """
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
-    result = report(found.context, found.explanations, verdict, factor=found.factor, offset=found.offset)
+    result = report(found, verdict)
     if found.factor is None:
         return result, _trial(result), verdict
     verdict = judge(context, found.as_sent)
-    trial = _trial(report(context, found.as_sent, verdict))
+    trial = _trial(report(ScaledSearch(context, found.as_sent, found.as_sent), verdict))
     return result, replace(trial, usable=result.usable), verdict
 
 

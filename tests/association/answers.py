@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from association import Prior, SearchReport
+from association import AssociationResult, Prior, SearchReport
 from association.consensus.acceptance import Accepted
 from association.consensus.consensus_set import ConsensusSet
 from association.consensus.estimation import EstimatedPose
@@ -18,8 +18,11 @@ from association.consensus.sight import BeamFractions
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.layout import LEVERAGE, MATCH
+from association.report import report
+from association.to_scale import ScaledSearch
 from association.verdict.alternatives import compare_alternatives
 from association.verdict.features import Features, describe, facts_of, scores_of
+from association.verdict.verdict import Verdict
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -167,6 +170,11 @@ def explanations_of(answer: Answer | None, *others: ConsensusSet, complete: bool
     own = () if answer is None else (answer.best,)
     listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.posterior))
     return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0, "ordered", 0.75))
+
+
+def report_of(context: SearchContext, explanations: Explanations, verdict: Verdict) -> AssociationResult:
+    """Report explanations of a scan that was searched as it was sent."""
+    return report(ScaledSearch(context, explanations, explanations), verdict)
 
 
 def features_of(context: SearchContext, answer: Answer, rivals: Sequence[ConsensusSet] = ()) -> Features:

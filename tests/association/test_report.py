@@ -12,7 +12,6 @@ from association import AssociationResult, MapIndex, Reason, Status, View, assem
 from association.consensus.acceptance import Accepted
 from association.explanations import Answer
 from association.rank_and_estimate import search_and_rank
-from association.report import report
 from association.verdict.verdict import Verdict, judge
 from association.verdict.vetoes import BETTER_ELSEWHERE, INCOMPLETE
 from registration import RigidTransform, Segments
@@ -27,6 +26,7 @@ from .answers import (
     leverages_of,
     ranked,
     registered_room,
+    report_of,
     room,
 )
 from .scenes import (
@@ -61,7 +61,7 @@ def given_answer() -> Answer:
 def told(answer: Answer | None, verdict: Verdict = SURE, **options: Any) -> AssociationResult:
     """Report an answer next to another explanation."""
     context = context_of(ROOM_INDEX, SCAN, **options)
-    return report(context, explanations_of(answer, ranked(60.0)), verdict)
+    return report_of(context, explanations_of(answer, ranked(60.0)), verdict)
 
 
 def test_what_is_found_and_concluded_is_told() -> None:
@@ -124,7 +124,7 @@ def test_parts_that_are_not_deciding_place_are_empty_and_change_nothing_else(ask
     explanations = search_and_rank(context_of(index, sent))
 
     def reported(**options: Any) -> AssociationResult:
-        return report(context_of(index, sent, **options), explanations, SURE)
+        return report_of(context_of(index, sent, **options), explanations, SURE)
 
     whole, part = reported(), reported(parts=asked)
     for name in ("correspondences", "alternatives", "missing_map"):
@@ -306,7 +306,7 @@ def test_no_match() -> None:
     context = context_of(ROOMS, SCAN)
     explanations = search_and_rank(context)
     for answer, status in ((explanations.answer, Status.NO_MATCH), (None, Status.OK)):
-        result = report(context, replace(explanations, answer=answer), replace(nothing, status=status))
+        result = report_of(context, replace(explanations, answer=answer), replace(nothing, status=status))
         assert (result.status, result.usable, result.probability) == (Status.NO_MATCH, False, 0.0)
         assert (result.pose, result.covariance, result.unobservable, result.diagnostics) == (None, None, None, None)
         assert (result.correspondences, result.missing_map) == ((), ())
@@ -324,11 +324,11 @@ def test_walls_that_are_matched_are_not_missing() -> None:
     answer = explanations.answer
     assert answer is not None
     verdict = judge(context, explanations)
-    assert report(context, explanations, verdict).missing_map == (8, 9)
+    assert report_of(context, explanations, verdict).missing_map == (8, 9)
     pairs = answer.accepted.pairs.copy()
     pairs[0, 1] = 9
     on_screen = replace(answer, accepted=replace(answer.accepted, pairs=pairs))
-    assert report(context, replace(explanations, answer=on_screen), verdict).missing_map == (8,)
+    assert report_of(context, replace(explanations, answer=on_screen), verdict).missing_map == (8,)
 
 
 def codes(endpoints: Floats, viewpoint: tuple[float, float] | None = (0.0, 0.0), **options: Any) -> dict[str, str]:
@@ -387,4 +387,4 @@ def test_what_the_verdict_and_the_search_say_is_told() -> None:
             vetoes = (BETTER_ELSEWHERE,) * contradicted + (INCOMPLETE,) * (not complete)
             verdict = replace(SURE, vetoes=vetoes, status=status)
             expected = ["prior_contradicted"] * contradicted + ["search_incomplete"] * (not complete)
-            assert [w.code for w in report(context, explanations, verdict).warnings] == expected
+            assert [w.code for w in report_of(context, explanations, verdict).warnings] == expected

@@ -476,6 +476,7 @@ class WarningAnswer(TypedDict):
         "search_incomplete",
         "map_scale",
         "common_offset",
+        "map_distorted",
         "last_view_only",
         "mirrored",
         "reversed",

@@ -13,7 +13,6 @@ from association import Beams, HardPrior, Scan
 from association.context import SearchContext
 from association.explanations import Answer
 from association.rank_and_estimate import search_and_rank
-from association.report import report
 from association.scan.scan import mirrored
 from association.verdict.chance import NullScore, find_null_score
 from association.verdict.tuning import NULL_FRACTION, UNLIKE_SYMMETRY
@@ -21,6 +20,7 @@ from association.verdict.verdict import judge
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
 
+from ..answers import report_of
 from ..kernels.drawn import SEEDS, drawn
 from ..scenes import (
     CORRIDOR,
@@ -149,7 +149,7 @@ def test_the_null_is_the_same_each_time_and_leaves_the_search_as_it_was(sampling
         explanations = search_and_rank(context)
         assert explanations.answer is not None
         found = [find_null_score(context, explanations.answer.best) for _ in range(nulls)]
-        return repr(report(context, explanations, judge(context, explanations))), found
+        return repr(report_of(context, explanations, judge(context, explanations))), found
 
     window = HardPrior(INSIDE, 1.0, 0.5)
     (plain, _), (asked, nulls), (_, within) = told(None, 0), told(None, 3), told(window, 1)
