@@ -15,7 +15,7 @@ from tests.running import RunningService, running
 
 TESTS = Path(__file__).parent
 EXIT_SECONDS = 30.0
-ROOMS = ("faults", "service", "ros2", "map_quality", "cli", "experiments", "benchmarks")  # whose files take long
+SLOW_DIRECTORIES = ("faults", "service", "ros2", "map_quality", "cli", "experiments", "benchmarks")  # whose files take long
 
 # The same examples in each run: what fails does so again, and no run fails by what it alone has drawn. Whoever looks
 # for other examples says `--hypothesis-profile=other`.
@@ -31,8 +31,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with what takes long: of two processes neither waits for the other's last file."""
-    rooms = {room: number for number, room in enumerate(ROOMS)}
-    items.sort(key=lambda item: rooms.get(item.path.relative_to(TESTS).parts[0], len(ROOMS)))
+    places = {directory: number for number, directory in enumerate(SLOW_DIRECTORIES)}
+    items.sort(key=lambda item: places.get(item.path.relative_to(TESTS).parts[0], len(SLOW_DIRECTORIES)))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -17,6 +17,7 @@ def test_a_killed_worker_costs_what_it_was_at(tmp_path: Path) -> None:
     assert [begun(tmp_path, item) for item in range(7)] == [1, 1, 1, 2, 1, 1, 1]
 
 
+@pytest.mark.long
 def test_an_item_that_ends_every_worker_is_lost_and_no_other(tmp_path: Path) -> None:
     found = dict(Processes(1).run(Noting(str(tmp_path), deadly=(1,), times=99), range(3)))
     assert found == {0: (0, "1"), 1: Lost(), 2: (4, "1")}

@@ -207,6 +207,7 @@ def test_row_groups_larger_than_a_block_are_laid_out_anew(tmp_path: Path) -> Non
     assert [row["stamp"] for row in rows(tmp_path / "out.parquet")] == [*range(40), *range(40)]
 
 
+@pytest.mark.long
 def test_a_worker_killed_on_the_way_costs_no_row(tmp_path: Path) -> None:
     log, room, out = write_log(tmp_path / "a.parquet", 80), write_room(tmp_path), tmp_path / "out.parquet"
     killed: list[int] = []

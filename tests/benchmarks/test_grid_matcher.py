@@ -34,6 +34,7 @@ def cast(occupied: np.ndarray, x: float, y: float, theta: float) -> tuple[np.nda
     return angles, (reach[occupied[rows, columns].argmax(axis=1)] + 0.5) * RESOLUTION
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("x", "y", "theta"), [(12.5, 30.5, 0.4), (45.5, 10.5, -2.0), (20.5, 8.5, 3.0)])
 def test_the_pose_is_found(x: float, y: float, theta: float) -> None:
     occupied, free = room()

@@ -41,6 +41,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_a_run_reports_the_mutants_that_no_test_notices(project: Path) -> None:
     """`x >= y` differs from `x > y` only for equal numbers, which the tests leave out."""
     session = project / "session.sqlite"

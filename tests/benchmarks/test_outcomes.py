@@ -16,6 +16,7 @@ def answers(found: list[Outcome]) -> list[tuple[object, ...]]:
     return [(o.query.number, o.query.level, o.map, o.right, o.among, o.result.pose, o.result.status) for o in found]
 
 
+@pytest.mark.long
 def test_an_engine_answers_as_this_process_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcomes, "PIECE", 7)
     offices = drawn_offices(4)

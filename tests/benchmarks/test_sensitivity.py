@@ -79,6 +79,7 @@ def test_the_sample_has_scans_with_and_without_ranges() -> None:
     assert again[0].case.group == drawn[3].case.group
 
 
+@pytest.mark.long
 def test_what_is_cached_or_derived_moves_too() -> None:
     before = gates(AssociationOptions())
     with moved(named("LEAST_OFFSET_GATE"), 1.0):

@@ -119,6 +119,7 @@ def test_what_is_drawn_is_as_much_as_was_promised() -> None:
     assert Choice(quick=10**6, first=7).chunks[0].numbers == range(7, 8)
 
 
+@pytest.mark.long
 def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_path) -> None:
     alone, together = run(FEW, Processes(1)), run(FEW, Processes(2))
     assert timeless(alone) == timeless(together)

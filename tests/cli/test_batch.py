@@ -30,6 +30,7 @@ def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, l
     ]
 
 
+@pytest.mark.long
 def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 400)
     write_room(tmp_path)

@@ -32,6 +32,7 @@ def test_the_drive_is_found_in_its_map(linefix: Linefix, folder: Path) -> None:
     assert all(math.hypot(pose["x"] - at.x, pose["y"] - at.y) < 0.05 for pose, at in usable)
 
 
+@pytest.mark.long
 def test_a_map_that_is_not_to_scale_is_hinted_at(
     linefix: Linefix, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,6 +54,7 @@ def test_a_map_is_stored_and_a_scan_found_in_it(service: RunningService) -> None
             client.get_map("of-a-client")
 
 
+@pytest.mark.long
 def test_a_map_of_another_tool_is_imported_checked_by_scans_and_analyzed(patient: RunningService) -> None:
     rows = "".join(",".join(map(str, row)) + "\n" for row in ROOM["segments"])
     with Client(patient.url, timeout=300.0) as client:

@@ -87,6 +87,7 @@ def test_a_full_disk_loses_nothing(start_service: Callable[..., Any], disk: Path
     assert "a defect" not in running.log()
 
 
+@pytest.mark.long
 def test_a_read_only_disk_is_read(start_service: Callable[..., Any], disk: Path) -> None:
     url = f"sqlite:///{disk / 'maps.sqlite3'}"
     first = start_service(database_url=url)

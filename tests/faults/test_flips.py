@@ -104,6 +104,7 @@ def test_a_flipped_bit_changes_no_map(tmp_path: Path, flips: int) -> None:
     assert total["healed"] > total["not healed"]
 
 
+@pytest.mark.long
 def test_a_flipped_bit_in_a_large_map(start_service: Callable[..., Any], tmp_path: Path) -> None:
     running = start_service()
     client = running.client

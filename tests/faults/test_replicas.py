@@ -137,6 +137,7 @@ def test_a_lost_database_is_told_and_recovered_from(three: Replicas) -> None:
     nothing_is_lost(three, load)
 
 
+@pytest.mark.long
 def test_a_killed_replica_costs_what_it_was_at(three: Replicas) -> None:
     with loaded(three.url) as load:
         three.kill(1)

@@ -39,6 +39,7 @@ def hall(drive: float) -> Analysis:
     return analyzed(Segments.from_array(outline(HALL)), 2.0, drive, Robot(range_max=REACH, beams=360))
 
 
+@pytest.mark.long
 def test_who_drives_to_what_is_like_no_other_place_knows_then() -> None:
     found = {one.pose.x: one for one in looks(hall(10.0)) if one.pose.y < 2.0}
     at_once = [x for x, one in found.items() if one.usable]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import count
 
+import pytest
+
 from tests.running import RunningService, until
 from tests.service.searches import slow_to_index
 
@@ -12,6 +14,7 @@ RUNNING, BEGUN = "linefix_indexing_running", "linefix_map_cache_misses_total"
 SEEN = {"segments": [[0.0, 1.0, 2.0, 1.0]]}
 
 
+@pytest.mark.long
 def test_an_index_that_is_not_done_in_time_is_504_and_goes_on(start_service: Callable[..., RunningService]) -> None:
     """The answer came when the map was indexed, seconds after the deadline; who asked for the same map waited, too."""
     running = start_service(searches=2)

@@ -294,6 +294,7 @@ def mutated_files(draw: st.DrawFn) -> dict[str, bytes]:
     return files
 
 
+@pytest.mark.long
 @fuzz(0.003)
 @given(files=mutated_files(), options=st.none() | st.binary(max_size=30) | ANYTHING.map(encoded))
 def test_mutated_files_of_other_tools(client: httpx.Client, files: dict[str, bytes], options: bytes | None) -> None:

@@ -50,6 +50,7 @@ def test_it_searches_as_soon_as_the_service_is_ready(page: Page) -> None:
     verdict(page, "ambiguous")
 
 
+@pytest.mark.long
 def test_reading_ends(page: Page, tmp_path: Path) -> None:
     """Also where two files are read at a time, and neither is a map."""
     (tmp_path / "a.dxf").write_text("0")
@@ -96,6 +97,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_a_bag_is_opened_and_its_scans_are_searched(page: Page, sample: Path) -> None:
     shown(page, "rooms", "ambiguous")
     page.set_input_files("#files", [sample / "drive.mcap"])
@@ -112,6 +114,7 @@ def test_a_bag_is_opened_and_its_scans_are_searched(page: Page, sample: Path) ->
     expect(page.locator("#legend")).to_contain_text("usable")
 
 
+@pytest.mark.long
 def test_a_bag_is_dropped(page: Page, sample: Path, service: RunningService) -> None:
     """On the page, as from a file manager."""
     shown(page, "rooms", "ambiguous")
@@ -125,6 +128,7 @@ def test_a_bag_is_dropped(page: Page, sample: Path, service: RunningService) -> 
     expect(page.locator("#scan-of-log")).to_contain_text("Scan 1 of 12", timeout=60_000)
 
 
+@pytest.mark.long
 def test_a_broken_bag_is_named(page: Page, tmp_path: Path) -> None:
     (tmp_path / "drive.bag").write_bytes(b"no bag")
     shown(page, "rooms", "ambiguous")

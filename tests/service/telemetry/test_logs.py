@@ -12,6 +12,7 @@ from pathlib import Path
 
 import httpx
 import orjson
+import pytest
 
 from examples.running import free_port
 from service.telemetry.logs import WAITING_LINES
@@ -75,6 +76,7 @@ def ask_for_livez(port: int, times: int) -> None:
                 answers += part
 
 
+@pytest.mark.long
 def test_the_service_does_not_wait_for_who_reads_its_log(tmp_path: Path) -> None:
     """A pipe holds 64 kB; with the next line the event loop stood still."""
     port = free_port()
