@@ -15,7 +15,8 @@ from tests.running import RunningService, running
 
 TESTS = Path(__file__).parent
 EXIT_SECONDS = 30.0
-SLOW_DIRECTORIES = ("faults", "service", "ros2", "map_quality", "cli", "experiments", "benchmarks")  # whose files take long
+# Whose files take long.
+SLOW_DIRECTORIES = ("faults", "service", "ros2", "map_quality", "cli", "experiments", "benchmarks")
 
 # The same examples in each run: what fails does so again, and no run fails by what it alone has drawn. Whoever looks
 # for other examples says `--hypothesis-profile=other`.

@@ -55,9 +55,7 @@ def test_no_search_waits_for_a_large_map_to_be_indexed(start_service: Callable[.
     """A search can rest for another, what indexes a map cannot."""
     running = start_service(searches=1, queue=4)
     seen = b', "scan": ' + orjson.dumps({"segments": examples.SEEN}) + b"}"
-    large = (
-        b'{"map": ' + slow_to_index(60_000) + seen[:-1] + b', "options": {"oriented": false, "deadline_ms": 30000}}'
-    )
+    large = b'{"map": ' + slow_to_index(60_000) + seen[:-1] + b', "options": {"oriented": false, "deadline_ms": 30000}}'
     with running.connection(timeout=60.0) as connection:
         connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(large) + large)
         until(lambda: running.count("linefix_indexing_running") == 1.0)
