@@ -18,7 +18,7 @@ from registration.values import value
 from ..context import SearchContext
 from ..tuning import FACTOR_DEVIATIONS, LOOSE_WALLS
 from .consensus_set import ConsensusSet
-from .matched_lines import MatchedLines
+from .matched_lines import MatchedLines, are_few
 from .tuning import ESTIMATION_ROUNDS
 
 UNKNOWNS = 5  # x, y, heading, offset, factor
@@ -61,13 +61,13 @@ def fit_common_offset(context: SearchContext, best: ConsensusSet, wall_sigma: fl
     Returns
     -------
     CommonOffset or None
-        None where the map's sigma is not known, where the scan does not tell the free side of a wall, with few lines,
-        and where the offset is within `FACTOR_DEVIATIONS` of its deviations of 0.
+        None where the map's sigma is not known, where the scan does not tell the free side of a wall, with few lines or
+        hundreds, and where the offset is within `FACTOR_DEVIATIONS` of its deviations of 0.
     """
     if not context.index.sigma or context.scan.views is not None or np.count_nonzero(best.matched) < UNKNOWNS:
         return None
     sides = _sides(context, best)
-    if sides is None:
+    if sides is None or not are_few(best):
         return None
     lines = MatchedLines.of(context, best, wall_sigma)
     pose, offset = best.pose, 0.0

@@ -26,7 +26,7 @@ from ..context import SearchContext
 from ..tuning import DOUBTING_DEVIATIONS, FACTOR_DEVIATIONS, LEAST_FACTOR, MOST_FACTOR
 from .consensus_set import ConsensusSet
 from .estimation import EstimatedPose
-from .matched_lines import LinesAtPose, MatchedLines
+from .matched_lines import LinesAtPose, MatchedLines, are_few
 
 
 @value(frozen=True, slots=True)
@@ -84,8 +84,11 @@ def fit_distortion(
     Returns
     -------
     Distortion or None
-        None where each unknown of the distortion is within `FACTOR_DEVIATIONS` of its deviations of 0.
+        None where each unknown of the distortion is within `FACTOR_DEVIATIONS` of its deviations of 0, and with
+        hundreds of lines.
     """
+    if not are_few(best):
+        return None
     lines = MatchedLines.of(context, best, estimated.wall_sigma)
     at = lines.at(estimated.pose)
     (x, y), (to_x, to_y) = estimated.pose.apply(np.array([sensor, (0.0, 0.0)]))

@@ -13,7 +13,12 @@ from registration.layout import Floats, Records
 from ..context import SearchContext
 from ..tuning import ROUGHNESS
 from .consensus_set import ConsensusSet
-from .tuning import ROUGH_FRACTION
+from .tuning import PAIRS_COMPARED, ROUGH_FRACTION
+
+
+def are_few(best: ConsensusSet) -> bool:
+    """Return whether the matched lines are few enough for `MatchedLines`, of which the time grows with their cube."""
+    return int(np.count_nonzero(best.matched)) ** 2 <= PAIRS_COMPARED
 
 
 @dataclass(frozen=True, slots=True)

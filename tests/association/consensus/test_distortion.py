@@ -204,3 +204,15 @@ def test_walls_that_do_not_show_it_leave_its_uncertainty_to_the_pose() -> None:
     rigid = np.linalg.eigvalsh(free.covariance - found.covariance)
     assert rigid.min() > -1e-9
     assert rigid.max() > 0.0
+
+
+def test_hundreds_of_lines_are_not_inverted() -> None:
+    """The time would grow with the cube of their number; 700 walls are all seen."""
+    walls = maze(7, n=700, size=120.0)
+    scan = scan_of(seen(walls, pose(60.0, 60.0, 0.3))[0], 0.01, viewpoint=HERE)
+    context = context_of(index_of(distorted(walls, np.diag([1.0015, 1.0]))), scan)
+    found = search_to_scale(context)
+    answer = found.explanations.answer
+    assert answer is not None
+    assert answer.best.matched.sum() > 500
+    assert found.distortion is None
