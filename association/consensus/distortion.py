@@ -9,7 +9,7 @@ since its other part is a turn::
     D = [[s + a, b], [b, s - a]]
 
 s stretches, a stretches one axis and shrinks the other, b lets the axes lean. They are unknowns of the least squares,
-each with the expectation 0. What the walls do not show of them is in the covariance of the pose.
+each with a prior of expectation 0. The covariance of the pose includes what the walls do not show of the distortion.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def fit_distortion(
     estimated : EstimatedPose
         Its pose, which its walls fix, and the deviation of their own errors.
     sensor : (float, float)
-        Where it is in the scan frame, metres; the frame is fixed to it.
+        The position of the sensor in the scan frame, metres. The frame is fixed to the sensor.
     to_scale : bool
         True if the scan was put to scale by a factor. Then s has the uncertainty of that, with the greatest factor as
         its deviation. Otherwise that is the least factor which would have been found, as always of a and b.

@@ -1,4 +1,4 @@
-"""Maps that are stretched along an axis, or that lean: the pose, its covariance, and what is said of the map."""
+"""Maps that are stretched along an axis, or that lean: the pose, its covariance, and the warning."""
 
 from __future__ import annotations
 
