@@ -123,6 +123,18 @@ def pose_in(result: AssociationResult) -> RigidTransform:
     return result.pose
 
 
+def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
+    """Return the squared error of an answer's pose, normalized by its covariance: a chi-square of three."""
+    found = pose_in(result)
+    error = np.array([found.x - truth.x, found.y - truth.y, math.remainder(found.theta - truth.theta, math.tau)])
+    assert result.covariance is not None
+    return float(error @ np.linalg.solve(result.covariance, error))
+
+
+def warning_codes(result: AssociationResult) -> list[str]:
+    return [warning.code for warning in result.warnings]
+
+
 def local(index: MapIndex, at: RigidTransform) -> RigidTransform:
     """Return a pose of the map frame in the index frame."""
     return pose(at.x - float(index.origin[0]), at.y - float(index.origin[1]), at.theta)

@@ -91,7 +91,6 @@ def test_it_holds_where_all_that_is_seen_lies_on_walls_that_are_nearly_one(
     assert took < ALLOWED + 0.5 * MORE
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("drawn", "viewpoint"),
     [(one, (0.0, 0.0)) for one in (repeated, cut_up, along_lines_of_sight, heap, far_apart)] + [(heap, None)],

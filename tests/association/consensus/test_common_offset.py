@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
 import pytest
 
-from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, associate
+from association import AssociationOptions, Deadline, MapIndex, Scan, associate
 from association.consensus.common_offset import CommonOffset, fit_common_offset
 from association.context import SearchContext
 from association.rank_and_estimate import search_and_rank
-from registration import RigidTransform, Segments
+from registration import Segments
 
 from ...map_quality.check.drawn import faces, sampled
-from ..scenes import pose_in, same_pose
+from ..scenes import pose_in, same_pose, squared_error, warning_codes
 
 SIGMA = 0.025
 
@@ -31,17 +28,6 @@ def fitted(index: MapIndex, scan: Scan, *, oriented: bool = True) -> CommonOffse
     return fit_common_offset(context, answer.best, answer.estimated.wall_sigma)
 
 
-def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
-    found = pose_in(result)
-    error = np.array([found.x - truth.x, found.y - truth.y, math.remainder(found.theta - truth.theta, math.tau)])
-    assert result.covariance is not None
-    return float(error @ np.linalg.solve(result.covariance, error))
-
-
-def codes(result: AssociationResult) -> list[str]:
-    return [warning.code for warning in result.warnings]
-
-
 @pytest.mark.parametrize("distance", [0.05, -0.05])
 def test_walls_that_are_all_displaced_do_not_move_the_pose(distance: float) -> None:
     """The covariance holds: 16.3 is the quantile of 0.1 % of a chi-square of three."""
@@ -51,7 +37,7 @@ def test_walls_that_are_all_displaced_do_not_move_the_pose(distance: float) -> N
         usable += found.usable
         assert same_pose(pose_in(found), truth, 0.01, 0.005)
         assert squared_error(found, truth) < 16.3
-        assert codes(found) == ["common_offset"]
+        assert warning_codes(found) == ["common_offset"]
     assert usable >= 5
 
 
@@ -86,6 +72,6 @@ def test_the_free_side_of_a_wall_is_where_the_sensor_is() -> None:
 def test_a_factor_is_no_offset() -> None:
     """A map that is 3 % too large is off by more where the walls are far."""
     index = MapIndex.build(Segments.from_array(1.03 * faces()), SIGMA)
-    told = [code for _, scan in sampled() for code in codes(associate(index, scan))]
+    told = [code for _, scan in sampled() for code in warning_codes(associate(index, scan))]
     assert told.count("map_scale") >= 3
     assert told.count("common_offset") <= 1

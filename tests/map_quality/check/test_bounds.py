@@ -97,7 +97,6 @@ def test_no_map_is_indexed_without_a_look_at_the_deadline(kind: str) -> None:
     assert looks.ended() < MOST_BETWEEN_LOOKS
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("kind", MAPS)
 def test_every_stage_of_a_check_looks_at_the_deadline_and_holds_little(kind: str) -> None:
     index = MapIndex.build(Segments.from_array(MAPS[kind]()))

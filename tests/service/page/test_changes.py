@@ -151,7 +151,6 @@ def test_a_proposal_of_a_file_needs_its_map(page: Page, proposal: dict[str, Any]
     expect(page.locator("#store-changes")).to_be_hidden()
 
 
-@pytest.mark.long
 def test_changes_of_a_stored_map_are_proposed_from_logs(page: Page, proposal: dict[str, Any]) -> None:
     page.goto("/")
     page.locator("#changes summary").click()

@@ -97,7 +97,6 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.long
 def test_a_bag_is_opened_and_its_scans_are_searched(page: Page, sample: Path) -> None:
     shown(page, "rooms", "ambiguous")
     page.set_input_files("#files", [sample / "drive.mcap"])

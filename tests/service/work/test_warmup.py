@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from service.schemas import examples
 from service.work.warmup import warm_up
 from tests.running import until
@@ -129,7 +127,6 @@ def signatures() -> dict[str, int]:
     return {f"{k.__module__}.{k.__name__}": len(k.signatures) for k in kernels.values()}
 
 
-@pytest.mark.long
 def test_no_request_compiles_anything_after_the_warm_up(tmp_path: Path) -> None:
     script = "from tests.service.work.test_warmup import compiled_by_requests; print(compiled_by_requests())"
     run = subprocess.run([sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, timeout=300)
