@@ -15,6 +15,7 @@ from .result import (
     AssociationDiagnostics,
     AssociationResult,
     AssociationWarning,
+    Corrections,
     Correspondence,
     CriticalWall,
     MapVerdict,
@@ -24,7 +25,7 @@ from .result import (
     Status,
     WarningCode,
 )
-from .scan.scan import Scan, Views, mirrored
+from .scan.scan import Scan, Views, mirrored, scaled, turned_round
 from .scan.views import MAX_VIEWS, View, assemble
 from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
 from .verdict_explanation import (
@@ -54,6 +55,7 @@ __all__ = [
     "Beams",
     "CancelledError",
     "Contribution",
+    "Corrections",
     "Correspondence",
     "CriticalWall",
     "Deadline",
@@ -89,4 +91,6 @@ __all__ = [
     "map_set",
     "message_of",
     "mirrored",
+    "scaled",
+    "turned_round",
 ]

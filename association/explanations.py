@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 
 from registration import RegistrationResult, wrap_angle
 from registration.values import value
@@ -34,8 +33,6 @@ class Answer:
         Fraction of directions in which the scan shows what the map does, 0 to 1.
     beams : BeamFractions
         Fractions of the beams that do not read what the map shows.
-    significance : float
-        Probability that chance scores as high.
     """
 
     best: ConsensusSet
@@ -44,7 +41,6 @@ class Answer:
     registered: RegistrationResult
     agreement: float
     beams: BeamFractions
-    significance: float
 
 
 @value(frozen=True, slots=True)
@@ -74,28 +70,6 @@ class Explanations:
         """All explanations but that of the answer, in their order."""
         best = None if self.answer is None else self.answer.best
         return (one for one in self.ranked if one is not best)
-
-
-def put_first(answer: Answer, explanations: Explanations) -> Explanations:
-    """Return explanations with another answer, before all others; the same ones if theirs is at that place."""
-    if explanations.answer is not None and _same_place(answer.best, explanations.answer.best):
-        return explanations
-    others = (one for one in explanations.ranked if not _same_place(answer.best, one))
-    return replace(explanations, ranked=(answer.best, *others), answer=answer)
-
-
-def add_alternatives(explanations: Explanations, alternatives: Sequence[ConsensusSet]) -> Explanations:
-    """Add alternatives that fit at other scales to explanations, none of them above the answer."""
-    if explanations.answer is None:
-        return explanations
-    best, ranked = explanations.answer.best, list(explanations.ranked)
-    for other in alternatives:
-        one = replace(other, score=min(other.score, best.score), posterior=min(other.posterior, best.posterior))
-        place = next((k for k, there in enumerate(ranked) if _same_place(one, there)), len(ranked))
-        if place == len(ranked) or ranked[place].posterior < one.posterior:
-            ranked[place : place + 1] = [one]
-    ranked.sort(key=lambda one: (not one.inside, -one.posterior))
-    return replace(explanations, ranked=tuple(ranked))
 
 
 def _same_place(one: ConsensusSet, other: ConsensusSet) -> bool:

@@ -136,8 +136,11 @@ class AssociationOptions:
     parts : tuple of str
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
         them a usable answer has no alternatives; any other has, because `message_of` returns their number.
-    causes : bool
-        True to look for a mistake of the caller's if the answer is not usable, for twice the time at most.
+    on_map : float
+        Prior probability that the scan was taken on this map, or on one of these: 0.5 to 1. A robot that cannot leave
+        the building has 1.
+    usable_from : float
+        Least `AssociationResult.probability` of a usable answer, 0.5 to 0.9999.
     estimator, rotation : str
         Of the final pose, as in `registration.RegistrationOptions`; the estimator also of the returned scores.
 
@@ -157,7 +160,8 @@ class AssociationOptions:
     angle_tolerance: float | None = None
     min_overlap: float = 0.5
     parts: tuple[Part, ...] = PARTS
-    causes: bool = False
+    on_map: float = 0.9
+    usable_from: float = 0.95
     estimator: Estimator = "joint"
     rotation: Rotation = "wahba"
 
@@ -169,6 +173,8 @@ class AssociationOptions:
             ("offset_tolerance", self.offset_tolerance, 1e-3, REACH),
             ("angle_tolerance", self.angle_tolerance, 1e-3, GREATEST_ANGLE_GATE),
             ("min_overlap", self.min_overlap, 0.0, 1.0),
+            ("on_map", self.on_map, 0.5, 1.0),
+            ("usable_from", self.usable_from, 0.5, 0.9999),
         ]
         if unknown := set(self.parts).difference(PARTS):
             raise InvalidSearchError(

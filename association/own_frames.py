@@ -172,7 +172,8 @@ def _named(reason: Reason, result: AssociationResult) -> Reason:
         return replace(
             reason,
             message="The scan fits none of these maps better than an unrelated scan would. The robot may be in a place "
-            "that no map contains. Search other maps, too, or test the laser on one map with `causes`.",
+            "that no map contains. Search other maps, too. If the robot is on one of them, run "
+            "`linefix map check MAP --log LOG`: scale, mirror, unit or mount may be wrong.",
         )
     if reason.code != "similar_place":
         return reason

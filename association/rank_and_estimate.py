@@ -9,7 +9,6 @@ from registration import RigidTransform
 from .consensus.acceptance import accept, register_accepted
 from .consensus.consensus_set import ConsensusSet
 from .consensus.estimation import estimate_poses
-from .consensus.kernels.matching import score_of_matches
 from .consensus.ranking import rank_candidates
 from .consensus.sight import agreement, compare_beams
 from .context import SearchContext
@@ -18,7 +17,6 @@ from .layout import FOUND, record
 from .result import SearchReport
 from .scan.views import corrected
 from .search.candidates import Candidates, Effort, find_candidates
-from .verdict.chance import significance
 
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
@@ -84,6 +82,5 @@ def _answer(context: SearchContext, best: ConsensusSet) -> Answer | None:
     if found is None:
         return None
     registered, estimated = found
-    probability = significance(context, score_of_matches(best.matches))
     beams = compare_beams(context, estimated)
-    return Answer(best, accepted, estimated, registered, agreement(context, best), beams, probability)
+    return Answer(best, accepted, estimated, registered, agreement(context, best), beams)

@@ -11,7 +11,6 @@ import numpy as np
 
 from registration import Ambiguity
 
-from .causes import Cause
 from .consensus.acceptance import correspondences, overlaps_at
 from .consensus.consensus_set import ConsensusSet, matches_of
 from .consensus.estimation import EstimatedPose, estimate_poses, slices_between_looks
@@ -26,7 +25,7 @@ from .to_scale import ScaledSearch
 from .tuning import CRITICAL_DISPLACEMENT
 from .verdict.alternatives import compare_alternatives
 from .verdict.verdict import Verdict
-from .warnings import warnings_of, warnings_of_causes, warnings_of_map
+from .warnings import warnings_of, warnings_of_map
 
 
 def report(found: ScaledSearch, verdict: Verdict) -> AssociationResult:
@@ -65,11 +64,6 @@ def report(found: ScaledSearch, verdict: Verdict) -> AssociationResult:
     )
 
 
-def with_causes(result: AssociationResult, causes: Sequence[Cause]) -> AssociationResult:
-    """Add a warning for each mistake of the caller that was found."""
-    return replace(result, warnings=(*result.warnings, *warnings_of_causes(causes))) if causes else result
-
-
 def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
     """Return the consensus set, with the overlaps at the pose that is answered."""
     accepted, overlaps = answer.accepted, answer.accepted.overlaps
@@ -106,7 +100,6 @@ def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> As
         score=answer.best.score_by(context.options.estimator),
         runner_up=verdict.runner_up,
         margin=verdict.margin,
-        significance=answer.significance,
         critical_wall=_critical_wall(context, answer),
     )
 

@@ -36,10 +36,8 @@ WarningCode = Literal[
     "map_scale",
     "common_offset",
     "map_distorted",
+    "turned",
     "last_view_only",
-    "mirrored",
-    "reversed",
-    "unit_scale",
 ]
 
 
@@ -110,6 +108,25 @@ class Reason:
 
 
 @dataclass(frozen=True, slots=True)
+class Corrections:
+    """Errors of the map around the sensor, or of the ranges, that a pose was estimated together with.
+
+    Attributes
+    ----------
+    scale : float
+        Factor on the lengths of the scan, 1 where there is none.
+    offset : float
+        Metres by which all walls are nearer to the sensor than the map has them: a bias of ranges, or thick walls.
+    strain : tuple of 3 floats
+        Elongation of the map along its x and y axis, and half of the shear, as fractions: xx, yy, xy.
+    """
+
+    scale: float = 1.0
+    offset: float = 0.0
+    strain: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class AssociationDiagnostics:
     """Numbers next to the pose.
 
@@ -127,10 +144,14 @@ class AssociationDiagnostics:
         none above `SearchReport.complete_above` of the score.
     margin : float or None
         Score of the best less that of the best other pose, nats; None likewise.
-    significance : float
-        Probability that chance scores as high; small is good.
     critical_wall : CriticalWall or None
         None where the pose stays within `CRITICAL_DISPLACEMENT` metres without any one wall.
+    corrections : Corrections or None
+        What the pose was estimated together with; None where that is the pose alone. `registration.register` with the
+        accepted pairs then gives the pose without them.
+    turn_rate : float or None
+        Rate at which the sensor turned during the scan, as the walls show it, rad/s; None where it was sent (`twist`),
+        or shows no rotation.
     """
 
     registration: RegistrationDiagnostics
@@ -138,8 +159,9 @@ class AssociationDiagnostics:
     score: float
     runner_up: float | None
     margin: float | None
-    significance: float
     critical_wall: CriticalWall | None
+    corrections: Corrections | None = None
+    turn_rate: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

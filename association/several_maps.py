@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -165,7 +164,7 @@ def associate_on_maps(
     CancelledError
         When the deadline was cancelled.
     """
-    began, until = time.monotonic(), deadline or Deadline()
+    until = deadline or Deadline()
     index = maps.index_for(scan, until)
     prior = _joint_prior(maps, index, known)
     # Directions count where they do on all maps; then the index is directed.
@@ -173,7 +172,7 @@ def associate_on_maps(
     oriented = replace(options, oriented=options.oriented and maps.oriented)
     # The map of the answer, and its registration there, follow from its correspondences.
     wanted = replace(oriented, parts=tuple(dict.fromkeys((*options.parts, "correspondences"))))
-    found = run_stages(SearchContext.of(searched, scan, prior, wanted, until), began)
+    found = run_stages(SearchContext.of(searched, scan, prior, wanted, until))
     result = in_own_frames(found, maps.ids)
     return result if "correspondences" in options.parts else replace(result, correspondences=())
 

@@ -276,25 +276,6 @@ class Question(NamedTuple):
     rules: Records
 
 
-class WallLengths(NamedTuple):
-    """The lengths of a map's walls, for the score of chance.
-
-    Attributes
-    ----------
-    ascending : (m,) their lengths, metres
-    beyond : (m + 1,) the sums of those from each on, metres
-    agreeing : float
-        Probability that two points of walls have the same direction.
-    area : float
-        Of the map, m^2.
-    """
-
-    ascending: Floats
-    beyond: Floats
-    agreeing: float
-    area: float
-
-
 class Odds(NamedTuple):
     """A model of the verdict.
 

@@ -8,7 +8,6 @@ one. With the scan's lengths multiplied by it the search finds the missed matche
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from registration import RigidTransform
@@ -17,37 +16,26 @@ from registration.values import value
 
 from .consensus.acceptance import register_accepted
 from .consensus.common_offset import CommonOffset, fit_common_offset
-from .consensus.consensus_set import ConsensusSet
 from .consensus.distortion import Distortion, fit_distortion
-from .consensus.ranking import rank_candidates
-from .consensus.similarity import Similarity, fit_similarity, fit_trimmed_similarity
+from .consensus.similarity import Similarity, fit_similarity
 from .context import SearchContext
-from .explanations import Answer, Explanations, add_alternatives
+from .explanations import Answer, Explanations
 from .options import AssociationOptions
 from .rank_and_estimate import search_and_rank
-from .scan.scan import Scan, scaled
-from .search.candidates import Effort, allowed_by, find_candidates
+from .scan.scan import scaled
+from .search.candidates import Effort
 from .tuning import (
-    ALTERNATIVE_FACTOR,
-    ALTERNATIVE_SCALES,
     DOUBTING_DEVIATIONS,
     DOUBTING_WALLS,
     FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
     FACTOR_WALLS,
-    GREATEST_STRETCH,
-    LEAST_AS_SENT,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LOOSE_WALLS,
     MOST_FACTOR,
-    REACH,
-    RIVAL_SHARE,
-    SCALE_KEPT,
-    SCALE_LENGTH,
 )
-from .verdict.tuning import LOOSE_ALTERNATIVES
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +139,7 @@ def _with_factor(first: ScaledSearch) -> ScaledSearch:
     found = _search_with_factor(first, similarity)
     if found.factor is None:
         return replace(first, off_scale=similarity is not None and is_far_off(similarity))
-    explanations = add_alternatives(found.explanations, _alternatives_at_other_scales(first, found))
-    return _with_uncertain_factor(replace(found, explanations=explanations))
+    return _with_uncertain_factor(found)
 
 
 def _may_be_off(first: ScaledSearch) -> bool:
@@ -262,36 +249,6 @@ def is_far_off(similarity: Similarity) -> bool:
     return is_off(similarity) and off > MOST_FACTOR and shown
 
 
-def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> list[ConsensusSet]:
-    """Return the consensus sets that explain the scan at other scales, each at the one that fits it best.
-
-    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small. See
-    `_effort_beyond`.
-    """
-    alternatives: list[ConsensusSet] = []
-    for scale in ALTERNATIVE_SCALES:
-        context = first.context if scale == 1.0 else at_scale(first.context, scale)
-        if len(context.lines.rows) == len(found.context.lines.rows):
-            ranked = first.explanations.ranked
-            if scale != 1.0:
-                ranked = tuple(rank_candidates(context, find_candidates(context, _effort_beyond(context, found)).poses))
-            near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
-            alternatives += [_at_best_scale(first, context, scale, one) for one in near[:LOOSE_ALTERNATIVES]]
-    return alternatives
-
-
-def _at_best_scale(first: ScaledSearch, context: SearchContext, scale: float, one: ConsensusSet) -> ConsensusSet:
-    """Return a consensus set of a scaled scan at the scale that fits it best; itself where that is too far from one."""
-    similarity = fit_similarity(context, one)
-    if similarity is None or not abs(scale * similarity.factor - 1.0) <= ALTERNATIVE_FACTOR:
-        return one
-    again = at_scale(first.context, scale * similarity.factor)
-    if len(again.lines.rows) != len(one.matches):
-        return one
-    found = rank_candidates(again, one.estimate)
-    return found[0] if found else one
-
-
 def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
     """Return the search put to scale with the pose of a similarity, and the covariance that comes with its factor."""
     answer, factor, similarity = found.explanations.answer, found.factor, _similarity(found)
@@ -321,48 +278,3 @@ def _with_distortion(found: ScaledSearch) -> ScaledSearch:
         return found
     answer = _moved(context, answer, distortion.pose, distortion.covariance)
     return replace(found, explanations=replace(found.explanations, answer=answer), distortion=distortion)
-
-
-def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:
-    """Estimate the factor on a scan, if that is within `GREATEST_STRETCH` of a `rung`.
-
-    The scan is searched with the widest gate on offsets. A factor of ``1 + e`` puts a wall off by e times its distance:
-    walls near the sensor are found all the same. A similarity fitted to the matches of each of the best
-    poses has the factor.
-
-    Returns
-    -------
-    float or None
-        The factor, over the rung, of the pose whose matches agree best with one; None where it is one.
-    """
-    options = replace(context.options, offset_tolerance=REACH)
-    scan = scaled(context.scan, rung)
-    lax = SearchContext.of(context.index, Scan(scan.measured, None, None), None, options, context.deadline)
-    effort = Effort(SCALE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options))
-    best: tuple[float, float] | None = None
-    for one in rank_candidates(lax, find_candidates(lax, effort).poses)[:SCALE_KEPT]:
-        fitted = fit_trimmed_similarity(lax, one) if one.fraction >= SCALE_LENGTH else None
-        if fitted is None:
-            continue
-        factor, left = fitted[0].factor, fitted[1]
-        if LEAST_FACTOR <= abs(factor - 1.0) <= GREATEST_STRETCH and (best is None or left < best[0]):
-            best = left, factor
-    return None if best is None else best[1]
-
-
-def search_rungs(
-    context: SearchContext, rungs: Sequence[float], options: AssociationOptions
-) -> tuple[ScaledSearch, float] | None:
-    """Search a scan at the factor near each of some rungs; return the best search and its factor.
-
-    None where the deadline passes before all are searched.
-    """
-    best: tuple[ScaledSearch, float] | None = None
-    for rung in rungs:
-        factor = rung * (estimate_factor(context, rung) or 1.0)
-        found = search_to_scale(at_scale(context, factor, options))
-        if context.deadline.passed:
-            return None
-        if best is None or found.score > best[0].score:
-            best = found, factor
-    return best

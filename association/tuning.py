@@ -92,17 +92,6 @@ FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
 # A greater factor puts the answer in doubt, if so many walls agree beyond those that it takes, or it is beyond noise.
 DOUBTING_WALLS = 1.0  # tables
 DOUBTING_DEVIATIONS = 3.0  # geometry
-ALTERNATIVE_SCALES = (
-    1.0,
-    0.94,
-    0.96,
-    0.98,
-    1.02,
-    1.04,
-    1.06,
-)  # tables; at which alternatives are searched, where a factor is taken
-ALTERNATIVE_FACTOR = 0.08  # tables; by which alternatives may be off in the end
-LEAST_AS_SENT = 0.5  # of the answer's score, tables; a pose that scores less there is no alternative at its own scale
 SAME_PLACE = 1.0  # m, geometry; by which a factor may move a pose
 
 # --- Reporting --------------------------------------------------------------------------------------------------------
@@ -116,27 +105,6 @@ FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on ei
 LEAST_STUCK = 10
 STUCK_SHARE = 0.5  # measured
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
-
-# --- Causes: a caller's mistakes --------------------------------------------------------------------------------------
-
-TIMES_FOR_CAUSES = 2.0  # of the answer's own time; the contract
-LEAST_TIME_FOR_CAUSES = 0.02  # s, measured; where nothing fits an answer takes no time, and twice that is none
-CAUSE_CONFIDENCE = 0.99  # tables
-# A changed scan that would not be usable either still fits much better with so much more score and inliers.
-# Measured: of 127 scans in their map that were not usable none did so.
-CAUSE_GAP = 30.0  # nats
-CAUSE_RATIO = 1.5
-CAUSE_SHARE = 0.7  # of the length
-USUAL_EXTENT = 12.0  # m, tables; of a scan
-LEAST_EXTENT = 1.5  # m, geometry; the part seen of any room
-GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
-# Times; a scan that is scaled by more falls out of the gates of the search, which are metres: then the map is scaled.
-GREATEST_SAME_GATES = 5.0
-USUAL_PART = (0.25, 2.0)  # times, tables; usual length of scan lines, once of one unit, over that of walls
-MOST_FOR_UNITS = 2000  # map segments; indexing them again takes some 20 ms
-GREATEST_STRETCH = 0.12  # tables; how far a factor near one may be from it; `LEAST_FACTOR` at least
-SCALE_LENGTH = 0.5  # of the scan's length, tables; that has to match where the gates are wide
-SCALE_KEPT = 8  # poses, tables
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -23,7 +22,7 @@ from .verdict.models import USUAL
 from .verdict.probabilities import Probabilities
 from .verdict.reasons import taken_by_reason
 from .verdict.roles import ROLES
-from .verdict.tuning import NO_MATCH_PROBABILITY, USABLE_CAUTIOUS
+from .verdict.tuning import NO_MATCH_PROBABILITY
 from .verdict.verdict import Verdict
 from .verdict.vetoes import VETOES, Origin
 
@@ -64,18 +63,12 @@ class ExplainedModel:
     log_odds : float
         The sum of the terms, nats.
     probability : float
-        Of these log odds, 0 to 1: out-of-map scans are included.
-    on_map : float
-        Nats that are added for a scan that is known to be of this map.
-    probability_on_map : float
-        With it, and without the null score, which is about other maps.
+        By the model and the prior probability `options.on_map`, 0 to 1.
     """
 
     contributions: tuple[Contribution, ...]
     log_odds: float
     probability: float
-    on_map: float
-    probability_on_map: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +112,6 @@ class ExplainedNull:
     score: float
     fraction: float
     symmetry: float
-    searched_above: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +172,6 @@ class VerdictExplanation:
     among: AmongAlternatives | None = None
     null: ExplainedNull | None = None
     probability_of_pose: float | None = None
-    cautious: float | None = None
     explained: float | None = None
     thresholds: Mapping[str, float] | None = None
 
@@ -195,13 +186,10 @@ class AnswerExplanation:
         The answer, as `associate` returns it.
     verdict : VerdictExplanation
         On the scan as a whole.
-    last_view : VerdictExplanation or None
-        On the last view of a drive alone, where the drive as a whole is not usable.
     """
 
     result: AssociationResult
     verdict: VerdictExplanation
-    last_view: VerdictExplanation | None
 
 
 def explain_verdict(
@@ -232,13 +220,9 @@ def explain_verdict(
     CancelledError
         When the deadline was cancelled.
     """
-    began = time.monotonic()
-    stages = run_stages(SearchContext.of(index, scan, prior, options, deadline or Deadline()), began)
-    last, verdict = stages.last, stages.verdict
-    if last.result is None and not (last.complete and stages.result.search.complete):
-        verdict = verdict.cut_short()
-    alone = None if last.found is None or last.verdict is None else explained(last.found.context, last.verdict)
-    return AnswerExplanation(stages.result, explained(stages.found.context, verdict), alone)
+    stages = run_stages(SearchContext.of(index, scan, prior, options, deadline or Deadline()))
+    verdict = stages.verdict if stages.result.search.complete else stages.verdict.cut_short()
+    return AnswerExplanation(stages.result, explained(stages.found.context, verdict))
 
 
 def explained(context: SearchContext, verdict: Verdict) -> VerdictExplanation:
@@ -269,9 +253,8 @@ def _with_numbers(
         among=found.among,
         null=_null(description, found),
         probability_of_pose=found.right,
-        cautious=found.cautious,
         explained=found.explained,
-        thresholds={"cautious": USABLE_CAUTIOUS, "explained": NO_MATCH_PROBABILITY},
+        thresholds={"usable_from": context.options.usable_from, "explained": NO_MATCH_PROBABILITY},
     )
 
 
@@ -282,7 +265,7 @@ def _evaluated(found: Probabilities) -> ExplainedModel:
         Contribution(name, values.get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None)
         for name, nats in terms.items()
     )
-    return ExplainedModel(contributions, sum(terms.values()), found.by_model, model.on_map, found.by_model_on_map)
+    return ExplainedModel(contributions, sum(terms.values()), found.by_model)
 
 
 def _weighed(context: SearchContext, description: Description) -> tuple[WeighedAlternative, ...]:
@@ -297,4 +280,4 @@ def _null(description: Description, found: Probabilities) -> ExplainedNull | Non
     if found.null is None:
         return None
     score = found.null.score
-    return ExplainedNull(score, score / description.answer.best.score, found.null.symmetry, found.null_above)
+    return ExplainedNull(score, score / description.answer.best.score, found.null.symmetry)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from registration import Beams
 
-from .causes import Cause, Mistake
 from .consensus.common_offset import CommonOffset
 from .consensus.distortion import Distortion
 from .context import SearchContext
@@ -19,17 +18,8 @@ from .scan.extents import extent, inner_extent
 from .scan.kernels.extents import facing_away
 from .to_scale import Factor, ScaledSearch
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
-from .units import UNIT_NAMES, unit_mistake
 from .verdict.verdict import Verdict
 
-WARNING_MESSAGES: Mapping[Mistake, str] = {
-    Mistake.MIRRORED: "The scan fits much better with left and right exchanged. The laser may be mounted upside down, "
-    "or its angles may increase clockwise. Reverse the order of its ranges, or negate every y and exchange begin and "
-    "end.",
-    Mistake.REVERSED: "The scan fits much better with begin and end of every segment exchanged. Free space must lie on "
-    "the left of the segments of scan and map. Exchange the ends of segments that have it on the right, or set "
-    '"oriented": false.',
-}
 NOT_IN_ORDER = (
     "The points are not in scanning order, so walls are missed: segments are extracted from consecutive points. "
     "Expected is one turn around the viewpoint in one direction or, without a viewpoint, neighbour after neighbour. "
@@ -61,16 +51,6 @@ def warnings_of_map(found: ScaledSearch) -> tuple[AssociationWarning, ...]:
     )
 
 
-def warnings_of_causes(causes: Sequence[Cause]) -> tuple[AssociationWarning, ...]:
-    """List the warnings about a sender's mistakes."""
-    return tuple(AssociationWarning(cause.mistake.code, _mistaken(cause)) for cause in causes)
-
-
-def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:
-    """List the warnings about the scan alone, independent of the search."""
-    return _listed(_of_scan(context))
-
-
 def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
     return {
         "no_segments": _no_segments(context),
@@ -84,21 +64,6 @@ def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
 
 def _listed(found: Mapping[WarningCode, str | None]) -> tuple[AssociationWarning, ...]:
     return tuple(AssociationWarning(code, message) for code, message in found.items() if message is not None)
-
-
-def _mistaken(cause: Cause) -> str:
-    if cause.mistake is not Mistake.UNIT_SCALE:
-        return WARNING_MESSAGES[cause.mistake]
-    unit, taken = None if cause.of_map else UNIT_NAMES.get(cause.factor), unit_mistake(cause.factor)
-    what = "the scan or the map is not to scale"
-    if unit is not None:
-        what = f"the scan seems to be in {unit}"
-    elif taken is not None:
-        what = f"the map seems to be in {taken}"
-    return (
-        f"The scan fits much better with all lengths times {cause.factor:.4g}: {what}. Send both in metres: multiply "
-        "the scan by this factor, or divide the map by it."
-    )
 
 
 def _incomplete(context: SearchContext) -> str:

@@ -147,9 +147,9 @@ def print_wrong(title: str, outcomes: Iterable[Outcome]) -> None:
             margin = "" if d.margin is None else f"{d.margin:.0f}"
             cells.append(
                 (name, "yes" if o.among else "no", f"{off[0]:.2f} m {off[1]:.1f} deg", f"{o.result.probability:.3f}",
-                 f"{d.score:.0f}", margin, f"{d.inlier_fraction:.2f}", matched, f"{d.significance:.0e}")
+                 f"{d.score:.0f}", margin, f"{d.inlier_fraction:.2f}", matched)
             )  # fmt: skip
-    head = ("query", "truth listed", "off", "probability", "score", "margin", "share", "matched", "significance")
+    head = ("query", "truth listed", "off", "probability", "score", "margin", "share", "matched")
     print_table(title, head, cells)
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from association.index.likelihood_field import LikelihoodField
+from association.search.kernels.branch_and_bound import bound_of
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import linefix
-from association.index.likelihood_field import LikelihoodField
-from association.search.kernels.branch_and_bound import bound_of
 from examples.concepts import legend, save
 from formats.colours import ESTIMATE, INK, MATCHED, UNMATCHED, WALL
 from registration import MeasuredSegments, RegistrationError, RigidTransform, Segments

@@ -24,14 +24,11 @@ from .tuning import (
     CROSSING_SAMPLE_LOOKS,
     CROSSINGS_A_CHAIN,
     FEW_CHAINS,
-    FIELD_CELL,
-    FIELD_REACH,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MOST_BANDS,
     MOST_CROSSINGS,
-    MOST_FIELD_CELLS,
     NEIGHBOURHOOD,
     RASTER_CELL,
     SWEEP_CELL,
@@ -136,12 +133,6 @@ def directions_near(walls: Walls, chains: Walls) -> Raster:
     direction_raster(ends, REACH + APART_STEP, shape, sectors, bits)
     direction_raster(ends, NARROW_REACH + APART_STEP, shape, sectors + SECTORS, bits)
     return Raster(shape, bits)
-
-
-def field_shape(ends: Floats) -> Records | None:
-    """Return corner and number of cells of the likelihood field of walls (m, 4), (1,) of `GRID_SHAPE`; None of many."""
-    shape = _shape(ends, FIELD_CELL, FIELD_REACH, MOST_FIELD_CELLS)
-    return shape if shape["cell"][0] <= FIELD_CELL else None
 
 
 def _sectors(walls: Records) -> NDArray[np.int32]:

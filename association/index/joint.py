@@ -22,7 +22,7 @@ from registration.values import value
 from ..deadline import Deadline
 from ..errors import InvalidMapError
 from ..layout import Integers
-from ..tuning import DIRECTION_BINS, EXCEEDING, FAR, FARTHER, MODEL_OFFSET, REACH
+from ..tuning import EXCEEDING, FAR, FARTHER, MODEL_OFFSET, REACH
 from .map_index import MapIndex, tables_of
 from .map_points import NO_POINTS, MapPoints
 from .tuning import CELL
@@ -151,16 +151,6 @@ class JointIndex(MapIndex):
     def least_kept(self) -> int:
         """Return the number of poses that are kept at least, so that each map can be listed."""
         return POSES_A_MAP * len(self.parts)
-
-    def agreeing_share(self) -> float:
-        """Return the probability that two points of walls of one map have the same direction, as of one map."""
-        bin_of = np.repeat(np.arange(DIRECTION_BINS), np.diff(self.walls.bin_starts))
-        piece_of = self.pieces.items[self.pieces.starts[:-1]]
-        lengths = np.zeros((len(self.parts), DIRECTION_BINS))
-        np.add.at(lengths, (self.map_of(piece_of % self.directed), bin_of), self.walls.longest)
-        near = lengths + np.roll(lengths, 1, axis=1) + np.roll(lengths, -1, axis=1)
-        agreeing = (lengths * near).sum(axis=1) / lengths.sum(axis=1)  # times the length of the map
-        return float(agreeing.sum() / lengths.sum())
 
     def map_of(self, segments: Integers) -> Integers:
         """Return the map of each segment of the joint index, (n,)."""

@@ -15,22 +15,20 @@ from registration import Segments
 from ..deadline import Deadline
 from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
-from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
+from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
 from ..tuning import WHOLE_GAP
-from .grids import crossing_chains, directions_near, field_shape, near_walls, stopping_beams, swept_chains
-from .likelihood_field import LikelihoodField, likelihood_field
+from .grids import crossing_chains, directions_near, near_walls, stopping_beams, swept_chains
 from .map_points import NO_POINTS, MapPoints
 from .tuning import (
     BLENDED_SIGMAS,
     BLENDED_STEP,
-    FIELD_LEVELS,
     LEAST_DIFFERENCE,
     MAX_EXTENT,
     MAX_MAP_SIGMA,
     ONE_LINE,
     ONE_LINE_SHARE,
 )
-from .walls import blended, both_ways, chains_of, ends_of_rows, merge, tie
+from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]
 
@@ -165,7 +163,7 @@ class MapIndex:
 
     def warmed(self) -> Self:
         """Compute what the first search would wait for, and return the index."""
-        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables", "obstacles"):
+        for name in ("crowd", "most_near", "area", "diagonal", "tables", "obstacles"):
             getattr(self, name)
         return self
 
@@ -194,22 +192,10 @@ class MapIndex:
         return MapIndex._of(either, self.sigma, self.origin, self.directed, self.points, deadline)
 
     @cached_property
-    def likelihood_field(self) -> LikelihoodField | None:
-        """The likelihood field of walls and points; None if the map is too large for one."""
-        return likelihood_field(ends_of_rows(self.obstacles.walls))
-
-    @cached_property
     def obstacles(self) -> Place:
         """The obstacles of beams: the walls, and behind them two short ones for each point."""
         place = self.tables.place
         return stopping_beams(place, self.points.shifted(-self.origin)) if len(self.points) else place
-
-    @cached_property
-    def wall_lengths(self) -> WallLengths:
-        """The lengths of its walls."""
-        lengths = np.sort(self.walls.longest)
-        beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
-        return WallLengths(lengths, beyond, self.agreeing_share(), self.area)
 
     @cached_property
     def crowd(self) -> float:
@@ -223,14 +209,6 @@ class MapIndex:
         cells = float(grid.shape["cell"][0] / obstacles.shape["cell"][0])
         longest = [float(np.diff(one.starts).max()) for one in (grid, obstacles)]
         return math.ceil(max(longest[0], cells * longest[1]))
-
-    def agreeing_share(self) -> float:
-        """Return the probability that two points of walls have the same direction, up to a neighbouring bin."""
-        shares = np.add.reduceat(
-            np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
-        )
-        shares = np.where(np.diff(self.walls.bin_starts) > 0, shares, 0.0) / self.walls.summed[-1]
-        return float((shares * (shares + np.roll(shares, 1) + np.roll(shares, -1))).sum())
 
     @cached_property
     def area(self) -> float:
@@ -270,7 +248,7 @@ class MapIndex:
 
     @property
     def nbytes(self) -> int:
-        """Memory held, bytes; with that of the likelihood field, which the first scan that needs it computes."""
+        """Memory held, bytes."""
         tables: list[Any] = [
             self.pieces,
             self.walls,
@@ -284,10 +262,8 @@ class MapIndex:
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         if len(self.points):
             tables += [(self.points.positions, self.obstacles.walls, self.obstacles.ties), self.obstacles.grid]
-        shape = field_shape(ends_of_rows(self.obstacles.walls))
-        of_field = 0 if shape is None else FIELD_LEVELS * int(shape["rows"][0] * shape["columns"][0])
         arrays = [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
-        return of_field + sum(int(array.nbytes) for array in arrays)
+        return sum(int(array.nbytes) for array in arrays)
 
 
 def tables_of(

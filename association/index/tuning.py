@@ -65,11 +65,3 @@ MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
 FEW_CHAINS = 500  # at least so many chains count; tables: in a room all pairs are listed
 CROSSING_SAMPLE = 128  # chains by which these numbers are estimated; measured: to a fifth, by 32 to a third;
 CROSSING_SAMPLE_LOOKS = 2_000_000  # with so many looks at most: up to half a second where lines cross everywhere
-
-# --- Likelihood field -------------------------------------------------------------------------------------------------
-
-FIELD_CELL = 0.2  # m, tables; half of it takes three times as long, and finds the same
-FIELD_DEVIATION = 0.75 * FIELD_CELL  # m, tables; of a point from its wall, at half a cell and half a heading off
-FIELD_REACH = 3.0 * FIELD_CELL  # m; four deviations, beyond which nothing is left of the likelihood
-FIELD_LEVELS = 6  # geometry; the highest has blocks of 32 cells
-MOST_FIELD_CELLS = MAX_SWEEP_CELLS  # memory: 6 MB; a square of 200 m

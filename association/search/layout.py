@@ -54,10 +54,6 @@ GOES_ON, INTERRUPTED, EXHAUSTED, PROVEN, CONFIDENT = range(5)
 # set takes at least whose score would be stored.
 BEST = fields((_I, "count"), (_F, "best_value least_value least_freedom"))
 
-# A block of poses of one heading, by its lowest row and column and by its level, with the greatest value that one of
-# them may have; and a pose of it, with its value.
-BLOCK = fields((_I, "bound level heading row column"))
-CELL_POSE = fields((_I, "value heading row column"))
 
 # Limits of a search: the greatest probability of having missed a better consensus set, -1 for all bases; a value
 # that is known to be reached; metres between slides, and the fraction of the best value that parallel segments have to

@@ -4,8 +4,7 @@ Origins: *geometry* follows from what the number means; *tables* was chosen by t
 floor plans and logs, and little changes near it; *measured* is a fit or a timing; *rounding* keeps arithmetic sound.
 """
 
-from ..consensus.tuning import CERTAIN
-from ..tuning import DISTINCT_ANGLE, RIVAL_SHARE
+from ..tuning import DISTINCT_ANGLE
 
 # --- Bases ------------------------------------------------------------------------------------------------------------
 
@@ -64,12 +63,3 @@ KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternativ
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5
-
-# --- Branch and bound over the ends of beams --------------------------------------------------------------------------
-
-# Fractions of the places where beams end, by the likelihood of the map's field there, 0 to 1.
-WELL_EXPLAINED = 0.6  # tables; with more at the answer, no more is searched
-FIELD_LEAST = RIVAL_SHARE * WELL_EXPLAINED  # tables; with less, poses in other buildings explain a scan as well
-FIELD_GAP = 0.1  # tables; a pose farther behind the best one is not kept, and a place nearer to it leaves it in doubt
-FIELD_POINTS = 80  # tables; of a scan
-END_SQUARE = CERTAIN  # m, tables; ends of beams within one such square count as one

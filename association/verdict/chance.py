@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from registration.values import value
 
 from ..consensus.consensus_set import ConsensusSet
@@ -21,32 +19,8 @@ from ..scan.scan import mirrored
 from ..scan.scan_lines import ScanLines
 from ..search.candidates import Effort, allowed_by, find_candidates
 from ..tuning import FEW_KEPT
-from .kernels import chance, symmetry
+from .kernels import symmetry
 from .tuning import NULL_ALLOWED, NULL_ALLOWED_NEAR, NULL_ENOUGH, NULL_FRACTION, NULL_MARGIN, NULL_SAMPLES
-
-EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
-
-
-def significance(context: SearchContext, score: float) -> float:
-    """Bound the probability that some pose scores `score` on a map that has nothing to do with the scan.
-
-    Consider a pose drawn at random, turned so that some directions agree. Scan segment i lies on a wall with a
-    probability q_i that the walls' length per area gives. The bound is Chernoff's on the sum of the gains, times the
-    number of poses that the gates distinguish. This is the a-contrario count of false alarms of Desolneux, Moisan and
-    Morel.
-
-    Parameters
-    ----------
-    context : SearchContext
-    score : float
-        Nats, without lines of sight.
-
-    Returns
-    -------
-    float
-        0 to 1; small is good.
-    """
-    return chance.significance(context.lines.rows, context.index.wall_lengths, context.gates, EXPONENTS, score)
 
 
 @value(frozen=True, slots=True)

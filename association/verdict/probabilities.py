@@ -11,10 +11,9 @@ from ..context import SearchContext
 from .alternatives import AmongAlternatives, compare_three_ways
 from .chance import NullScore, find_null_score
 from .features import Description, Features, add_null_score
-from .kernels.null_features import allowed_null
 from .kernels.odds import probability
 from .models import MODELS, USUAL, Model
-from .tuning import USABLE_CAUTIOUS
+from .tuning import FITTED_ON_MAP
 from .vetoes import Veto
 
 
@@ -30,39 +29,24 @@ class Probabilities:
         With the null score where it was needed and matters.
     explained : float
         That this place or a similar one is right, wherever along an unobservable direction; out-of-map scans included.
-    by_model_on_map, by_model : float
-        By the model, before the alternatives: for a scan that is known to be of this map, without the null score; and
-        with out-of-map scans included.
-    among : AmongAlternatives
+    by_model : float
+        By the model, before the alternatives.
+        among : AmongAlternatives
     null : NullScore or None
         Of the mirrored scan; None where that was not searched.
-    null_above : float
-        Fraction of the answer's score below which the mirrored scan was not searched; 0 where all was.
     """
 
     model: Model
     features: Features
     explained: float
-    by_model_on_map: float
     by_model: float
     among: AmongAlternatives
     null: NullScore | None
-    null_above: float
 
     @property
     def right(self) -> float:
-        """Return the probability that the pose is right, given that the robot is on this map."""
-        return self.by_model_on_map * self.among.mean
-
-    @property
-    def cautious(self) -> float:
-        """Return the same where out-of-map scans are included, and the least comparison with alternatives counts."""
+        """Return the probability that the pose is right, with the prior probability `options.on_map`."""
         return self.by_model * self.among.least
-
-    @property
-    def suffice(self) -> bool:
-        """Return whether the cautious probability reaches its threshold; `right` is never less."""
-        return self.cautious >= USABLE_CAUTIOUS
 
 
 def work_out_probabilities(context: SearchContext, description: Description, vetoes: tuple[Veto, ...]) -> Probabilities:
@@ -84,11 +68,10 @@ def work_out_probabilities(context: SearchContext, description: Description, vet
         When the deadline was cancelled.
     """
     found = _at_first(context, description)
-    if not found.suffice or any(veto.settles for veto in vetoes):
+    if found.right < context.options.usable_from or any(veto.settles for veto in vetoes):
         return found
-    # Only an answer that would be usable is compared with the mirrored scan, which costs another search. If it is
-    # usable, the null score is not reported; if it is not, the reasons go by it.
-    return _with_null_score(context, description, found, certain=not vetoes and context.window is None)
+    # Only an answer that would be usable is compared with the mirrored scan, which costs another search.
+    return _with_null_score(context, description, found)
 
 
 def _at_first(context: SearchContext, description: Description) -> Probabilities:
@@ -98,26 +81,33 @@ def _at_first(context: SearchContext, description: Description) -> Probabilities
         model=model,
         features=Features(*described.item()),
         explained=probability(model.odds, _as_if_fixed(described), 0.0),
-        by_model_on_map=probability(model.odds, described, model.on_map),
-        by_model=probability(model.odds, described, 0.0),
+        by_model=_by_model(model, described, context.options.on_map),
         among=compare_three_ways(context, description.answer, description.others, description.alternatives),
         null=None,
-        null_above=0.0,
     )
 
 
-def _with_null_score(
-    context: SearchContext, description: Description, found: Probabilities, *, certain: bool
-) -> Probabilities:
-    """Search the mirrored scan; if the answer is `certain` otherwise, only as far as the null score may change that."""
-    described, best, least = description.features.copy(), description.answer.best, 0.0
-    if certain:
-        bar = USABLE_CAUTIOUS / found.among.least
-        least = allowed_null(found.model.odds, described.copy(), best.score, bar)
-    null = find_null_score(context, best, least)
+def _with_null_score(context: SearchContext, description: Description, found: Probabilities) -> Probabilities:
+    """Search the mirrored scan."""
+    described, best = description.features.copy(), description.answer.best
+    null = find_null_score(context, best)
     add_null_score(described, best, null)
-    by_model = probability(found.model.odds, described, 0.0)
-    return replace(found, features=Features(*described.item()), by_model=by_model, null=null, null_above=least)
+    by_model = _by_model(found.model, described, context.options.on_map)
+    return replace(found, features=Features(*described.item()), by_model=by_model, null=null)
+
+
+def _by_model(model: Model, described: Records, on_map: float) -> float:
+    """Return the probability of an answer by the model and the prior probability that the scan is of this map.
+
+    The model states the log odds L where a fraction f of scans is of this map, and L + c for scans that are: so the
+    odds against the answer are ``exp(-L - c)`` on this map and ``exp(-L) - exp(-L - c)`` elsewhere, and the prior
+    changes the latter by the ratio of the prior odds.
+    """
+    by_all = probability(model.odds, described, 0.0)
+    by_map = probability(model.odds, described, model.on_map)
+    on_this, in_all = 1.0 / by_map - 1.0, 1.0 / by_all - 1.0
+    ratio = (1.0 - on_map) / on_map * FITTED_ON_MAP / (1.0 - FITTED_ON_MAP)
+    return 1.0 / (1.0 + on_this + max(0.0, in_all - on_this) * ratio)
 
 
 def _as_if_fixed(described: Records) -> Records:

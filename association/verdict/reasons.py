@@ -46,7 +46,8 @@ REASON_MESSAGES: Mapping[ReasonCode, str] = {
     "unobservable_direction": "The observed walls do not fix the position along one direction (`unobservable`). Move "
     "until other walls are in view, and scan again.",
     "not_on_map": "The scan fits this map no better than an unrelated scan would. The robot may be in a place that "
-    "the map does not contain. Search other maps, too, or test the laser with `causes`.",
+    "the map does not contain. If it is on the map, run `linefix map check MAP --log LOG`: scale, mirror, unit or "
+    "mount may be wrong.",
     "similar_place": "Another pose fits the scan about as well: see `alternatives`. Send a prior, or move and scan "
     "again.",
     "single_wall": "The pose depends on a single wall (`critical_wall`). Move and scan again.",

@@ -29,19 +29,12 @@ NULL_FRACTION = 0.7  # of the answer's score, tables; a null below it says no mo
 # By what fraction a null may be better than the answer, measured: of 11,275 right answers that are sure otherwise 3
 # have one that is better by more. Else the laser is upside down, or the robot elsewhere.
 MIRRORED_BETTER = 0.02
-# Fractions at which it is looked up whether a null matters; beyond the last it always does.
-NULL_FRACTIONS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.0 + MIRRORED_BETTER)
 NULL_MARGIN = 0.9  # of the score in question, measured; a pose that scores less while it is searched for is not kept
 NULL_ENOUGH = 1.1  # likewise; a null above it
 # The probability that is allowed of having missed a better one. Tables: it is one feature among others;
 NULL_ALLOWED = 0.01
 NULL_ALLOWED_NEAR = 0.001  # where only what matters is looked for, which fewer bases show
 NULL_SAMPLES = 1_024  # consensus sets, a resolution of 1e-3
-
-# --- Chance: the bound ------------------------------------------------------------------------------------------------
-
-LEAST_CHANCE, MOST_CHANCE = 1e-6, 0.9  # of one match, rounding
-LEAST_SIGNIFICANCE = 1e-300  # rounding
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
@@ -61,9 +54,7 @@ UNLIKE_SYMMETRY, SYMMETRIC = (
     0.95,
 )  # tables; fractions between which a map comes to count as symmetric about a place
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
-# Cross-validated: with it at most 0.7 % of the out-of-map scans that can be told are usable (mirrored ones 0.3 %), and
-# of the usable answers to scans of the map at most 0.1 % are wrong.
-USABLE_CAUTIOUS = 0.95
+FITTED_ON_MAP = 0.5  # fraction of the scans of their map among those that the models were fitted to, about
 # Fraction of the beams of a drive's exact views that read the walls, over that of all views. Of 2,823 right drives in
 # drawn buildings and logs that were usable 1 in 500 came below 0.65; one whose frame was 3.8 degrees off to 0.36.
 # Measured.

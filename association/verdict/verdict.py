@@ -16,7 +16,7 @@ from .features import Description, describe_answer
 from .inconsistencies import displaced_walls, turn_during_scan
 from .probabilities import Probabilities, work_out_probabilities
 from .reasons import REASON_MESSAGES, Doubts, reasons_of
-from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_CAUTIOUS
+from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY
 from .unobservable import beyond_tolerance, choose_along_direction
 from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 
@@ -69,11 +69,6 @@ class Verdict:
         """Return whether the prior contradicts the pose."""
         return contradict_prior(self.vetoes)
 
-    @property
-    def cautious(self) -> float:
-        """Return the probability that the pose is right where out-of-map scans are included; 0 without an answer."""
-        return 0.0 if self.probabilities is None else self.probabilities.cautious
-
     def cut_short(self) -> Verdict:
         """Return the same, not usable, where something was left undone."""
         if not self.complete:
@@ -83,9 +78,7 @@ class Verdict:
         return replace(self, usable=False, vetoes=vetoes, reasons=reasons)
 
 
-def judge(
-    context: SearchContext, explanations: Explanations, *, off_scale: bool = False, on_map: bool = False
-) -> Verdict:
+def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
     """Judge the best explanation.
 
     1. Describe it by features, among its alternatives.
@@ -100,8 +93,6 @@ def judge(
     explanations : Explanations
     off_scale : bool
         True if scan and map differ by a factor that was not corrected.
-    on_map : bool
-        True if other evidence than the models shows that the scan was taken on this map.
 
     Raises
     ------
@@ -116,7 +107,7 @@ def judge(
     found = work_out_probabilities(context, description, applied(findings))
     pose = choose_along_direction(context, answer)
     vetoes = applied(_all_findings(context, findings, found, pose))
-    status = _status(found, vetoes, on_map=on_map)
+    status = _status(found, vetoes, context.options.usable_from)
     vetoes = counted(vetoes, status)
     usable = status is Status.OK and not vetoes
     margin, runner_up = _margin(context, explanations, answer)
@@ -127,7 +118,7 @@ def judge(
         pose=pose,
         margin=margin,
         runner_up=runner_up,
-        reasons=() if usable else _reasons(description, found, status, vetoes, on_map=on_map),
+        reasons=() if usable else _reasons(context, description, found, status, vetoes),
         vetoes=vetoes,
         description=description,
         probabilities=found,
@@ -192,7 +183,7 @@ def _margin(context: SearchContext, explanations: Explanations, answer: Answer) 
     if nearest is None:
         return None, None
     best = answer.best.posterior
-    return best - nearest.posterior, None if not best > 0.0 else max(0.0, nearest.posterior / best)
+    return max(0.0, best - nearest.posterior), None if not best > 0.0 else max(0.0, nearest.posterior / best)
 
 
 def _probability(status: Status, right: float, *, contradicted: bool) -> float | None:
@@ -206,24 +197,24 @@ def _probability(status: Status, right: float, *, contradicted: bool) -> float |
 
 
 def _reasons(
-    description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...], *, on_map: bool
+    context: SearchContext, description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...]
 ) -> tuple[Reason, ...]:
     """List why an answer is not usable."""
     doubts = Doubts(
         status,
         vetoes,
-        not_on_map=found.explained < ELSEWHERE_PROBABILITY and not on_map,
-        similar_place=found.among.least < USABLE_CAUTIOUS,
+        not_on_map=found.explained < ELSEWHERE_PROBABILITY,
+        similar_place=found.among.least < context.options.usable_from,
         alone=not description.others,
     )
     return reasons_of(doubts, found.features, found.model)
 
 
-def _status(found: Probabilities, vetoes: tuple[Veto, ...], *, on_map: bool) -> Status:
+def _status(found: Probabilities, vetoes: tuple[Veto, ...], usable_from: float) -> Status:
     """Decide in order of precedence."""
-    if found.explained < NO_MATCH_PROBABILITY and not on_map:
+    if found.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
     caps = [veto.caps for veto in vetoes if veto.caps is not None]
     if Status.DEGENERATE in caps:
         return Status.DEGENERATE
-    return Status.OK if found.suffice and not caps else Status.AMBIGUOUS
+    return Status.OK if found.right >= usable_from and not caps else Status.AMBIGUOUS

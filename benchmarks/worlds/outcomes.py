@@ -25,7 +25,7 @@ FINE_DISTANCE, FINE_ANGLE = 0.1, 1.0
 TOLERANCE = 0.03  # m; a beam reads what the map shows within this and
 SIGMAS = 4.0  # times the noise
 
-DIAGNOSTICS = ("inlier_fraction", "score", "runner_up", "margin", "significance")
+DIAGNOSTICS = ("inlier_fraction", "score", "runner_up", "margin")
 OF_THE_REGISTRATION = ("chi2", "dof", "reliability")
 
 
@@ -59,7 +59,7 @@ class WorldOutcome:
     walls, matched, missing : int
         Walls of the map among the correspondences, correspondences, map segments that should have been seen.
     scan_segments, map_segments : int
-    inlier_fraction, score, runner_up, margin, significance, chi2, reliability : float or None
+    inlier_fraction, score, runner_up, margin, chi2, reliability : float or None
         As the answer's diagnostics name them.
     dof : int or None
     alternatives : int
@@ -93,7 +93,6 @@ class WorldOutcome:
     score: float | None
     runner_up: float | None
     margin: float | None
-    significance: float | None
     chi2: float | None
     reliability: float | None
     dof: int | None

@@ -2,16 +2,10 @@
 
 import math
 
-import numpy as np
-
 from compiled import kernel
 from registration.layout import Records
 
-from ...tables import Odds
-from ..tuning import MAX_GAP, MOST_NULL, NULL_FRACTION, NULL_FRACTIONS, SYMMETRIC, UNLIKE_SYMMETRY
-from .odds import log_odds
-
-ROUNDING = 1e-9  # of a probability
+from ..tuning import MAX_GAP, MOST_NULL, NULL_FRACTION, SYMMETRIC, UNLIKE_SYMMETRY
 
 
 @kernel
@@ -35,25 +29,3 @@ def write_null_features(score: float, null: float, symmetry: float, features: Re
     """Write the scores of an answer and of the mirrored scan into the features of the answer, (1,) of `FEATURES`."""
     out = features[0]
     out.null, out.null_gap, out.null_better = null_features(score, null, symmetry)
-
-
-@kernel
-def allowed_null(cautious: Odds, features: Records, score: float, bar: float) -> float:
-    """Return the greatest of `NULL_FRACTIONS` at which the probability is over `bar`; or 0.
-
-    That is the mirrored scan's score over the answer's. Wherever the map is not symmetric about the
-    place. The more it scores the less the probability. `features` (1,) are those of the answer; those of
-    the null score are changed.
-    """
-    numbers = features.view(np.float64)
-    least = bar + ROUNDING
-    if least >= 1.0:
-        return 0.0
-    least = math.log(least / (1.0 - least))
-    allowed = 0.0
-    for ratio in NULL_FRACTIONS:
-        write_null_features(score, ratio * score, 0.0, features)
-        if log_odds(cautious, numbers) < least:
-            break
-        allowed = ratio
-    return allowed
