@@ -66,8 +66,8 @@ MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift gain score"))
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 # A scored consensus set, nats: its score, and score and prior together; the terms of the score, which is gain -
-# chi_square / 2 - log_determinant. Whether its walls are parallel by their reliability; whether it lies in the window of
-# a hard prior. Its sums, walls' own errors eliminated.
+# chi_square / 2 - log_determinant. Whether its walls are parallel by their reliability; whether it lies in the window
+# of a hard prior. Its sums, walls' own errors eliminated.
 SET_SCORE = np.dtype(
     [*fields((_F, "score value gain chi_square log_determinant"), (_I, "parallel inside")).descr, ("sums", JOINT_SUMS)]
 )
@@ -88,8 +88,8 @@ PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYM
 NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # The terms by which a pose is judged.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
-# Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any set
-# takes at least which reaches that. Whether poses outside the window of a hard prior are dropped.
+# Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any
+# set takes at least which reaches that. Whether poses outside the window of a hard prior are dropped.
 RULE = fields((_F, "kept_fraction best_value least_value least_freedom"), (_I, "within"))
 # Two wall chains whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
 # `kernels.crossings.code_of`. There are dozens of them for each chain, so that four bytes have to do.
@@ -108,9 +108,9 @@ HYPOTHESIS = np.dtype([*POSE.descr, *fields((_F, "cosine sine lever_x lever_y an
 # cosine of the latter.
 POSED_LINE = fields((_F, "x y dx dy half gate angle_gate least_cosine"))
 # What a wall and its neighbours along its chain cover of a posed line: offset of the line from the wall; abscissae from
-# its midpoint between which the wall covers it; metres that count as covered, and that are; sums over these of the walls'
-# steps from the wall, and of their squares. Of the neighbours in one direction: how far they reach; how much what comes
-# counts; the same sums, and at their best.
+# its midpoint between which the wall covers it; metres that count as covered, and that are; sums over these of the
+# walls' steps from the wall, and of their squares. Of the neighbours in one direction: how far they reach; how much
+# what comes counts; the same sums, and at their best.
 COVER = fields(
     (
         _F,

@@ -7,7 +7,7 @@ import numpy as np
 from registration.layout import Floats, Records
 
 from ..context import SearchContext
-from ..layout import BEAM_SCRATCH, SHOWN, Integers, record
+from ..layout import BEAM_SCRATCH, SHOWN, Flags, Integers, record
 from ..scan.beams import BeamSet
 from ..tuning import MOST_LOOKED_AT
 from .consensus_set import BeamEvidence
@@ -79,7 +79,7 @@ def score_of_beams(beams: BeamSet, evidence: BeamEvidence) -> Floats:
     return np.asarray((BEAMS_READ * evidence.read - BEAMS_PASSED * evidence.passed) @ beams.weights / total)
 
 
-def passed_walls(beams: BeamSet, table: Records, matched: Integers) -> tuple[Integers, Integers, Floats, Floats]:
+def passed_walls(beams: BeamSet, table: Records, matched: Flags) -> tuple[Integers, Integers, Floats, Floats]:
     """Return the walls that rays to lines pass through well before their end, and how many rays do.
 
     Parameters
@@ -111,13 +111,13 @@ def passed_walls(beams: BeamSet, table: Records, matched: Integers) -> tuple[Int
     return pairs // walls, pairs % walls, counts[0], counts[1]
 
 
-def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matched: Integers) -> Floats:
+def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matched: Flags) -> Floats:
     """Return the penalty of lines of sight at each pose, (k,) nats: for walls that should have blocked the view."""
     poses, walls, to_matched, to_clutter = passed_walls(beams, table, matched)
     rows = context.index.obstacles.walls[walls]
     lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
     rays = np.minimum(1.0, to_matched / BLOCKING_RAYS) + np.minimum(1.0, to_clutter / BLOCKING_RAYS)
-    return np.bincount(poses, BLOCKED * lengths * rays, len(table))
+    return np.bincount(poses, BLOCKED * lengths * rays, len(table)).astype(np.float64)
 
 
 def moved_to_beams(context: SearchContext, beams: BeamSet, poses: Records) -> Records:

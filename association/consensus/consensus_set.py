@@ -86,7 +86,7 @@ class ConsensusSet:
     def free(self) -> bool:
         """Return whether a direction of the position is open: its deviation exceeds 0.5 m."""
         _, _, _, xx, xy, _, yy, _, _ = self.estimate[0].item()
-        return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2
+        return bool(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2)
 
     def fraction(self, lines: Records) -> float:
         """Return the fraction of the scan's length that is matched."""

@@ -5,10 +5,10 @@ o, on a wall of normal n and offset p, is
 
     r = n . (z + b u + g) - p - e      z = (I + S) R(theta) R(omega tau) (m - o),      u = z / |z|
 
-with the sensor's place g on the map, the error e of the wall, an offset b along the ray, a symmetric strain S of the map
-around the sensor, and the angle omega by which the sensor turned during the scan. All but g and theta have priors. A
-line enters by its centroid and by its direction. The errors of walls are eliminated. The sensor's place is the centre
-of all of it, so that the origin of the scan frame does not matter.
+with the sensor's place g on the map, the error e of the wall, an offset b along the ray, a symmetric strain S of the
+map around the sensor, and the angle omega by which the sensor turned during the scan. All but g and theta have priors.
+A line enters by its centroid and by its direction. The errors of walls are eliminated. The sensor's place is the
+centre of all of it, so that the origin of the scan frame does not matter.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from registration.values import value
 
 from ..context import SearchContext
 from .consensus_set import ConsensusSet
-from .observations import Observations, observations_of
+from .observations import Indices, Observations, observations_of
 from .tuning import (
     COMMON_WALL_ERROR,
     ESTIMATION_ROUNDS,
@@ -70,7 +70,7 @@ class Leverages:
         Of the move, or the weakest one if that is not fixed.
     """
 
-    walls: Floats
+    walls: Indices
     own: Floats
     displacements: Floats
     deviations: Floats
@@ -152,7 +152,7 @@ def estimate(context: SearchContext, best: ConsensusSet) -> Estimate | None:
     return model.estimate(shown=shown)
 
 
-def _columns(context: SearchContext, seen: Observations) -> np.ndarray:
+def _columns(context: SearchContext, seen: Observations) -> Indices:
     """Return the columns beyond the pose that a scan may show."""
     if seen.views is not None or context.options.estimator != "joint" or context.scan.viewpoint is None:
         return np.zeros(0, np.intp)
@@ -176,7 +176,7 @@ class _Model:
         self.of_wall = np.zeros((len(seen.walls), len(seen)))
         self.of_wall[seen.wall, np.arange(len(seen))] = 1.0
 
-    def with_columns(self, columns: np.ndarray) -> _Model:
+    def with_columns(self, columns: Indices) -> _Model:
         """Return the same with further unknowns, at the same solution."""
         full = copy(self)
         full.active = np.concatenate([np.arange(3), columns, np.arange(COLUMNS, self.size)]).astype(np.intp)

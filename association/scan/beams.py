@@ -122,8 +122,9 @@ def together(one: BeamSet, other: BeamSet) -> BeamSet:
     """Return the beams of two sets."""
     rows = np.empty(len(one) + len(other), BEAM)
     rows[: len(one)], rows[len(one) :] = one.rows, other.rows
-    columns = (np.concatenate([getattr(one, name), getattr(other, name)]) for name in ("line", "sensor", "weights"))
-    return BeamSet(rows, *columns, max(one.reach, other.reach))
+    line, sensor = np.concatenate([one.line, other.line]), np.concatenate([one.sensor, other.sensor])
+    weights = np.concatenate([one.weights, other.weights])
+    return BeamSet(rows, line, sensor, weights, max(one.reach, other.reach))
 
 
 def _rows(begins: Floats, directions: Floats, ranges: Floats) -> Records:

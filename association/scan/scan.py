@@ -197,10 +197,12 @@ def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, 
         )  # fmt: skip
         larger, (x, y) = scaled(scan, factor), ((1.0 - factor) * sensor[0], (1.0 - factor) * sensor[1])
         seen, beams = larger.measured, larger.beams
-        ends = Segments.derived(seen.segments.endpoints + [x, y, x, y])
+        ends = Segments.derived(seen.segments.endpoints + np.array([x, y, x, y]))
         if beams is not None and beams.origins is not None:
-            beams = replace(beams, origins=beams.origins + [x, y])
-        scan = replace(larger, measured=replace(seen, segments=ends, centroids=seen.centroids + [x, y]), beams=beams)
+            beams = replace(beams, origins=beams.origins + np.array([x, y]))
+        scan = replace(
+            larger, measured=replace(seen, segments=ends, centroids=seen.centroids + np.array([x, y])), beams=beams
+        )
         scan = replace(scan, viewpoint=at)
     if turn == 0.0 or scan.beams is None:
         return scan
@@ -213,7 +215,8 @@ def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, 
         bearings = way * (np.arctan2(away[:, 1], away[:, 0]) - first) % math.tau
         angles = turn * (bearings / sweep - 0.5)
         c, s = np.cos(angles), np.sin(angles)
-        return np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], axis=1) + centre
+        back = np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], axis=1)
+        return np.asarray(back + centre)
 
     seen = scan.measured
     # A line through the sensor's sweep is seen bent: its middle and its ends are turned by the time of each.

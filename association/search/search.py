@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -246,9 +247,7 @@ class _Search:
             if fade:
                 merits[of_line[i]] += fade
                 merits[of_line[j]] += fade
-            if not self._propose(
-                lambda first, posed, i=i, j=j: sweep_base(self.question, i, j, self.sweep, first, posed), gains, best
-            ):
+            if not self._propose(partial(sweep_base, self.question, i, j, self.sweep), gains, best):
                 return False
             self.bases += 1
             fraction = best.rule["kept_fraction"][0]
@@ -297,9 +296,7 @@ class _Search:
         for i in chosen:
             # Poses that explain other lines, too, are found from bases.
             own = np.where(np.abs(sines[i]) < MIN_CROSSING_BASE, scan["gain"], 0.0)
-            if not self._propose(
-                lambda first, posed, i=i: slide_line(self.question, i, self.sweep, spacing, first, posed), own, slides
-            ):
+            if not self._propose(partial(slide_line, self.question, i, self.sweep, spacing), own, slides):
                 return
 
     def _propose(self, propose: Callable[[int, Records], tuple[int, int]], gains: Floats, best: _BestPoses) -> bool:

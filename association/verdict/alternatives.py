@@ -15,7 +15,7 @@ from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score
 from ..consensus.tuning import BEAMS_PASSED, BEAMS_READ, BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, NEAR, SIGHT_TOLERANCE
 from ..context import SearchContext
-from ..layout import ESTIMATE
+from ..layout import ESTIMATE, Indices
 from ..scan.beams import together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
@@ -101,8 +101,8 @@ class _Evidence:
     distances: Floats
     begins: Floats
     ways: Floats
-    order: Floats
-    sensors: Floats
+    order: Indices
+    sensors: Indices
 
     @classmethod
     def of(cls, context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> _Evidence:
@@ -157,7 +157,7 @@ class _Evidence:
         return float(np.clip(np.add.reduceat(more, first), -limits, limits).sum())
 
 
-def _of_lines(context: SearchContext, matches: Records, rays: Floats) -> Floats:
+def _of_lines(context: SearchContext, matches: Records, rays: Indices) -> Floats:
     """Return the score of each scan line, (k, n) nats, for each of the rays to it."""
     return np.asarray(np.where(matches["wall"] >= 0, matches["score"], 0.0) / np.maximum(1, rays))
 

@@ -52,7 +52,7 @@ def put_line(seen: Record, pose: Record, c: float, s: float, gates: Record, line
 
 @kernel
 def begin_cover(wall: Record, line: Record, cover: Record) -> bool:
-    """Write what a wall covers of a posed line to `cover`, a record of `COVER`; return False where it covers nothing."""
+    """Write what a wall covers of a posed line to `cover`, of `COVER`; return False where it covers nothing."""
     cover.offset = wall.dx * line.y - wall.dy * line.x - wall.offset
     if abs(cover.offset) > line.gate or wall.dx * line.dx + wall.dy * line.dy < line.least_cosine:
         return False

@@ -7,7 +7,7 @@ import math
 from compiled import kernel
 from registration.layout import Floats, Record, Records
 
-from ...layout import HARD_PRIOR, NO_PRIOR
+from ...layout import HARD_PRIOR, NO_PRIOR, Integers
 from ...tables import Place, Question, ScoreRules, ScoreWork
 from ...tuning import DIRECTION_BINS, INSIDE
 from ..tuning import MOST_BRIDGED, ROUNDS, SAME_SHIFT
@@ -302,7 +302,7 @@ def score_poses(
 
 
 @kernel
-def list_walls(held: Records, wall_sums: Records, ties: Floats, listed: Floats) -> int:
+def list_walls(held: Records, wall_sums: Records, ties: Floats, listed: Integers) -> int:
     """List the walls that are held, each once: those that are tied to none, then the others along their chains."""
     count = 0
     for i in range(len(held)):
@@ -330,7 +330,7 @@ def list_walls(held: Records, wall_sums: Records, ties: Floats, listed: Floats) 
 
 @kernel
 def eliminate(
-    wall_sums: Records, ties: Floats, listed: Floats, count: int, variance: float, plain: Record, sums: Record,
+    wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, plain: Record, sums: Record,
     common: Record,
 ) -> None:  # fmt: skip
     """Write sums without the errors of the listed walls.
@@ -365,7 +365,7 @@ def eliminate(
 
 
 @kernel
-def infer(wall_sums: Records, ties: Floats, listed: Floats, count: int, variance: float, pose: Record) -> None:
+def infer(wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, pose: Record) -> None:
     """Write for each listed wall the evidence of its error by other walls, at a pose; by itself, the prior's."""
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
