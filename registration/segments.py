@@ -1,4 +1,4 @@
-"""Validated sets of directed line segments."""
+"""Validated sets of directed line segments, and the single ranges that they are made of."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError, InvalidSegmentsError
-from .kernels.segments import are_within, lines_of
+from .kernels.arrays import are_within, lines_of
 from .layout import Floats
 from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
+from .transform import RigidTransform
 
-ALONG, ACROSS = (
-    np.array([-1.0, 1.0]),
-    np.array([1.0, -1.0]),
-)  # of y for -y
+ALONG, ACROSS = np.array([-1.0, 1.0]), np.array([1.0, -1.0])  # of y for -y
 ACROSS_BOTH = np.tile(ACROSS, 2)
 DEFAULT_POINT_SPACING = 0.05  # m, what a segment without a count of points is taken to have
 
@@ -229,3 +227,39 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
             f"expected a number from {low:g} to {high:g}, found {array[bad][0]:g}", argument=argument, index=index
         )
     return _frozen(array)
+
+
+@dataclass(frozen=True, slots=True)
+class Beams:
+    """Single range measurements, evidence for and against a pose.
+
+    Attributes
+    ----------
+    angles : (m,) radians in the scan frame
+    ranges : (m,) metres; inf where the beam came back from nothing within `range_max`; nan where nothing is known
+    range_max : float
+        Metres; how far a beam without return is known to be free; inf where the scanner does not say.
+    origins : (m, 2) or None
+        Origin of each beam in the scan frame, metres; None: at the scan's viewpoint.
+    """
+
+    angles: Floats
+    ranges: Floats
+    range_max: float
+    origins: Floats | None = None
+
+    def mirrored(self) -> Beams:
+        """Return them with left and right exchanged, in reverse order."""
+        origins = None if self.origins is None else np.ascontiguousarray(self.origins[::-1] * ACROSS)
+        angles, ranges = np.ascontiguousarray(-self.angles[::-1]), np.ascontiguousarray(self.ranges[::-1])
+        return Beams(angles, ranges, self.range_max, origins)
+
+    def scaled(self, factor: float) -> Beams:
+        """Return them with all lengths multiplied."""
+        origins = None if self.origins is None else self.origins * factor
+        return Beams(self.angles, self.ranges * factor, self.range_max * factor, origins)
+
+    def moved(self, by: RigidTransform, viewpoint: tuple[float, float]) -> Beams:
+        """Return them in another frame; those without an origin of their own begin at `viewpoint`."""
+        origins = np.tile(np.asarray(viewpoint), (len(self.angles), 1)) if self.origins is None else self.origins
+        return Beams(self.angles + by.theta, self.ranges, self.range_max, by.apply(origins))

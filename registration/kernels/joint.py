@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from compiled import kernel
 
-from ..layout import JOINT_SUMS, Floats, Record, Records
-from .compensated import accumulated
-from .matrices import PARALLEL_RATIO
+from ..layout import Record
+
+MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
+PARALLEL_RATIO = 1e-12  # of two eigenvalues: below it rounding alone decides the direction of the smaller one
+MIN_PIVOT = 1e-12  # of the determinant to the product of the diagonal; a smaller one is singular
 
 MAX_STEPS = 16
 MAX_STEP = 0.3  # rad
@@ -183,22 +183,22 @@ def joint_information(sums: Record, theta: float, out: Record) -> None:
 
 
 @kernel
-def joint_add_compensated(sums: Records, line: Record, seen: Record, weight: float, sign: float) -> None:
-    """Do as `joint_add` on compensated sums."""
-    terms = np.zeros(1, JOINT_SUMS)
-    joint_add(terms[0], line, seen, weight, 1.0)
-    what = terms.view(np.float64)
-    into = sums.view(np.float64)
-    size = len(what)
-    for k in range(size):
-        into[k], into[size + k] = accumulated(into[k], into[size + k], sign * what[k], 0.0)
-
-
-@kernel
-def joint_sums_compensated(pairs: Records, weights: Floats) -> Records:
-    """Return the compensated sums of pairs; those of weight 0 do not count."""
-    sums = np.zeros(2, JOINT_SUMS)
-    for i in range(len(pairs)):
-        if weights[i] > 0.0:
-            joint_add_compensated(sums, pairs[i].map, pairs[i].scan, weights[i], 1.0)
-    return sums
+def invert3(m: Record, out: Record) -> bool:
+    """Write the inverse of a positive definite matrix to `out`, by cofactors; return False where it is singular."""
+    a = m.yy * m.tt - m.yt * m.yt
+    b = m.xt * m.yt - m.xy * m.tt
+    d = m.xy * m.yt - m.xt * m.yy
+    det = m.xx * a + m.xy * b + m.xt * d
+    if not det > MIN_PIVOT * m.xx * m.yy * m.tt:
+        return False
+    # All are read before one is written: `out` may be `m`.
+    yy = (m.xx * m.tt - m.xt * m.xt) / det
+    yt = (m.xy * m.xt - m.xx * m.yt) / det
+    tt = (m.xx * m.yy - m.xy * m.xy) / det
+    out.xx = a / det
+    out.xy = b / det
+    out.xt = d / det
+    out.yy = yy
+    out.yt = yt
+    out.tt = tt
+    return True

@@ -1,4 +1,4 @@
-"""Checks of segments as they are sent, and the lines that they lie on."""
+"""Loops over the arrays of segments, and the lifetime of the elements of arrays of records."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from compiled import kernel
 
-from ..layout import Floats, X, Y
+from ..layout import Floats, Records, X, Y
 
 X2, Y2 = 2, 3  # columns of (n, 4) end points, behind `X` and `Y` of the begin
 
@@ -52,3 +52,13 @@ def lines_of(endpoints: Floats) -> Lines:
         midpoints[i, X] = x
         midpoints[i, Y] = y
     return directions, normals, offsets, lengths, midpoints
+
+
+@kernel
+def keep_alive(records: Records) -> None:
+    """Keep an array that a kernel made alive until here.
+
+    An element, ``records[0]``, is a bare pointer. Numba frees an array after the last use of its name, although
+    elements of it may be in use still: then others write to that memory. So a kernel that makes an array of records
+    ends with this, unless it hands the array itself on or back. Arguments live as long as the call.
+    """
