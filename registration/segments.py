@@ -161,8 +161,10 @@ class MeasuredSegments:
     def __post_init__(self) -> None:
         # For a kernel an array that may be written to is another type, and each type is compiled separately.
         for name in ("sigma", "point_counts", "centroids", "spreads"):
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-            object.__setattr__(self, name, _frozen(array.view()))
+            given = getattr(self, name)
+            if given.flags.writeable or not given.flags.c_contiguous or given.dtype != np.float64:
+                array = np.ascontiguousarray(given, dtype=np.float64)
+                object.__setattr__(self, name, _frozen(array.view()))
 
     @classmethod
     def from_segments(

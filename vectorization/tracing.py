@@ -1,0 +1,100 @@
+"""The way from ordered points to segments: pieces, lines, their extension, corners."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import MeasuredSegments, Segments
+from registration.layout import Floats, Records
+
+from .kernels.corners import cut_corners, share_corners
+from .kernels.lines import bridge, fit_lines, rejoin
+from .kernels.pieces import find_gaps, merge, move_breaks, split
+from .layout import FITTED, PIECE, SCANNER, SUMS
+from .options import VectorizationOptions
+from .tuning import (
+    GAP_NOISE,
+    LONGEST_STEP,
+    RELATIVE_ROUGHNESS,
+    ROUGHNESS,
+    SETTLING_ROUNDS,
+    SPACINGS,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traced:
+    """Lines of the segments, in order, and what is known of them.
+
+    Attributes
+    ----------
+    lines : (k,) FITTED
+    endpoints : (k, 4) metres
+    moments : (k, 4) centroid, sigma and root mean square distance of the points, metres
+    spans : (k, 2) first and last point
+    """
+
+    lines: Records
+    endpoints: Floats
+    moments: Floats
+    spans: NDArray[np.int64]
+
+    def measured(self) -> MeasuredSegments:
+        """Return the segments."""
+        lines, moments = self.lines, self.moments
+        return MeasuredSegments(
+            Segments.derived(self.endpoints), moments[:, 2], lines["count"], moments[:, :2], lines["spread"]
+        )
+
+
+NOTHING = Traced(np.zeros(0, FITTED), np.zeros((0, 4)), np.zeros((0, 4)), np.zeros((0, 2), np.int64))
+
+
+def trace(
+    points: Records, increment: float, closed: bool, sigma: float, options: VectorizationOptions, origin: Floats
+) -> Traced:
+    """Return the lines of points, with the sensor at `origin` (2,); if `closed`, the last is next to the first."""
+    n = len(points)
+    if n < options.min_points:
+        return NOTHING
+    scanner = _scanner(points, increment, sigma, options)
+    sums, starts = np.zeros(n + 1, SUMS), np.empty(n, np.int64)
+    gaps = starts[: find_gaps(points, scanner, sums, starts)]
+    pieces, growth = np.empty(n, PIECE), np.empty(n)
+    pieces = pieces[: split(points, sums, gaps, scanner, pieces, np.empty(n, PIECE))]
+    pieces = pieces[: merge(pieces, sums, gaps, scanner, growth)]
+    for _ in range(SETTLING_ROUNDS):
+        if not move_breaks(pieces, sums, gaps, scanner):
+            break
+        pieces = pieces[: merge(pieces, sums, gaps, scanner, growth)]
+
+    own, scratch = np.empty(len(pieces) + 2, SUMS), np.empty(2, FITTED)
+    pieces = pieces[: bridge(pieces, sums, own, points, scanner, scratch)]
+    lines = np.empty(len(pieces), FITTED)
+    lines = lines[: fit_lines(points, pieces, own, scanner, np.zeros(n, np.bool_), lines)]
+    lines = lines[: rejoin(points, lines, scanner, scratch)]
+    share_corners(points, lines, scanner, closed, scratch)
+    endpoints, moments, spans = (
+        np.empty((len(lines), 4)),
+        np.empty((len(lines), 4)),
+        np.empty((len(lines), 2), np.int64),
+    )
+    k = cut_corners(points, lines, scanner, closed, origin, endpoints, moments, spans)
+    return Traced(lines[:k], endpoints[:k], moments[:k], spans[:k])
+
+
+def _scanner(points: Records, increment: float, sigma: float, options: VectorizationOptions) -> Records:
+    """Return what the lines depend on besides the points, (1,) of `SCANNER`."""
+    floor = max(ROUGHNESS, RELATIVE_ROUGHNESS * sigma) ** 2
+    max_gap = math.inf if options.max_gap is None else options.max_gap
+    default_gap, longest = 0.0, LONGEST_STEP
+    if increment == 0.0:
+        spacing = float(np.median(np.hypot(np.diff(points["x"]), np.diff(points["y"]))))
+        default_gap = longest = SPACINGS * spacing + GAP_NOISE * sigma
+    asked = options.min_points, options.min_length
+    scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap), *asked)
+    return np.array([scanner], SCANNER)
