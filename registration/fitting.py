@@ -93,17 +93,15 @@ class Problem:
         Segments without a direction are turned round as one rotation wants.
         """
         counting = weights.used > 0.0
-        if not counting.all():
-            weights, some = weights.take(counting), given.take(counting)
-        else:
-            counting, some = slice(None), given
+        whole = bool(counting.all())
+        some, weights = (given, weights) if whole else (given.take(counting), weights.take(counting))
         middles = some.map_midpoints.mean(axis=0), some.centroids.mean(axis=0)
         every, unique = given.about(*middles), True
         if not oriented:
             theta, unique = _choose_rotation(every.take(counting), weights)
             against = np.abs(every.angles(theta)) > 0.5 * math.pi
             every = replace(every, directions=np.where(against[:, None], -every.directions, every.directions))
-        pairs = every if some is given else every.take(counting)
+        pairs = every if whole else every.take(counting)
         phi, psi = joint_factors(pairs)
         angle = math.atan2(-(weights.used @ psi[0]), weights.used @ psi[1])
         return cls(pairs, weights, middles, phi, psi, joint_terms(phi, psi, pairs.spreads), angle, unique), every

@@ -123,4 +123,4 @@ def _is_regular(matrix: Floats) -> bool:
     first = 1.0 - PARALLEL_RATIO
     second = first - a * a / first
     rest = c - a * b / first
-    return second > 0.0 and first - b * b / first - rest * rest / second > 0.0
+    return bool(second > 0.0 and first - b * b / first - rest * rest / second > 0.0)

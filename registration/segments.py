@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError, InvalidSegmentsError
-from .kernels.arrays import are_within, lines_of
+from .kernels.arrays import lines_of
 from .layout import Floats
 from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
 from .transform import RigidTransform
@@ -77,11 +77,11 @@ class Segments:
                 f"expected numbers of shape (n, 4), found {raw.dtype} of shape {raw.shape}", argument=argument
             )
         e = np.array(raw, dtype=np.float64, order="C")
-        if not are_within(e.reshape(-1), -MAX_COORDINATE, MAX_COORDINATE):
+        if not _are_within(e, -MAX_COORDINATE, MAX_COORDINATE):
             _refuse(~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
             _refuse((np.abs(e) > MAX_COORDINATE).any(axis=1), f"has a coordinate beyond {MAX_COORDINATE:g} m", argument)
         found = cls._lines(e)
-        if not are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
+        if not _are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
             _refuse(found.lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
             _refuse(found.lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
         return found
@@ -99,7 +99,10 @@ class Segments:
 
     @classmethod
     def _lines(cls, e: Floats) -> Segments:
-        return cls(*map(_frozen, (e, *lines_of(e))))
+        n = len(e)
+        derived = np.empty((n, 2)), np.empty((n, 2)), np.empty(n), np.empty(n), np.empty((n, 2))
+        lines_of(e, *derived)
+        return cls(*map(_frozen, (e, *derived)))
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -129,6 +132,11 @@ class Segments:
         """Return the segments moved by a vector of 2 metres, to work near the origin."""
         offset = np.asarray(by, dtype=np.float64)
         return Segments.derived(self.endpoints + np.tile(offset, 2))
+
+
+def _are_within(values: Floats, low: float, high: float) -> bool:
+    """Tell whether all values are numbers from `low` to `high`, which are finite."""
+    return bool(((values >= low) & (values <= high)).all())  # so written that nan is not
 
 
 def _refuse(bad: NDArray[np.bool_] | np.bool_, what: str, argument: str) -> None:
@@ -222,7 +230,7 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
         array = array.reshape(shape)
     if array.shape != shape:
         raise InvalidArgumentError(f"expected shape {shape}, found {array.shape}", argument=argument)
-    if not are_within(array.reshape(-1), low, high):
+    if not _are_within(array, low, high):
         bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
         index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
         raise InvalidArgumentError(

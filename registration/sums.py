@@ -67,7 +67,8 @@ class CompensatedSums:
     @property
     def values(self) -> Floats:
         """The sums in plain doubles, in the order of the record's fields, (k,)."""
-        return self.compensated[0]
+        values: Floats = self.compensated[0]
+        return values
 
     @property
     def count(self) -> int:
@@ -115,7 +116,7 @@ def joint_factors(pairs: Correspondences) -> tuple[Floats, Floats]:
 
 def joint_terms(phi: Floats, psi: Floats, spreads: Floats) -> Floats:
     """Return what each pair of weight 1 adds to the joint sums, (18, n), from its factors."""
-    terms = np.empty((len(JOINT_SUMS), len(spreads)))
+    terms = np.empty((COUNT + 1, len(spreads)))
     np.multiply(phi[UPPER[0]], phi[UPPER[1]], out=terms[:WAHBA_COS])
     across, along = spreads * psi
     terms[CC] += across * psi[0]
@@ -134,7 +135,8 @@ def information_of(values: Floats, theta: float) -> Floats:
     """Return the information of additive (x, y, theta) in the map frame from joint sums (18,), (3, 3)."""
     out = record(SYMMETRIC3)
     joint_information(joint_record(values), theta, out[0])
-    return out.view(np.float64)[FULL]
+    full: Floats = out.view(np.float64)[FULL]
+    return full
 
 
 def inverse_of(information: Floats) -> Floats:

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 from registration import MeasuredSegments, Segments
 from registration.layout import Floats, Records
 
+from . import tuning
 from .kernels.corners import cut_corners, share_corners
 from .kernels.lines import bridge, fit_lines, rejoin
 from .kernels.pieces import find_gaps, merge, move_breaks, split
 from .layout import FITTED, PIECE, SCANNER, SUMS
 from .options import VectorizationOptions
-from .tuning import (
-    GAP_NOISE,
-    LONGEST_STEP,
-    RELATIVE_ROUGHNESS,
-    ROUGHNESS,
-    SETTLING_ROUNDS,
-    SPACINGS,
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,25 +26,21 @@ class Traced:
     Attributes
     ----------
     lines : (k,) FITTED
-    endpoints : (k, 4) metres
-    moments : (k, 4) centroid, sigma and root mean square distance of the points, metres
+    found : (k, 8) end points, then centroid, sigma and root mean square distance of the points, metres
     spans : (k, 2) first and last point
     """
 
     lines: Records
-    endpoints: Floats
-    moments: Floats
+    found: Floats
     spans: NDArray[np.int64]
 
     def measured(self) -> MeasuredSegments:
         """Return the segments."""
-        lines, moments = self.lines, self.moments
-        return MeasuredSegments(
-            Segments.derived(self.endpoints), moments[:, 2], lines["count"], moments[:, :2], lines["spread"]
-        )
+        segments, moments, lines = Segments.derived(self.found[:, :4]), self.found[:, 4:], self.lines
+        return MeasuredSegments(segments, moments[:, 2], lines["count"], moments[:, :2], lines["spread"])
 
 
-NOTHING = Traced(np.zeros(0, FITTED), np.zeros((0, 4)), np.zeros((0, 4)), np.zeros((0, 2), np.int64))
+NOTHING = Traced(np.zeros(0, FITTED), np.zeros((0, 8)), np.zeros((0, 2), np.int64))
 
 
 def trace(
@@ -67,7 +56,7 @@ def trace(
     pieces, growth = np.empty(n, PIECE), np.empty(n)
     pieces = pieces[: split(points, sums, gaps, scanner, pieces, np.empty(n, PIECE))]
     pieces = pieces[: merge(pieces, sums, gaps, scanner, growth)]
-    for _ in range(SETTLING_ROUNDS):
+    for _ in range(tuning.SETTLING_ROUNDS):
         if not move_breaks(pieces, sums, gaps, scanner):
             break
         pieces = pieces[: merge(pieces, sums, gaps, scanner, growth)]
@@ -78,23 +67,19 @@ def trace(
     lines = lines[: fit_lines(points, pieces, own, scanner, np.zeros(n, np.bool_), lines)]
     lines = lines[: rejoin(points, lines, scanner, scratch)]
     share_corners(points, lines, scanner, closed, scratch)
-    endpoints, moments, spans = (
-        np.empty((len(lines), 4)),
-        np.empty((len(lines), 4)),
-        np.empty((len(lines), 2), np.int64),
-    )
-    k = cut_corners(points, lines, scanner, closed, origin, endpoints, moments, spans)
-    return Traced(lines[:k], endpoints[:k], moments[:k], spans[:k])
+    found, spans = np.empty((len(lines), 8)), np.empty((len(lines), 2), np.int64)
+    k = cut_corners(points, lines, scanner, closed, origin, found, spans)
+    return Traced(lines[:k], found[:k], spans[:k])
 
 
 def _scanner(points: Records, increment: float, sigma: float, options: VectorizationOptions) -> Records:
     """Return what the lines depend on besides the points, (1,) of `SCANNER`."""
-    floor = max(ROUGHNESS, RELATIVE_ROUGHNESS * sigma) ** 2
+    floor = max(tuning.ROUGHNESS, tuning.RELATIVE_ROUGHNESS * sigma) ** 2
     max_gap = math.inf if options.max_gap is None else options.max_gap
-    default_gap, longest = 0.0, LONGEST_STEP
+    default_gap, longest = 0.0, tuning.LONGEST_STEP
     if increment == 0.0:
         spacing = float(np.median(np.hypot(np.diff(points["x"]), np.diff(points["y"]))))
-        default_gap = longest = SPACINGS * spacing + GAP_NOISE * sigma
+        default_gap = longest = tuning.SPACINGS * spacing + tuning.GAP_NOISE * sigma
     asked = options.min_points, options.min_length
     scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap), *asked)
     return np.array([scanner], SCANNER)

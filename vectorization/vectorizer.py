@@ -204,14 +204,14 @@ def _from_bare_points(every: Floats, options: VectorizationOptions) -> Vectoriza
     sigma = options.sigma or noise_of_points(places - origin)
     traced = trace(points, 0.0, False, sigma, options, origin)
     backward = _runs_backward(traced.lines, points)
-    traced.endpoints[backward] = traced.endpoints[backward][:, [2, 3, 0, 1]]
+    traced.found[backward, :4] = traced.found[backward][:, [2, 3, 0, 1]]
     return _vectorized(traced, sigma, order[traced.spans], ordered=runs_along(places))
 
 
 def _vectorized(
     traced: Traced, sigma: float, spans: Indices, beams: Beams | None = None, *, ordered: bool = True
 ) -> Vectorization:
-    return Vectorization(traced.measured(), traced.moments[:, 3], sigma, spans, beams, ordered)
+    return Vectorization(traced.measured(), traced.found[:, 7], sigma, spans, beams, ordered)
 
 
 def _spans_along(traced: Traced, points: Records) -> Indices:

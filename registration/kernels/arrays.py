@@ -1,10 +1,8 @@
-"""Loops over the arrays of segments, and the lifetime of the elements of arrays of records."""
+"""The lines that segments lie on, and the lifetime of the elements of arrays of records."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from compiled import kernel
 
@@ -12,28 +10,13 @@ from ..layout import Floats, Records, X, Y
 
 X2, Y2 = 2, 3  # columns of (n, 4) end points, behind `X` and `Y` of the begin
 
-Lines = tuple[Floats, Floats, Floats, Floats, Floats]
-
 
 @kernel
-def are_within(values: Floats, low: float, high: float) -> bool:
-    """Tell whether all values (n,) are numbers from `low` to `high`, which are finite."""
-    within = True
-    for value in values:
-        within &= low <= value <= high  # so written that nan is not
-    return within
-
-
-@kernel
-def lines_of(endpoints: Floats) -> Lines:
-    """Return of segments (n, 4) the directions and normals (n, 2), offsets and lengths (n,), and midpoints (n, 2)."""
-    count = len(endpoints)
-    directions = np.empty((count, 2), np.float64)
-    normals = np.empty((count, 2), np.float64)
-    offsets = np.empty(count, np.float64)
-    lengths = np.empty(count, np.float64)
-    midpoints = np.empty((count, 2), np.float64)
-    for i in range(count):
+def lines_of(
+    endpoints: Floats, directions: Floats, normals: Floats, offsets: Floats, lengths: Floats, midpoints: Floats
+) -> None:
+    """Write of segments (n, 4) the directions and normals (n, 2), offsets and lengths (n,), and midpoints (n, 2)."""
+    for i in range(len(endpoints)):
         along_x = endpoints[i, X2] - endpoints[i, X]
         along_y = endpoints[i, Y2] - endpoints[i, Y]
         length = math.hypot(along_x, along_y)
@@ -51,7 +34,6 @@ def lines_of(endpoints: Floats) -> Lines:
         lengths[i] = length
         midpoints[i, X] = x
         midpoints[i, Y] = y
-    return directions, normals, offsets, lengths, midpoints
 
 
 @kernel

@@ -51,7 +51,8 @@ def test_moved_origins(seed: int) -> None:
 
 
 def reference_normals(pairs: Correspondences) -> Floats:
-    return pairs.directions @ reference.TURN.T
+    normals: Floats = pairs.directions @ reference.TURN.T
+    return normals
 
 
 @given(SEEDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import FrozenInstanceError, fields, is_dataclass
+from typing import Any
 
 import pytest
 
@@ -36,7 +37,7 @@ def test_exports_are_sorted_and_complete() -> None:
 @pytest.mark.parametrize("name", [name for name in registration.__all__ if is_dataclass(getattr(registration, name))])
 def test_assigning_to_a_value_fails(name: str) -> None:
     member = getattr(registration, name)
-    kind = member if inspect.isclass(member) else type(member)
+    kind: Any = member if inspect.isclass(member) else type(member)
     value = object.__new__(kind)
     with pytest.raises(FrozenInstanceError):
         setattr(value, fields(kind)[0].name, 1.0)

@@ -10,24 +10,7 @@ from numpy.typing import NDArray
 from compiled import kernel
 from registration.layout import Record, Records
 
-from ..tuning import (
-    BREAK_PENALTY,
-    END_GATE,
-    FIT_STEPS,
-    FLATNESS,
-    JOINT_FITS,
-    LEAST_COSINE,
-    LEAST_POINTS,
-    MISSING_STEPS,
-    NEAR_PARALLEL,
-    POINT_GATE,
-    SETTLED,
-    SKIPPED,
-    SKIPPED_STEPS,
-    WORST_ANGLE,
-    WORST_FIT,
-    WORST_KNOWN,
-)
+from .. import tuning
 from .pieces import add, line_cost
 
 Flags = NDArray[np.bool_]
@@ -60,8 +43,8 @@ def fit_line(points: Records, a: int, b: int, scanner: Record, line: Record) -> 
     Returns whether there are any two apart.
     """
     scale = 2.0
-    for turn in range(FIT_STEPS):
-        gate = POINT_GATE * POINT_GATE * scale
+    for turn in range(tuning.FIT_STEPS):
+        gate = tuning.POINT_GATE * tuning.POINT_GATE * scale
         weight = abscissa = distance = 0.0
         abscissa2 = product = chi2 = 0.0
         count = 0
@@ -74,7 +57,7 @@ def fit_line(points: Records, a: int, b: int, scanner: Record, line: Record) -> 
             cosine = 1.0
             if point.ray_x != 0.0 or point.ray_y != 0.0:
                 cosine = line.nx * point.ray_x + line.ny * point.ray_y
-                if cosine > LEAST_COSINE:
+                if cosine > tuning.LEAST_COSINE:
                     t = line.p * (line.nx * point.ray_y - line.ny * point.ray_x) / cosine
             v = scanner.variance * cosine * cosine + scanner.floor
             if e * e <= gate * v:
@@ -116,7 +99,7 @@ def fit_line(points: Records, a: int, b: int, scanner: Record, line: Record) -> 
         line.nx = nx
         line.ny = ny
         line.p = p
-        if turn > 1 and slope * slope * abscissa2 + off * off * weight < SETTLED:
+        if turn > 1 and slope * slope * abscissa2 + off * off * weight < tuning.SETTLED:
             break
     return True
 
@@ -127,7 +110,7 @@ def seen_through(line: Record, points: Records, a: int, b: int, scanner: Record)
     for i in range(a, b):
         cosine = line.nx * points[i].ray_x + line.ny * points[i].ray_y
         off = line.nx * points[i].x + line.ny * points[i].y - line.p
-        gate = POINT_GATE * POINT_GATE * (scanner.variance * cosine * cosine + scanner.floor)
+        gate = tuning.POINT_GATE * tuning.POINT_GATE * (scanner.variance * cosine * cosine + scanner.floor)
         if off * cosine > 0.0 and off * off > gate:
             return True
     return False
@@ -146,7 +129,7 @@ def bridge(pieces: Records, sums: Records, totals: Records, points: Records, sca
     for k in range(len(pieces)):
         a = pieces[k].first
         b = pieces[k].end
-        if b - a < LEAST_POINTS:
+        if b - a < tuning.LEAST_POINTS:
             continue
         own = totals[count]
         add(sums[b], sums[a], -1.0, own)
@@ -155,16 +138,16 @@ def bridge(pieces: Records, sums: Records, totals: Records, points: Records, sca
             total = totals[count - 1]
             one = points[last.end - 1]
             other = points[a]
-            if a - last.end <= SKIPPED and max(own.count, total.count) >= scanner.least_points:
+            if a - last.end <= tuning.SKIPPED and max(own.count, total.count) >= scanner.least_points:
                 sine = abs(one.ray_x * other.ray_y - one.ray_y * other.ray_x)
                 turn = math.atan2(sine, one.ray_x * other.ray_x + one.ray_y * other.ray_y)
                 near = math.hypot(other.x - one.x, other.y - one.y) <= scanner.longest
-                if near and turn <= SKIPPED_STEPS * scanner.increment + 1e-9:
+                if near and turn <= tuning.SKIPPED_STEPS * scanner.increment + 1e-9:
                     both = totals[count + 1]
                     add(total, own, 1.0, both)
                     line_of(both, line[0])
                     apart = line_cost(zero, total, scanner) + line_cost(zero, own, scanner)
-                    one_line = line_cost(zero, both, scanner) - apart < BREAK_PENALTY
+                    one_line = line_cost(zero, both, scanner) - apart < tuning.BREAK_PENALTY
                     if one_line and not seen_through(line[0], points, last.end, a, scanner):
                         last.end = b
                         totals[count - 1] = both
@@ -188,7 +171,7 @@ def extend(points: Records, start: int, direction: int, taken: Flags, line: Reco
             cosine = line.nx * point.ray_x + line.ny * point.ray_y
             sine = abs(before.ray_x * point.ray_y - before.ray_y * point.ray_x)
             turn = math.atan2(sine, before.ray_x * point.ray_x + before.ray_y * point.ray_y)
-            if turn > MISSING_STEPS * scanner.increment:
+            if turn > tuning.MISSING_STEPS * scanner.increment:
                 break
         if math.hypot(point.x - before.x, point.y - before.y) > scanner.longest:
             break
@@ -196,8 +179,8 @@ def extend(points: Records, start: int, direction: int, taken: Flags, line: Reco
         lever = line.nx * point.y - line.ny * point.x - line.middle
         known = (1.0 + lever * lever / line.spread) / line.weight
         v = scanner.variance * cosine * cosine + scanner.floor + known
-        certain = known < WORST_KNOWN * (scanner.variance + scanner.floor)
-        if e * e <= POINT_GATE * POINT_GATE * v and cosine > LEAST_COSINE and certain:
+        certain = known < tuning.WORST_KNOWN * (scanner.variance + scanner.floor)
+        if e * e <= tuning.POINT_GATE * tuning.POINT_GATE * v and cosine > tuning.LEAST_COSINE and certain:
             last = i
             misfits = 0
         else:
@@ -248,7 +231,9 @@ def fit_lines(
                         cosine = line.nx * point.ray_x + line.ny * point.ray_y
                         if point.ray_x == 0.0 and point.ray_y == 0.0:
                             cosine = 1.0
-                        strays = e * e > END_GATE * END_GATE * (scanner.variance * cosine * cosine + scanner.floor)
+                        strays = e * e > tuning.END_GATE * tuning.END_GATE * (
+                            scanner.variance * cosine * cosine + scanner.floor
+                        )
                         low += 1 if strays and end == 0 else 0
                         high -= 1 if strays and end == 1 else 0
             again = low != first or high != last
@@ -280,31 +265,33 @@ def rejoin(points: Records, lines: Records, scanners: Records, scratch: Records)
         other = lines[count - 1]
         sine = one.nx * other.ny - one.ny * other.nx
         cosine = one.nx * other.nx + one.ny * other.ny
-        if abs(sine) > NEAR_PARALLEL or cosine < 0.0 or other.first - one.last - 1 > SKIPPED:
+        if abs(sine) > tuning.NEAR_PARALLEL or cosine < 0.0 or other.first - one.last - 1 > tuning.SKIPPED:
             continue
         z = points[one.last]
         a = points[other.first]
         turn = math.atan2(abs(z.ray_x * a.ray_y - z.ray_y * a.ray_x), z.ray_x * a.ray_x + z.ray_y * a.ray_y)
         apart = math.hypot(a.x - z.x, a.y - z.y)
-        if apart > scanner.longest or turn > SKIPPED_STEPS * scanner.increment + 1e-9:
+        if apart > scanner.longest or turn > tuning.SKIPPED_STEPS * scanner.increment + 1e-9:
             continue
         scratch[0] = one if one.weight * one.spread > other.weight * other.spread else other
         joint.first = one.first
         joint.last = other.last
-        for _ in range(JOINT_FITS):
+        for _ in range(tuning.JOINT_FITS):
             fit_line(points, joint.first, joint.last + 1, scanner, joint)
         if seen_through(joint, points, one.last + 1, other.first, scanner):
             continue
         everyone = joint.count >= one.count + other.count - 1.0
         excess = joint.chi2 - one.chi2 - other.chi2
-        if everyone and (excess < BREAK_PENALTY or excess < FLATNESS * FLATNESS * joint.weight):
+        if everyone and (excess < tuning.BREAK_PENALTY or excess < tuning.FLATNESS * tuning.FLATNESS * joint.weight):
             lines[count - 2] = joint
             count -= 1
     left = 0
     for k in range(count):
         line = lines[k]
-        known = line.weight * line.spread * WORST_ANGLE * WORST_ANGLE >= 1.0
-        fits = line.chi2 <= WORST_FIT * max(1.0, line.count - 2.0) and not (scanner.increment > 0.0 and line.p <= 0.0)
+        known = line.weight * line.spread * tuning.WORST_ANGLE * tuning.WORST_ANGLE >= 1.0
+        fits = line.chi2 <= tuning.WORST_FIT * max(1.0, line.count - 2.0) and not (
+            scanner.increment > 0.0 and line.p <= 0.0
+        )
         large = line.count >= scanner.least_points and line.end - line.begin >= scanner.least_length
         if known and fits and large:
             lines[left] = lines[k]

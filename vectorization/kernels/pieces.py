@@ -10,17 +10,7 @@ from numpy.typing import NDArray
 from compiled import kernel
 from registration.layout import Floats, Record, Records
 
-from ..tuning import (
-    BREAK_PENALTY,
-    BREAK_REACH,
-    BREAK_TRIALS,
-    CHORD_GATE,
-    GAP_NOISE,
-    GRAZING,
-    LEAST_BROKEN,
-    LEAST_SIDE,
-    MISSING_STEPS,
-)
+from .. import tuning
 
 Indices = NDArray[np.int64]
 
@@ -34,7 +24,7 @@ def find_gaps(points: Records, scanners: Records, sums: Records, starts: Indices
     gap is above its `max_gap`.
     """
     scanner = scanners[0]
-    farthest = math.sin(min(0.5 * math.pi, MISSING_STEPS * scanner.increment))
+    farthest = math.sin(min(0.5 * math.pi, tuning.MISSING_STEPS * scanner.increment))
     count = 0
     for i in range(len(points)):
         point = points[i]
@@ -56,9 +46,9 @@ def find_gaps(points: Records, scanners: Records, sums: Records, starts: Indices
             sine = abs(one.ray_x * point.ray_y - one.ray_y * point.ray_x)
             cosine = one.ray_x * point.ray_x + one.ray_y * point.ray_y
             nearer = min(one.ray_x * one.x + one.ray_y * one.y, point.ray_x * point.x + point.ray_y * point.y)
-            # The wall's angle with the second ray, if it makes GRAZING with the first.
-            grazing = math.sin(GRAZING) * cosine - math.cos(GRAZING) * sine
-            limit = nearer * sine / max(grazing, math.sin(0.5 * GRAZING)) + GAP_NOISE * scanner.sigma
+            # The wall's angle with the second ray, if it makes tuning.GRAZING with the first.
+            grazing = math.sin(tuning.GRAZING) * cosine - math.cos(tuning.GRAZING) * sine
+            limit = nearer * sine / max(grazing, math.sin(0.5 * tuning.GRAZING)) + tuning.GAP_NOISE * scanner.sigma
             if cosine <= 0.0 or sine > farthest:
                 limit = 0.0
         limit = min(limit, scanner.max_gap)
@@ -149,11 +139,13 @@ def split(points: Records, sums: Records, starts: Indices, scanners: Records, pi
                     worst = off * off
                     least = v
                     place = i
-            if worst / least <= CHORD_GATE * CHORD_GATE:
+            if worst / least <= tuning.CHORD_GATE * tuning.CHORD_GATE:
                 place = -1
-                least = line_cost(sums[a], sums[b], scanner) - BREAK_PENALTY
-                stride = max(1, (b - a) // BREAK_TRIALS)
-                for k in range(a + LEAST_SIDE, b - LEAST_SIDE + 1 if b - a >= LEAST_BROKEN else a, stride):
+                least = line_cost(sums[a], sums[b], scanner) - tuning.BREAK_PENALTY
+                stride = max(1, (b - a) // tuning.BREAK_TRIALS)
+                for k in range(
+                    a + tuning.LEAST_SIDE, b - tuning.LEAST_SIDE + 1 if b - a >= tuning.LEAST_BROKEN else a, stride
+                ):
                     cost = line_cost(sums[a], sums[k], scanner) + line_cost(sums[k], sums[b], scanner)
                     if cost < least:
                         least = cost
@@ -201,7 +193,7 @@ def merge(pieces: Records, sums: Records, gaps: Indices, scanners: Records, grow
                     growth[j] = line_cost(begin, last, scanner) - apart
                 if growth[j] < growth[k]:
                     k = j
-            if growth[k] >= BREAK_PENALTY:
+            if growth[k] >= tuning.BREAK_PENALTY:
                 break
             pieces[k].end = pieces[k + 1].end
             left -= 1
@@ -229,7 +221,7 @@ def move_breaks(pieces: Records, sums: Records, gaps: Indices, scanners: Records
             continue
         least = math.inf
         place = b
-        for j in range(max(a + 2, b - BREAK_REACH), min(c - 2, b + BREAK_REACH) + 1):
+        for j in range(max(a + 2, b - tuning.BREAK_REACH), min(c - 2, b + tuning.BREAK_REACH) + 1):
             cost = line_cost(sums[a], sums[j], scanner) + line_cost(sums[j], sums[c], scanner)
             if cost < least:
                 least = cost

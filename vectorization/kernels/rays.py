@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from compiled import kernel
 from registration.layout import Floats, Records
 
-from ..tuning import LEAST_QUANTUM, QUANTUM_SLACK, QUANTUM_UNIT, TRIPLE_STEPS
+from .. import tuning
 
 
 @kernel
@@ -65,7 +65,7 @@ def misfits_and_quantum(points: Records, increment: float, as_read: Records, mis
     (n,) has the unit of the ranges. Returns also the step that the ranges of all points `as_read` are multiples of,
     metres, 0 for none or one below a millimetre.
     """
-    widest = TRIPLE_STEPS * increment
+    widest = tuning.TRIPLE_STEPS * increment
     count = 0
     for i in range(1, len(points) - 1):
         a = points[i - 1]
@@ -85,15 +85,15 @@ def misfits_and_quantum(points: Records, increment: float, as_read: Records, mis
             count += 1
     step = 0
     for i in range(len(as_read)):
-        units = as_read[i].range / QUANTUM_UNIT
+        units = as_read[i].range / tuning.QUANTUM_UNIT
         whole = round(units)
-        exact = abs(units - whole) <= QUANTUM_SLACK
+        exact = abs(units - whole) <= tuning.QUANTUM_SLACK
         while whole > 0:
             step, whole = whole, step % whole
-        if not exact or step < LEAST_QUANTUM:
+        if not exact or step < tuning.LEAST_QUANTUM:
             step = 0
             break
-    return count, step * QUANTUM_UNIT
+    return count, step * tuning.QUANTUM_UNIT
 
 
 @kernel
