@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .correspondences import Correspondences, cross
-from .kernels.joint import joint_cost, joint_solve
+from .kernels.sums import joint_cost, joint_solve
 from .layout import Floats
 from .observability import Free, Freedom, freedom
 from .options import RegistrationOptions, Rotation

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from .correspondences import Correspondences
-from .kernels.joint import MAX_DEVIATION, PARALLEL_RATIO
+from .kernels.sums import MAX_DEVIATION, PARALLEL_RATIO
 from .layout import Floats
 from .sums import TRANSLATION, eigen2, information_of
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .correspondences import Correspondences, cross
-from .kernels.joint import PARALLEL_RATIO, joint_cost, joint_information, joint_solve
+from .kernels.sums import PARALLEL_RATIO, joint_cost, joint_information, joint_solve
 from .layout import JOINT_SUMS, SYMMETRIC3, Floats, Record, record
 from .options import Rotation
 from .transform import IDENTITY, RigidTransform, wrap_angle

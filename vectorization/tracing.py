@@ -1,4 +1,4 @@
-"""The way from ordered points to segments: pieces, lines, their extension, corners."""
+"""The way from ordered points to segments: their noise, pieces, lines, the extension of these, corners."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from . import tuning
 from .kernels.corners import cut_corners, share_corners
 from .kernels.lines import bridge, fit_lines, rejoin
 from .kernels.pieces import find_gaps, merge, move_breaks, split
+from .kernels.rays import misfits_and_quantum, select
 from .layout import FITTED, PIECE, SCANNER, SUMS
 from .options import VectorizationOptions
 
@@ -83,3 +84,33 @@ def _scanner(points: Records, increment: float, sigma: float, options: Vectoriza
     asked = options.min_points, options.min_length
     scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap), *asked)
     return np.array([scanner], SCANNER)
+
+
+def noise_of_ranges(points: Records, increment: float, as_read: Records) -> float:
+    """Return the standard deviation of ranges, metres, from the points of neighbouring rays.
+
+    It is no less than what the quantisation of the ranges `as_read` lets it be.
+    """
+    misfits = np.empty(len(points))
+    count, quantum = misfits_and_quantum(points, increment, as_read, misfits)
+    noise = 0.0
+    if count >= tuning.LEAST_TRIPLES:
+        k = int(tuning.TRUSTED * count)
+        select(misfits[:count], k)
+        trusted = misfits[:k]
+        noise = math.sqrt(float(trusted @ trusted) / (k * tuning.TRUSTED_MEAN_SQUARE))
+    return max(noise or tuning.UNKNOWN_SIGMA, tuning.LEAST_SIGMA, quantum / math.sqrt(12.0))
+
+
+def noise_of_points(places: Floats) -> float:
+    """Return the standard deviation of points (n, 2) normal to the walls, metres, from small windows."""
+    windows = len(places) - tuning.WINDOW + 1
+    if windows < tuning.LEAST_TRIPLES:
+        return max(tuning.UNKNOWN_SIGMA, tuning.LEAST_SIGMA)
+    inside = np.lib.stride_tricks.sliding_window_view(places, tuning.WINDOW, axis=0)
+    x, y = (inside - inside.mean(axis=2, keepdims=True)).transpose(1, 0, 2)
+    xx, xy, yy = (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
+    squares = np.maximum(0.0, 0.5 * (xx + yy - np.hypot(xx - yy, 2.0 * xy))) / (tuning.WINDOW - 2)
+    k = windows // 2
+    select(squares, k)
+    return max(math.sqrt(squares[k] / tuning.MEDIAN_CHI) or tuning.UNKNOWN_SIGMA, tuning.LEAST_SIGMA)

@@ -16,10 +16,9 @@ from .errors import InvalidScanError
 from .kernels.rays import gather
 from .laser import LaserScan, Motion
 from .layout import POINT
-from .noise import noise_of_points, noise_of_ranges
 from .options import VectorizationOptions
 from .order import first_of_each, runs_along, runs_around, without_repeats
-from .tracing import Traced, trace
+from .tracing import Traced, noise_of_points, noise_of_ranges, trace
 from .tuning import LEAST_INCREMENT, REPEATED_NOISE, UNKNOWN_SIGMA
 
 AT_ORIGIN = np.zeros(2)

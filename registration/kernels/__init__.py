@@ -5,8 +5,7 @@ packages may call.
 """
 
 from .arrays import keep_alive
-from .joint import MAX_DEVIATION, invert3, joint_add, joint_cost, joint_information, joint_solve
-from .one_step import one_step_add
+from .sums import MAX_DEVIATION, invert3, joint_add, joint_cost, joint_information, joint_solve, one_step_add
 
 __all__ = [
     "MAX_DEVIATION",

@@ -14,7 +14,7 @@ from vectorization import LaserScan
 from vectorization.kernels import lines, pieces
 from vectorization.kernels import rays as beams
 from vectorization.layout import FITTED, PIECE, POINT, SCANNER, SUMS
-from vectorization.noise import noise_of_points, noise_of_ranges
+from vectorization.tracing import noise_of_points, noise_of_ranges
 from vectorization.tuning import (
     LEAST_SIGMA,
     MEDIAN_CHI,
