@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from association.causes import find_causes
+from association.units import UNITS
 
 from association import AssociationOptions, Beams, Deadline, MapIndex, Scan, associate
-from association.causes import find_causes
 from association.rank_and_estimate import search_and_rank
 from association.scan.scan import mirrored, scaled, turned_round
 from association.to_scale import estimate_factor
-from association.units import UNITS
 from association.verdict.verdict import judge
 from association.warnings import warnings_of_causes
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
 
 from association import AssociationOptions, AssociationResult, Deadline, HardPrior, Scan, View, assemble, associate
 from association.context import SearchContext
-from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
 from association.rank_and_estimate import search_and_rank
 from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
 from association.verdict.alternatives import AmongAlternatives

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from association.search.branch_and_bound import PointMatches, match_points
 
 from association import CancelledError, Deadline, HardPrior, SoftPrior, associate
 from association.context import SearchContext
 from association.layout import FOUND, record
 from association.search import branch_and_bound
-from association.search.branch_and_bound import PointMatches, match_points
 from association.search.candidates import find_candidates
 from association.search.tuning import FIELD_GAP, KEPT
 from registration import Beams, RigidTransform

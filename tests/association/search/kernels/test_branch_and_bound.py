@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from association.search.kernels.branch_and_bound import branch_and_bound, greatest_mean
 
 from association.layout import FOUND, GRID_SHAPE, record
-from association.search.kernels.branch_and_bound import branch_and_bound, greatest_mean
 from association.search.layout import CELL_POSE
 from registration.layout import Records
 

@@ -1,21 +1,25 @@
-"""Sums and solutions of the joint estimator.
+"""Sums and solutions of both estimators.
 
-The sums are the upper triangle of the 5 x 5 matrix ``Q`` of ``cost = x' Q x`` with ``x = [cos, sin, t_x, t_y, 1]``, the
-two sums of Wahba's angle and the number of pairs. Adding or removing a pair or a whole set is plain addition, so a
-consensus set changes in constant time whatever its size.
+Those of the joint one are the upper triangle of the 5 x 5 matrix ``Q`` of ``cost = x' Q x`` with ``x = [cos, sin, t_x,
+t_y, 1]``, the two sums of Wahba's angle and the number of pairs. Adding or removing a pair or a whole set is plain
+addition, so a consensus set changes in constant time whatever its size.
+
+Those of the paper's are an array of two ONE_STEP_SUMS in double-double arithmetic, values and errors. After any number
+of additions and removals they are the sums of what remains; what is lost is 2^-104 of the largest number that ever
+stood there.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from compiled import kernel
 
-from ..layout import JOINT_SUMS, Floats, Record, Records
-from .compensated import accumulated
-from .matrices import PARALLEL_RATIO
+from ..layout import Record, Records
+
+MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
+PARALLEL_RATIO = 1e-12  # of two eigenvalues: below it rounding alone decides the direction of the smaller one
+MIN_PIVOT = 1e-12  # of the determinant to the product of the diagonal; a smaller one is singular
 
 MAX_STEPS = 16
 MAX_STEP = 0.3  # rad
@@ -183,22 +187,76 @@ def joint_information(sums: Record, theta: float, out: Record) -> None:
 
 
 @kernel
-def joint_add_compensated(sums: Records, line: Record, seen: Record, weight: float, sign: float) -> None:
-    """Do as `joint_add` on compensated sums."""
-    terms = np.zeros(1, JOINT_SUMS)
-    joint_add(terms[0], line, seen, weight, 1.0)
-    what = terms.view(np.float64)
-    into = sums.view(np.float64)
-    size = len(what)
-    for k in range(size):
-        into[k], into[size + k] = accumulated(into[k], into[size + k], sign * what[k], 0.0)
+def invert3(m: Record, out: Record) -> bool:
+    """Write the inverse of a positive definite matrix to `out`, by cofactors; return False where it is singular."""
+    a = m.yy * m.tt - m.yt * m.yt
+    b = m.xt * m.yt - m.xy * m.tt
+    d = m.xy * m.yt - m.xt * m.yy
+    det = m.xx * a + m.xy * b + m.xt * d
+    if not det > MIN_PIVOT * m.xx * m.yy * m.tt:
+        return False
+    # All are read before one is written: `out` may be `m`.
+    yy = (m.xx * m.tt - m.xt * m.xt) / det
+    yt = (m.xy * m.xt - m.xx * m.yt) / det
+    tt = (m.xx * m.yy - m.xy * m.xy) / det
+    out.xx = a / det
+    out.xy = b / det
+    out.xt = d / det
+    out.yy = yy
+    out.yt = yt
+    out.tt = tt
+    return True
 
 
 @kernel
-def joint_sums_compensated(pairs: Records, weights: Floats) -> Records:
-    """Return the compensated sums of pairs; those of weight 0 do not count."""
-    sums = np.zeros(2, JOINT_SUMS)
-    for i in range(len(pairs)):
-        if weights[i] > 0.0:
-            joint_add_compensated(sums, pairs[i].map, pairs[i].scan, weights[i], 1.0)
-    return sums
+def accumulated(value: float, error: float, high: float, low: float) -> tuple[float, float]:
+    """Return value and error of a sum after ``high + low`` was added to it."""
+    total = value + high
+    back = total - value
+    lost = (value - (total - back)) + (high - back) + (error + low)
+    result = total + lost
+    return result, lost - (result - total)
+
+
+@kernel
+def one_step_add(
+    sums: Records, line: Record, seen: Record, gap: float, alpha_ref: float, weight: float, sign: float
+) -> None:
+    """Add (`sign` 1) or remove (-1) one pair.
+
+    Parameters
+    ----------
+    sums : (2,) ONE_STEP_SUMS
+        Changed in place.
+    line, seen : records with the fields `dx` and `dy`
+        Directions of the map and the scan segment.
+    gap : float
+        ``r`` about the reference, metres.
+    alpha_ref : float
+        Angle of the reference, radians.
+    weight, sign : float
+    """
+    # The scan direction turned by alpha_ref, and the angle from there to the map's.
+    c = math.cos(alpha_ref)
+    s = math.sin(alpha_ref)
+    ex = c * seen.dx - s * seen.dy
+    ey = s * seen.dx + c * seen.dy
+    vx = line.dx
+    vy = line.dy
+    a = math.atan2(ex * vy - ey * vx, ex * vx + ey * vy)
+    half = math.sin(0.5 * a)
+    w = sign * weight
+    value = sums[0]
+    error = sums[1]
+    value.w, error.w = accumulated(value.w, error.w, w, 0.0)
+    value.x2, error.x2 = accumulated(value.x2, error.x2, w * vx * vx, 0.0)
+    value.y2, error.y2 = accumulated(value.y2, error.y2, w * vy * vy, 0.0)
+    value.xy, error.xy = accumulated(value.xy, error.xy, w * vx * vy, 0.0)
+    value.px, error.px = accumulated(value.px, error.px, -w * gap * vy, 0.0)
+    value.py, error.py = accumulated(value.py, error.py, w * gap * vx, 0.0)
+    value.gap2, error.gap2 = accumulated(value.gap2, error.gap2, w * gap * gap, 0.0)
+    value.angle, error.angle = accumulated(value.angle, error.angle, w * a, 0.0)
+    value.angle2, error.angle2 = accumulated(value.angle2, error.angle2, w * a * a, 0.0)
+    value.versine, error.versine = accumulated(value.versine, error.versine, 2.0 * w * half * half, 0.0)
+    value.sine, error.sine = accumulated(value.sine, error.sine, w * math.sin(a), 0.0)
+    value.count, error.count = accumulated(value.count, error.count, sign, 0.0)
