@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from registration.layout import Records
 
-from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, WALL, as_records, record
+from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, WALL, Integers, as_records, record
 from ..tables import Crossings, Grid, Place, Raster, Sweep, Walls
 from ..tuning import APART_STEP, NARROW_REACH, REACH, SECTORS
 from .kernels.crossings import find_crossings, list_crossings, sample_crossings
-from .kernels.walls import direction_raster, grid_cells
+from .kernels.walls import grid_cells
 from .map_points import MapPoints
+from .merging import ends_of, ends_of_rows
 from .tuning import (
     CELL,
     CELL_GROWTH,
@@ -34,14 +35,14 @@ from .tuning import (
     SWEEP_CELL,
     SWEEP_REACH,
 )
-from .walls import ends_of, ends_of_rows
 
 Floats = NDArray[np.float64]
 
 
 def near_walls(walls: Walls) -> Grid:
     """List in each cell the walls within `REACH` of it."""
-    return _grid(ends_of(walls), CELL, REACH, MAX_CELLS)
+    grid, _ = _grid(ends_of(walls), walls.rows, CELL, REACH, MAX_CELLS)
+    return grid
 
 
 def stopping_beams(place: Place, points: MapPoints) -> Place:
@@ -56,7 +57,7 @@ def stopping_beams(place: Place, points: MapPoints) -> Place:
     rows["angle"][along] = 0.5 * math.pi
     rows["before"] = rows["after"] = -1
     walls = np.concatenate([place.walls, rows])
-    grid = _grid(ends_of_rows(walls), RASTER_CELL, SWEEP_REACH, MAX_CELLS)
+    grid, _ = _grid(ends_of_rows(walls), walls, RASTER_CELL, SWEEP_REACH, MAX_CELLS)
     return Place(walls, place.bin_starts, grid, np.append(place.ties, np.full(len(rows), -1.0)))
 
 
@@ -65,13 +66,9 @@ def swept_chains(chains: Walls) -> Sweep:
     ends = ends_of(chains)
     squares = np.round(0.5 * (ends[:, :2] + ends[:, 2:]) / NEIGHBOURHOOD)
     order = np.lexsort((squares[:, 0], squares[:, 1]))
-    rows, swept = chains.rows[order], _grid(ends[order], SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
-    sectors = _sectors(rows)[swept.items]
-    present = np.zeros(len(swept.starts) - 1, np.uint16)
-    np.bitwise_or.at(
-        present, np.repeat(np.arange(len(present)), np.diff(swept.starts)), (1 << sectors).astype(np.uint16)
-    )
-    swept = swept._replace(items=swept.items * np.int32(SECTORS) + sectors)
+    rows = chains.rows[order]
+    swept, present = _grid(ends[order], rows, SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    swept = swept._replace(items=swept.items * np.int32(SECTORS) + _sectors(rows)[swept.items])
     return Sweep(rows, rows["end"] - rows["begin"], swept, present)
 
 
@@ -126,13 +123,12 @@ def listed(chains: Records, found: Records, reach: float) -> Crossings:
 def directions_near(walls: Walls, chains: Walls) -> Raster:
     """Set in each cell the sectors of the walls and chains near it: chains also have directions over their doorways."""
     # The line of a chain may pass its walls by as much as they were joined with.
-    both = np.vstack([ends_of(walls), ends_of(chains)])
-    shape = _shape(both, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
-    sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(chains.rows)]), as_records(ENDS, both)
-    bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
-    direction_raster(ends, REACH + APART_STEP, shape, sectors, bits)
-    direction_raster(ends, NARROW_REACH + APART_STEP, shape, sectors + SECTORS, bits)
-    return Raster(shape, bits)
+    rows = np.concatenate([walls.rows, chains.rows])
+    ends, sectors = ends_of_rows(rows), _sectors(rows)
+    shape = _shape(ends, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
+    _, _, wide = grid_cells(as_records(ENDS, ends), sectors, REACH + APART_STEP, shape, False)
+    _, _, narrow = grid_cells(as_records(ENDS, ends), sectors, NARROW_REACH + APART_STEP, shape, False)
+    return Raster(shape, wide.astype(np.uint32) | narrow.astype(np.uint32) << np.uint32(SECTORS))
 
 
 def _sectors(walls: Records) -> NDArray[np.int32]:
@@ -140,10 +136,14 @@ def _sectors(walls: Records) -> NDArray[np.int32]:
     return np.floor((walls["angle"] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)
 
 
-def _grid(ends: Floats, size: float, reach: float, most: int) -> Grid:
-    """Lay a grid of at most about `most` cells of `size` metres over what is within `reach` metres of the walls."""
+def _grid(ends: Floats, walls: Records, size: float, reach: float, most: int) -> tuple[Grid, Integers]:
+    """Lay a grid of at most about `most` cells of `size` metres over what is within `reach` metres of the walls.
+
+    Returns it, and the sectors of the walls that each cell lists, as bits.
+    """
     shape = _shape(ends, size, reach, most)
-    return Grid(shape, *grid_cells(as_records(ENDS, ends), reach, shape))
+    starts, items, bits = grid_cells(as_records(ENDS, ends), _sectors(walls), reach, shape, True)
+    return Grid(shape, starts, items), bits
 
 
 def _shape(ends: Floats, size: float, reach: float, most: int) -> Records:

@@ -19,6 +19,7 @@ from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, W
 from ..tuning import WHOLE_GAP
 from .grids import crossing_chains, directions_near, near_walls, stopping_beams, swept_chains
 from .map_points import NO_POINTS, MapPoints
+from .merging import blended, both_ways, chains_of, merge, tie
 from .tuning import (
     BLENDED_SIGMAS,
     BLENDED_STEP,
@@ -28,7 +29,6 @@ from .tuning import (
     ONE_LINE,
     ONE_LINE_SHARE,
 )
-from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]
 
