@@ -14,8 +14,7 @@ from .consensus.distortion import Distortion
 from .context import SearchContext
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
-from .scan.extents import extent, inner_extent
-from .scan.kernels.extents import facing_away
+from .scan.extents import extent, facing_away, inner_extent
 from .to_scale import Factor, ScaledSearch
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict.verdict import Verdict
