@@ -14,9 +14,6 @@ from unittest.mock import patch
 import numpy as np
 
 from association.scan import scan_lines
-from association.scan.kernels.describing import describe_labelled, seen_at_once
-from association.scan.kernels.joining import as_lines, join_labelled, longest_first
-from association.tables import Measured
 from registration.layout import Records
 
 from .collection import LEVELS
@@ -63,20 +60,10 @@ def without_wall_error(terms: Terms) -> None:
     terms[1]["wall_variance"] = TINY**2
 
 
-def each_by_itself(
-    measured: Measured, counted: bool, _: bool, variances: Records, model: Records
-) -> tuple[Any, Records, Any]:
-    """Describe the segments as lines without joining any."""
-    apart, given = np.arange(len(measured.lengths)), as_lines(measured)
-    lines = join_labelled(given, longest_first(given), apart, counted)
-    row_of, rows = describe_labelled(apart, lines, variances, model)
-    return row_of, rows, seen_at_once(rows)
-
-
 @contextmanager
 def apart() -> Iterator[None]:
-    """Let no segments be joined."""
-    with patch.object(scan_lines, "_describe_view", each_by_itself):
+    """Let no segments be joined: no cosine is 2."""
+    with patch.object(scan_lines, "JOINTS", np.array([[0.0, 2.0]])):
         yield
 
 

@@ -48,31 +48,16 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
         if deadline.passed:
             break
         shifts = (views.root @ (found - views.found)).reshape(-1, 3)
-        seams = lines.moved(shifts).seams(views.root @ spread @ views.root.T, views.root)
-        weighed = seams.jacobian * (ALIGNING_SHARE / seams.variances)[:, None]
-        spread = np.asarray(np.linalg.inv(np.eye(len(found)) + seams.jacobian.T @ weighed))
-        left = seams.residuals - seams.jacobian @ found
+        pairs = lines.moved(shifts).pairs(views.root @ spread @ views.root.T)
+        residuals, variances, jacobian = pairs.apart.ravel(), pairs.variances.ravel(), pairs.by_views(views.root)
+        weighed = jacobian * (ALIGNING_SHARE / variances)[:, None]
+        spread = np.asarray(np.linalg.inv(np.eye(len(found)) + jacobian.T @ weighed))
+        left = residuals - jacobian @ found
         found = np.asarray(spread @ (weighed.T @ -left))
         # If lines do not fit one another as they should, some of them are not one.
-        worse = max(1.0, float(np.mean((left + seams.jacobian @ found) ** 2 / seams.variances)) if len(left) else 1.0)
+        worse = max(1.0, float(np.mean((left + jacobian @ found) ** 2 / variances)) if len(left) else 1.0)
         spread = spread * worse
     return corrected(scan, found, 0.5 * (spread + spread.T))
-
-
-@dataclass(frozen=True, slots=True)
-class _Seams:
-    """Distances of lines that are one in two views: offsets and sines of angles, with their variances.
-
-    Attributes
-    ----------
-    residuals, variances : (k,)
-    jacobian : (k, 3 u)
-        By the variates of `Views.root`.
-    """
-
-    residuals: Floats
-    variances: Floats
-    jacobian: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,16 +97,6 @@ class _Lines:
         out["dx"], out["dy"] = c * dx - s * dy, s * dx + c * dy
         return _Lines(out, self.of_view, self.places + shifts[:, :2])
 
-    def seams(self, covariance: Floats, root: Floats) -> _Seams:
-        """Return how far lines lie apart that are one; `covariance` is that of the views' poses."""
-        pairs = self.pairs(covariance)
-        steps, turns = pairs.by_views(self.places, root)
-        return _Seams(
-            np.concatenate([pairs.offsets, pairs.sines]),
-            np.concatenate([pairs.noise, pairs.turning]),
-            np.concatenate([steps, turns]),
-        )
-
     def pairs(self, covariance: Floats) -> _Pairs:
         """Pair lines of each view with those of the views before it that alone they can be.
 
@@ -129,16 +104,15 @@ class _Lines:
         views. A line that can be two of another view, which are farther apart than one wall is, is none of them there.
         Each is paired at most once, with the nearest view before its own.
         """
-        pairs = _Pairs.of(self.lines, self.of_view, *self._alike())
-        lengths = self.lines["length"]
-        least = np.minimum(LEAST_ALIGNED, 0.5 * np.minimum(lengths[pairs.one], lengths[pairs.other]))
-        pairs = pairs.taken((pairs.common >= least) & (np.abs(pairs.offsets) <= MOST_APART))
-        # Of the covariance, a factor: the errors of the views by independent variates.
+        pairs = _Pairs.of(self, *self._alike())
+        lengths = self.lines["length"][pairs.rows]
+        enough = pairs.common >= np.minimum(LEAST_ALIGNED, 0.5 * lengths.min(axis=1))
+        pairs = pairs.taken(enough & (np.abs(pairs.apart[:, 0]) <= MOST_APART))
+        # A factor of the covariance: the errors of the views by independent variates.
         values, vectors = np.linalg.eigh(covariance)
-        steps, turns = pairs.by_views(self.places, vectors * np.sqrt(np.maximum(0.0, values)))
-        offset, angle = pairs.noise + (steps**2).sum(axis=1), pairs.turning + (turns**2).sum(axis=1)
-        near = np.abs(pairs.offsets) <= GATE_SIGMAS * np.sqrt(offset)
-        return pairs.taken(near & (np.abs(pairs.sines) <= GATE_SIGMAS * np.sqrt(angle))).nearest()
+        moves = pairs.by_views(vectors * np.sqrt(np.maximum(0.0, values)))
+        variances = pairs.variances + (moves**2).sum(axis=1).reshape(-1, 2)
+        return pairs.taken((np.abs(pairs.apart) <= GATE_SIGMAS * np.sqrt(variances)).all(axis=1)).nearest()
 
     def _alike(self) -> tuple[Indices, Indices]:
         """List the pairs of lines of a view and of those before it that run about the same way."""
@@ -157,75 +131,69 @@ class _Lines:
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """Pairs of lines, (k,): `one` of a view, and the `other` of a view before it; which lines they are, of which views.
+    """Pairs of lines: the first of a view, the second of one before it.
 
     Attributes
     ----------
-    common : length that both cover along the other, m
-    x, y : the middle of that, on the other
-    dx, dy : direction of the other
-    offsets : how far the one lies to the left of the other there, m
-    noise : variance of that by the lines alone, m^2
-    sines : of the angle to the other
-    turning : variance of that by the lines alone
+    rows : (k, 2) which lines they are
+    views : (k, 2) their views
+    common : (k,) length that both cover along the second, m
+    directions : (k, 2) of the second
+    levers : (k, 2) abscissae on the second, from where each view was, of the middle of what both cover, m
+    apart : (k, 2) how far the first lies to the left of the second there, m, and the sine of the angle between them
+    variances : (k, 2) of these, by the lines alone, m^2 and rad^2
     """
 
-    one: Indices
-    other: Indices
+    rows: Indices
     views: Indices
-    earlier: Indices
     common: Floats
-    x: Floats
-    y: Floats
-    dx: Floats
-    dy: Floats
-    offsets: Floats
-    noise: Floats
-    sines: Floats
-    turning: Floats
+    directions: Floats
+    levers: Floats
+    apart: Floats
+    variances: Floats
 
     @classmethod
-    def of(cls, lines: Records, of_view: Indices, one: Indices, other: Indices) -> _Pairs:
-        a, b = lines[one], lines[other]
-        dx, dy = b["dx"], b["dy"]
+    def of(cls, found: _Lines, first: Indices, second: Indices) -> _Pairs:
+        a, b, rows = found.lines[first], found.lines[second], np.stack([first, second], axis=1)
+        dx, dy, views = b["dx"], b["dy"], found.of_view[rows]
         middle = dx * (a["x"] - b["x"]) + dy * (a["y"] - b["y"])
         low = np.maximum(middle - 0.5 * a["length"], -0.5 * b["length"])
         high = np.minimum(middle + 0.5 * a["length"], 0.5 * b["length"])
         x, y = b["x"] + 0.5 * (low + high) * dx, b["y"] + 0.5 * (low + high) * dy
         along = a["dx"] * (x - a["centroid_x"]) + a["dy"] * (y - a["centroid_y"])
-        across_x, across_y = a["centroid_x"] + along * a["dx"] - x, a["centroid_y"] + along * a["dy"] - y
-        noise, turning = _variances_at(a, x, y) + _variances_at(b, x, y), _angle_variances(a) + _angle_variances(b)
-        return cls(
-            one, other, of_view[one], of_view[other], high - low, x, y, dx, dy,
-            dx * across_y - dy * across_x, noise, dx * a["dy"] - dy * a["dx"], turning,
-        )  # fmt: skip
+        offset = dx * (a["centroid_y"] + along * a["dy"] - y) - dy * (a["centroid_x"] + along * a["dx"] - x)
+        apart = np.stack([offset, dx * a["dy"] - dy * a["dx"]], axis=1)
+        variances = np.add(*(np.stack([_variances_at(line, x, y), _angle_variances(line)], 1) for line in (a, b)))
+        from_x, from_y = (place[:, None] - found.places[views, k] for k, place in enumerate((x, y)))
+        levers = dx[:, None] * from_x + dy[:, None] * from_y
+        return cls(rows, views, high - low, np.stack([dx, dy], axis=1), levers, apart, variances)
 
     def taken(self, chosen: Indices | Flags) -> _Pairs:
         """Return some of the pairs."""
         return _Pairs(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def by_views(self, places: Floats, root: Floats) -> tuple[Floats, Floats]:
-        """Return how offsets and angles change with the variates of the poses, (k, 3 u) each: see `Views.root`."""
-        offsets, angles = np.zeros((2, len(self.one), root.shape[1]))
-        for sign, views in ((1.0, self.views), (-1.0, self.earlier)):
-            x, y = places[views].T
-            steps = np.stack([-self.dy, self.dx, self.dx * (self.x - x) + self.dy * (self.y - y)], axis=1)
+    def by_views(self, root: Floats) -> Floats:
+        """Return the derivatives of `apart`, one after the other, by the variates of `Views.root`, (2 k, 3 u)."""
+        jacobian = np.zeros((len(self.rows), 2, root.shape[1]))
+        for sign, views, levers in zip((1.0, -1.0), self.views.T, self.levers.T, strict=True):
+            steps = np.column_stack([-self.directions[:, 1], self.directions[:, 0], levers])
             of_views = root.reshape(-1, 3, root.shape[1])[views]
-            offsets += sign * np.einsum("ki,kij->kj", steps, of_views)
-            angles += sign * of_views[:, 2]
-        return offsets, angles
+            jacobian[:, 0] += sign * np.einsum("ki,kij->kj", steps, of_views)
+            jacobian[:, 1] += sign * of_views[:, 2]
+        return jacobian.reshape(-1, root.shape[1])
 
     def nearest(self) -> _Pairs:
         """Return for each line the nearest one of the nearest view in which it can be one wall alone."""
-        if not len(self.one):
+        if not len(self.rows):
             return self
-        order = np.lexsort((np.abs(self.offsets) / np.sqrt(self.noise), -self.earlier, self.one))
-        one, earlier, offsets = self.one[order], self.earlier[order], self.offsets[order]
-        starts = np.flatnonzero(np.diff(one, prepend=-1) | np.diff(earlier, prepend=-1))
-        apart = np.maximum.reduceat(offsets, starts) - np.minimum.reduceat(offsets, starts)
-        single = starts[apart <= SAME_LINE]
-        _, first = np.unique(one[single], return_index=True)
-        return self.taken(order[single[first]])
+        offsets = self.apart[:, 0]
+        order = np.lexsort((np.abs(offsets) / np.sqrt(self.variances[:, 0]), -self.views[:, 1], self.rows[:, 0]))
+        first, earlier, offsets = self.rows[order, 0], self.views[order, 1], offsets[order]
+        starts = np.flatnonzero(np.diff(first, prepend=-1) | np.diff(earlier, prepend=-1))
+        between = np.maximum.reduceat(offsets, starts) - np.minimum.reduceat(offsets, starts)
+        single = starts[between <= SAME_LINE]
+        _, chosen = np.unique(first[single], return_index=True)
+        return self.taken(order[single[chosen]])
 
 
 def _variances_at(lines: Records, x: Floats, y: Floats) -> Floats:

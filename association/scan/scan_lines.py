@@ -34,8 +34,8 @@ from .tuning import (
 )
 
 _FIELDS = len(LINE_PARTS.names or ())
-# Of a view, first what was cut is joined, then what lies about on one line.
-_JOINTS = np.array([[CUT_LATERAL, CUT_COSINE], [LINE_LATERAL, LINE_COSINE]])
+# Lateral offsets (m) and cosines. Of a view, first what was cut is joined, then what lies about on one line.
+JOINTS = np.array([[CUT_LATERAL, CUT_COSINE], [LINE_LATERAL, LINE_COSINE]])
 
 
 @value(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class ScanLines:
         variances, model = variances_of(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
             given = _given(measured) if given is None else given
-            row_of, lines = join_lines(given, _JOINTS, measured.counted, options.oriented)
+            row_of, lines = join_lines(given, JOINTS, measured.counted, options.oriented)
             rows, seen = describe_lines(lines, variances, model)
             return cls(row_of, rows, model, seen, given)
         part_of, parts, views = parts_of(measured, scan.views, directed=options.oriented)
@@ -122,7 +122,7 @@ def parts_of(
     covariance, given, before = views.covariance, _given(measured), 0
     for v, pose in enumerate(views.poses):
         own = np.flatnonzero(views.of_segment == v)
-        labels, lines = join_lines(given[own], _JOINTS, measured.counted, directed)
+        labels, lines = join_lines(given[own], JOINTS, measured.counted, directed)
         part_of[own] = labels + before
         block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
         levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from association.index.grids import boxes_in_bands, crossing_chains, listed
 from association.index.kernels import crossings
-from association.index.walls import ends_of_rows
+from association.index.merging import ends_of_rows
 from association.layout import CROSSING, Integers
 from association.tables import Crossings
 from registration.layout import Records
