@@ -180,6 +180,8 @@ class _Linked:
         ends = ends_of(walls)
         directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
         records = as_records(ENDS, ends), as_records(POINT, directions)
+        for one in records:
+            one.flags.writeable = False  # as those of segments: a kernel is compiled for each kind
         self.of_wall = collinear_groups(*records, join_gates(LINK_GAP, APART_STEP), deadline)
         # Along the common direction of the walls of a group, for their own directions differ.
         common = np.zeros((len(ends), 2))

@@ -224,6 +224,7 @@ def grid_cells(
                     starts[c] += 1
     if listing:
         # The second pass moved every start to the next one's place.
-        starts[1:] = starts[:-1].copy()
+        for c in range(places, 0, -1):
+            starts[c] = starts[c - 1]
         starts[0] = 0
     return starts, items, bits

@@ -31,7 +31,9 @@ def join_lines(given: Records, joints: Floats, counted: bool, directed: bool) ->
     (n,) the line of each part
     (k,) of `LINE_PARTS`, the longest first, ties by index
     """
-    labels = np.arange(len(given))
+    labels = np.empty(len(given), np.int64)
+    for i in range(len(given)):
+        labels[i] = i
     parts = given
     for done in range(len(joints) + 1):
         n = len(parts)
