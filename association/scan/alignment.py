@@ -49,7 +49,8 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
             break
         shifts = (views.root @ (found - views.found)).reshape(-1, 3)
         pairs = lines.moved(shifts).pairs(views.root @ spread @ views.root.T)
-        residuals, variances, jacobian = pairs.apart.ravel(), pairs.variances.ravel(), pairs.by_views(views.root)
+        residuals, variances = pairs.apart.ravel(), pairs.variances.ravel()
+        jacobian = (pairs.steps @ views.root[pairs.errors]).reshape(-1, len(found))
         weighed = jacobian * (ALIGNING_SHARE / variances)[:, None]
         spread = np.asarray(np.linalg.inv(np.eye(len(found)) + jacobian.T @ weighed))
         left = residuals - jacobian @ found
@@ -108,10 +109,9 @@ class _Lines:
         lengths = self.lines["length"][pairs.rows]
         enough = pairs.common >= np.minimum(LEAST_ALIGNED, 0.5 * lengths.min(axis=1))
         pairs = pairs.taken(enough & (np.abs(pairs.apart[:, 0]) <= MOST_APART))
-        # A factor of the covariance: the errors of the views by independent variates.
-        values, vectors = np.linalg.eigh(covariance)
-        moves = pairs.by_views(vectors * np.sqrt(np.maximum(0.0, values)))
-        variances = pairs.variances + (moves**2).sum(axis=1).reshape(-1, 2)
+        at = pairs.errors
+        steps = ((pairs.steps @ covariance[at[:, :, None], at[:, None]]) * pairs.steps).sum(axis=2)
+        variances = pairs.variances + np.maximum(0.0, steps)
         return pairs.taken((np.abs(pairs.apart) <= GATE_SIGMAS * np.sqrt(variances)).all(axis=1)).nearest()
 
     def _alike(self) -> tuple[Indices, Indices]:
@@ -138,8 +138,7 @@ class _Pairs:
     rows : (k, 2) which lines they are
     views : (k, 2) their views
     common : (k,) length that both cover along the second, m
-    directions : (k, 2) of the second
-    levers : (k, 2) abscissae on the second, from where each view was, of the middle of what both cover, m
+    steps : (k, 2, 6) derivatives of `apart` by x, y, theta of both views
     apart : (k, 2) how far the first lies to the left of the second there, m, and the sine of the angle between them
     variances : (k, 2) of these, by the lines alone, m^2 and rad^2
     """
@@ -147,8 +146,7 @@ class _Pairs:
     rows: Indices
     views: Indices
     common: Floats
-    directions: Floats
-    levers: Floats
+    steps: Floats
     apart: Floats
     variances: Floats
 
@@ -164,23 +162,21 @@ class _Pairs:
         offset = dx * (a["centroid_y"] + along * a["dy"] - y) - dy * (a["centroid_x"] + along * a["dx"] - x)
         apart = np.stack([offset, dx * a["dy"] - dy * a["dx"]], axis=1)
         variances = np.add(*(np.stack([_variances_at(line, x, y), _angle_variances(line)], 1) for line in (a, b)))
+        steps = np.zeros((len(rows), 2, 2, 3))
+        steps[:, 0, :, 0], steps[:, 0, :, 1], steps[:, 1, :, 2] = -dy[:, None], dx[:, None], 1.0
         from_x, from_y = (place[:, None] - found.places[views, k] for k, place in enumerate((x, y)))
-        levers = dx[:, None] * from_x + dy[:, None] * from_y
-        return cls(rows, views, high - low, np.stack([dx, dy], axis=1), levers, apart, variances)
+        steps[:, 0, :, 2] = dx[:, None] * from_x + dy[:, None] * from_y
+        steps[:, :, 1] *= -1.0
+        return cls(rows, views, high - low, steps.reshape(-1, 2, 6), apart, variances)
+
+    @property
+    def errors(self) -> Indices:
+        """Where x, y, theta of both views are among those of all, (k, 6)."""
+        return (3 * self.views[:, :, None] + np.arange(3)).reshape(-1, 6)
 
     def taken(self, chosen: Indices | Flags) -> _Pairs:
         """Return some of the pairs."""
         return _Pairs(*(getattr(self, field.name)[chosen] for field in fields(self)))
-
-    def by_views(self, root: Floats) -> Floats:
-        """Return the derivatives of `apart`, one after the other, by the variates of `Views.root`, (2 k, 3 u)."""
-        jacobian = np.zeros((len(self.rows), 2, root.shape[1]))
-        for sign, views, levers in zip((1.0, -1.0), self.views.T, self.levers.T, strict=True):
-            steps = np.column_stack([-self.directions[:, 1], self.directions[:, 0], levers])
-            of_views = root.reshape(-1, 3, root.shape[1])[views]
-            jacobian[:, 0] += sign * np.einsum("ki,kij->kj", steps, of_views)
-            jacobian[:, 1] += sign * of_views[:, 2]
-        return jacobian.reshape(-1, root.shape[1])
 
     def nearest(self) -> _Pairs:
         """Return for each line the nearest one of the nearest view in which it can be one wall alone."""
