@@ -110,16 +110,6 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # The terms by which a pose is judged.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two wall chains whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
-# `kernels.crossings.code_of`. There are dozens of them for each chain, so that four bytes have to do.
-CROSSING = fields((np.int32, "first second"), (np.uint32, "code"))
-
-# Some of the boxes around chains that are near one another in y: where they begin and end, and their range of y.
-BAND = fields((_I, "begin end"), (_F, "low high"))
-
-# The lists of crossings: the reach from the point where the lines cross, and the number of cells that way.
-CROSSING_SHAPE = fields((_F, "reach"), (_I, "columns"))
-
 # The geometry of a base for its search, of its segments a, which slides, and b: from the midpoint of a to that of b,
 # also along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
 # rotation; the tolerance of the two angles; by how much the rotation may be off until the final one is known, and by

@@ -9,27 +9,18 @@ from numpy.typing import NDArray
 
 from registration.layout import Records
 
-from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, WALL, Integers, as_records, record
-from ..tables import Crossings, Grid, Place, Raster, Sweep, Walls
-from ..tuning import APART_STEP, NARROW_REACH, REACH, SECTORS
-from .kernels.crossings import find_crossings, list_crossings, sample_crossings
+from ..layout import ENDS, GRID_SHAPE, WALL, Integers, as_records, record
+from ..tables import Grid, Place, Raster, Sweep, Walls
+from ..tuning import APART_STEP, REACH, SECTORS
 from .kernels.walls import grid_cells
 from .map_points import MapPoints
 from .merging import ends_of, ends_of_rows
 from .tuning import (
     CELL,
     CELL_GROWTH,
-    CROSSING_BAND,
-    CROSSING_REACHES,
-    CROSSING_SAMPLE,
-    CROSSING_SAMPLE_LOOKS,
-    CROSSINGS_A_CHAIN,
-    FEW_CHAINS,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
-    MOST_BANDS,
-    MOST_CROSSINGS,
     NEIGHBOURHOOD,
     RASTER_CELL,
     SWEEP_CELL,
@@ -72,63 +63,14 @@ def swept_chains(chains: Walls) -> Sweep:
     return Sweep(rows, rows["end"] - rows["begin"], swept, present)
 
 
-def crossing_chains(chains: Records) -> Crossings:
-    """List the pairs of chains (m,) that cross, up to as far from there as their number allows, or none."""
-    ends, counted = ends_of_rows(chains), max(len(chains), FEW_CHAINS)
-    most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_CHAIN, MOST_CROSSINGS, strict=True)]
-    boxed = boxes_in_bands(ends)
-    # No farther than from one end of the map to the other: the fewer lists there are the sooner one is found.
-    across = float(np.hypot(*np.ptp(ends.reshape(-1, 2), axis=0)))
-    reaches = np.array([reach for reach in CROSSING_REACHES if reach <= across] or CROSSING_REACHES[-1:])
-    every = max(1, len(chains) // CROSSING_SAMPLE)
-    counts = sample_crossings(chains, *boxed, reaches, every, CROSSING_SAMPLE_LOOKS)
-    allowed = (counts <= most).all(axis=1)
-    for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
-        found = np.empty(int(1.2 * count) + FEW_CHAINS, CROSSING)
-        number, looks = find_crossings(chains, *boxed, reach, 2 * most[2], found)
-        if number > 2 * most[0] or looks > 2 * most[2]:
-            continue  # the sample was not like the rest
-        if number > len(found):
-            found = np.empty(number, CROSSING)
-            find_crossings(chains, *boxed, reach, 2 * most[2], found)
-        return listed(chains, found[:number], reach)
-    return listed(chains, np.zeros(0, CROSSING), -1.0)
-
-
-def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records, NDArray[np.int32], Records]:
-    """Return the boxes around chains (m, 4), by bands of y and there by their left sides, their order, and the bands.
-
-    (m,) of `ENDS`, (m,) and (b,) of `BAND`, each some `height` metres or more.
-    """
-    boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
-    bottom, extent = boxes[:, 1].min(initial=np.inf), np.ptp(boxes[:, 1]) if len(boxes) else 0.0
-    band_of = np.floor((boxes[:, 1] - bottom) / max(height, extent / MOST_BANDS))
-    order = np.lexsort((boxes[:, 0], band_of))
-    boxes, band_of = boxes[order], band_of[order]
-    begins = np.flatnonzero(np.diff(band_of, prepend=-1.0))
-    bands = np.zeros(len(begins), BAND)
-    if len(begins):
-        bands["begin"], bands["end"] = begins, np.append(begins[1:], len(boxes))
-        bands["low"] = np.minimum.reduceat(boxes[:, 1], begins)
-        bands["high"] = np.maximum.reduceat(boxes[:, 3], begins)
-    return as_records(ENDS, boxes), order.astype(np.int32), bands
-
-
-def listed(chains: Records, found: Records, reach: float) -> Crossings:
-    """List crossings (k,) of `CROSSING`, all those of the chains that there are up to `reach` metres."""
-    shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / SWEEP_CELL)))
-    return Crossings(shape, *list_crossings(chains, found, shape))
-
-
 def directions_near(walls: Walls, chains: Walls) -> Raster:
     """Set in each cell the sectors of the walls and chains near it: chains also have directions over their doorways."""
     # The line of a chain may pass its walls by as much as they were joined with.
     rows = np.concatenate([walls.rows, chains.rows])
     ends, sectors = ends_of_rows(rows), _sectors(rows)
     shape = _shape(ends, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
-    _, _, wide = grid_cells(as_records(ENDS, ends), sectors, REACH + APART_STEP, shape, False)
-    _, _, narrow = grid_cells(as_records(ENDS, ends), sectors, NARROW_REACH + APART_STEP, shape, False)
-    return Raster(shape, wide.astype(np.uint32) | narrow.astype(np.uint32) << np.uint32(SECTORS))
+    _, _, bits = grid_cells(as_records(ENDS, ends), sectors, REACH + APART_STEP, shape, False)
+    return Raster(shape, bits)
 
 
 def _sectors(walls: Records) -> NDArray[np.int32]:

@@ -1,7 +1,7 @@
 """Several maps in one index: each is shifted to a place of its own, so far from the others that nothing crosses.
 
-One search then finds the best pose of all maps, and one verdict weighs alternatives on all of them. Wall chains,
-crossings and rays end within a map, because the gap between two maps is longer than any of them.
+One search then finds the best pose of all maps, and one verdict weighs alternatives on all of them. Wall chains and
+rays end within a map, because the gap between two maps is longer than any of them.
 """
 
 from __future__ import annotations
