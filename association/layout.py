@@ -91,13 +91,6 @@ TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any
 # set takes at least which reaches that. Whether poses outside the window of a hard prior are dropped.
 RULE = fields((_F, "kept_fraction best_value least_value least_freedom"), (_I, "within"))
-# Two wall chains whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
-# `kernels.crossings.code_of`. There are dozens of them for each chain, so that four bytes have to do.
-CROSSING = fields((np.int32, "first second"), (np.uint32, "code"))
-# Some of the boxes around chains that are near one another in y: where they begin and end, and their range of y.
-BAND = fields((_I, "begin end"), (_F, "low high"))
-# The lists of crossings: the reach from the point where the lines cross, and the number of cells that way.
-CROSSING_SHAPE = fields((_F, "reach"), (_I, "columns"))
 # A base: two scan lines that fix a pose, of which the first slides along chains; its merit, the logarithm of the lesser
 # gain, to a power, over the cost of its search.
 BASE = fields((_I, "sliding crossing"), (_F, "merit"))

@@ -73,8 +73,7 @@ class Raster(NamedTuple):
     Attributes
     ----------
     shape : (1,) of `GRID_SHAPE`
-    bits : (columns * rows,) bit s of a cell is set where a wall or a chain of direction sector s is within `REACH`, bit
-        ``SECTORS + s`` where it is within `NARROW_REACH`
+    bits : (columns * rows,) bit s of a cell is set where a wall or a chain of direction sector s is within `REACH`
     """
 
     shape: Records
@@ -118,24 +117,6 @@ class Sweep(NamedTuple):
     present: Integers
 
 
-class Crossings(NamedTuple):
-    """The pairs of wall chains whose lines cross near both, by how a scan segment would lie on each.
-
-    Attributes
-    ----------
-    shape : (1,) of `CROSSING_SHAPE`
-    bins : (angles,) which of the grids is that of each bin of angles between two chains, -1 where there is none
-    starts, entries : cell ``c = (grid * columns + column) * columns + row`` lists
-        ``entries[starts[c]:starts[c + 1]]``, of `CROSSING`: those whose first chain is somewhere `column` cells, and
-        whose second one `row` cells, from where they cross
-    """
-
-    shape: Records
-    bins: Integers
-    starts: Integers
-    entries: Records
-
-
 class Pieces(NamedTuple):
     """The map's own segments.
 
@@ -157,7 +138,6 @@ class MapTables(NamedTuple):
 
     place: Place
     sweep: Sweep
-    crossings: Crossings
     raster: Raster
 
 

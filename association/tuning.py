@@ -18,7 +18,6 @@ DIRECTION_BINS = 90  # tables
 SECTOR_BITS = 4
 SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables
 REACH = 0.4  # m, tables; a wall is listed in the cells this near to it, so gates end here
-NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where it is this near
 
 # --- Scan: the gain of a segment and its variances --------------------------------------------------------------------
 
@@ -48,9 +47,6 @@ FREE_ANGLE = 0.1  # rad
 BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length, tables
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables
-# Bins of half a turn; an odd number, so that the middle one is about a right angle. Measured: with 23 it takes up to a
-# tenth longer, with 91 as long.
-CROSSING_ANGLES = 45
 
 # --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
 

@@ -14,8 +14,7 @@ from .context import SearchContext
 from .explanations import Answer, Explanations
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
-from .scan.extents import extent, inner_extent
-from .scan.kernels.extents import facing_away
+from .scan.extents import extent, facing_away, inner_extent
 from .tuning import (
     DOUBTING_DEVIATIONS,
     EXCEEDING,

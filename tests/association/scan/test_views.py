@@ -254,6 +254,16 @@ def test_views_are_laid_on_one_another_where_their_walls_are_one() -> None:
     assert aligned(exact, Deadline()) is exact
 
 
+@pytest.mark.parametrize(("walls", "moves"), [([1.0], True), ([1.0, 1.05], True), ([1.0, 1.2], False)])
+def test_a_line_that_may_be_either_of_two_walls_moves_no_view(walls: list[float], moves: bool) -> None:
+    """Two faces of one thin wall count as one."""
+    first = View(scan_of([[0.0, y, 4.0, y] for y in walls]))
+    second = View(scan_of([[0.5, 1.1, 3.5, 1.1]]), pose(), np.diag([0.1**2, 0.1**2, 1e-6]))
+    found = aligned(assemble([first, second]), Deadline()).views
+    assert found is not None
+    assert (abs(found.poses[1].y) > 0.02) is moves
+
+
 def test_the_errors_of_views_are_found_beside_the_pose() -> None:
     """And where the scan is moved to them, its segments lie on the walls."""
     true, off = pose(-1.0, 0.3, 0.2), pose(-0.96, 0.25, 0.23)

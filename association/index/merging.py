@@ -7,19 +7,20 @@ much they are one wall falls smoothly with the step and the gap between them.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import Segments
-from registration.layout import LINE, Records
+from registration.layout import Records
 
 from ..deadline import Deadline
 from ..errors import IndexingEndedError
 from ..layout import ENDS, POINT, WALL, Integers, as_records
 from ..tables import JoinGates, Walls
 from ..tuning import APART_STEP, BASE_SLACK, BASE_SLACK_SHARE, DIRECTION_BINS
-from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
+from .kernels.walls import blend_walls, join_collinear, list_begins, tie_walls
 from .tuning import (
     BEGIN_CELL,
     CHAIN_GAP,
@@ -56,15 +57,15 @@ def merge(local: Segments, gap: float, beside: float, deadline: Deadline | None 
     """
     ends, directions = as_records(ENDS, local.endpoints), as_records(POINT, local.directions)
     labels = collinear_groups(ends, directions, join_gates(gap, beside), deadline)
-    wall, lines = _lines(local, labels)
-    lateral = np.maximum(
-        np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, :2]) - lines.offsets[wall]),
-        np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, 2:]) - lines.offsets[wall]),
-    )
+    wall = _numbered(labels)
+    lines = _Lines.of(local, wall)
+    both = local.endpoints.reshape(-1, 2, 2)
+    lateral = np.abs(np.einsum("ij,ikj->ik", lines.normals[wall], both) - lines.offsets[wall, None]).max(axis=1)
     crooked = np.zeros(len(lines), dtype=bool)
-    np.logical_or.at(crooked, wall, lateral > beside)
+    crooked[wall[lateral > beside]] = True
     if crooked.any():
-        wall, lines = _lines(local, np.where(crooked[wall], np.arange(len(labels)) + len(labels), labels))
+        wall = _numbered(np.where(crooked[wall], np.arange(len(labels)) + len(labels), labels))
+        lines = _Lines.of(local, wall)
     return _sorted(local, wall, lines)
 
 
@@ -77,13 +78,15 @@ def collinear_groups(ends: Records, directions: Records, gates: JoinGates, deadl
         When the deadline passes first.
     """
     labels = np.arange(len(ends))
-    heads, following = list_begins(ends, gates.cell)
+    heads = np.full(1 << (2 * len(ends) - 1).bit_length(), -1)
+    following = list_begins(ends, gates.cell, heads)
     for first in range(0, len(ends), PIECES_A_LOOK):
         if deadline is not None and deadline.passed:
             raise IndexingEndedError
         last = min(first + PIECES_A_LOOK, len(ends))
         join_collinear(ends, directions, heads, following, gates, labels, first, last)
-    label_groups(labels)
+    while not np.array_equal(labels, upper := labels[labels]):
+        labels = upper
     return labels
 
 
@@ -94,33 +97,34 @@ def join_gates(gap: float, lateral: float) -> JoinGates:
     return JoinGates(cell, float(gap), float(lateral), math.cos(MERGE_ANGLE))
 
 
+@dataclass(frozen=True, slots=True)
 class _Lines:
-    """A line through each group of pieces: unit directions (m, 2), left normals (m, 2), offsets (m,)."""
+    """A line through each group of pieces: unit directions (m, 2), offsets along the left normals (m,)."""
 
-    def __init__(self, local: Segments, wall: NDArray[np.intp], count: int) -> None:
-        d = np.zeros((count, 2))
-        np.add.at(d, wall, local.directions * local.lengths[:, None])
-        d /= np.linalg.norm(d, axis=1)[:, None]
-        self.directions = d
-        self.normals = np.stack([-d[:, 1], d[:, 0]], axis=1)
-        weight = np.bincount(wall, local.lengths, count)
-        offsets = np.einsum("ij,ij->i", self.normals[wall], local.midpoints)
-        self.offsets = np.bincount(wall, local.lengths * offsets, count) / weight
+    directions: Floats
+    offsets: Floats
 
     def __len__(self) -> int:
         return len(self.offsets)
 
-    def take_over(self, lines: Records) -> None:
-        """Take other lines, (m,) of `LINE`, in place of these."""
-        self.directions = np.column_stack([lines["dx"], lines["dy"]])
-        self.normals = np.stack([-self.directions[:, 1], self.directions[:, 0]], axis=1)
-        self.offsets = lines["offset"].copy()
+    @property
+    def normals(self) -> Floats:
+        """To the left, (m, 2)."""
+        return np.column_stack([-self.directions[:, 1], self.directions[:, 0]])
+
+    @classmethod
+    def of(cls, local: Segments, wall: NDArray[np.intp]) -> _Lines:
+        """Return the lines of pieces (n,), by their lengths; `wall` (n,): the group of each, counted from 0."""
+        weights, count = local.lengths, int(wall.max()) + 1
+        sums = np.column_stack([np.bincount(wall, weights * along, count) for along in local.directions.T])
+        lines = cls(sums / np.linalg.norm(sums, axis=1)[:, None], np.zeros(count))
+        offsets = np.einsum("ij,ij->i", lines.normals[wall], local.midpoints)
+        return cls(lines.directions, np.bincount(wall, weights * offsets, count) / np.bincount(wall, weights, count))
 
 
-def _lines(local: Segments, labels: Integers) -> tuple[NDArray[np.intp], _Lines]:
-    """Return the group of each piece, counted from 0, and the groups' lines."""
-    _, wall = np.unique(labels, return_inverse=True)
-    return wall, _Lines(local, wall, int(wall.max()) + 1)
+def _numbered(labels: Integers) -> NDArray[np.intp]:
+    """Return the group of each piece, counted from 0."""
+    return np.unique(labels, return_inverse=True)[1]
 
 
 def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Walls, Integers]:
@@ -165,7 +169,7 @@ def chains_of(walls: Walls, deadline: Deadline | None = None) -> Walls:
         return chains
     both = np.vstack([ends_of(chains), ends_of_rows(joined)])
     local, each = Segments.derived(both), np.arange(len(both))
-    every, _ = _sorted(local, each, _Lines(local, each, len(both)))
+    every, _ = _sorted(local, each, _Lines.of(local, each))
     return every
 
 
@@ -176,6 +180,8 @@ class _Linked:
         ends = ends_of(walls)
         directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
         records = as_records(ENDS, ends), as_records(POINT, directions)
+        for one in records:
+            one.flags.writeable = False  # as those of segments: a kernel is compiled for each kind
         self.of_wall = collinear_groups(*records, join_gates(LINK_GAP, APART_STEP), deadline)
         # Along the common direction of the walls of a group, for their own directions differ.
         common = np.zeros((len(ends), 2))
@@ -219,11 +225,8 @@ def blended(
     """
     linked = _Linked(walls, deadline)
     ties = tie_walls(walls.rows, linked.by_begin, linked.of_wall, apart)
-    on = np.zeros(len(walls.rows), LINE)
-    blend_walls(walls.rows, walls.longest, linked.by_begin, linked.of_wall, ties, on)
-    lines = _Lines(local, wall_of_piece, len(on))
-    lines.take_over(on)
-    return _sorted(local, wall_of_piece, lines)
+    dx, dy, offsets = blend_walls(walls.rows, walls.longest, linked.by_begin, linked.of_wall, ties)
+    return _sorted(local, wall_of_piece, _Lines(np.column_stack([dx, dy]), offsets))
 
 
 def direction_bin(angles: Floats) -> NDArray[np.intp]:
