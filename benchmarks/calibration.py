@@ -40,10 +40,10 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FORMS = (SEGMENTS, RANGES)
-BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
-RIDGE = 3.0  # on slopes of standardised pieces, in units of one answer
-LEAST_BESIDE = 0.03  # fraction of the examples that lies on either side of a bend,
-LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
+BENDS = (0.2, 0.5, 0.8, 0.95)  # quantiles of a feature at which its curve may bend
+RIDGE = 10.0  # on slopes of standardised pieces, in units of one answer
+LEAST_BESIDE = 0.02  # fraction of the examples that lies on either side of a bend,
+LEAST_PIECE = 0.01  # and of what the values come to in all that lies between two
 REAL = 3.0  # a scan of a real plan or log counts as that many of drawn buildings
 ON_MAPS = (0.5, 0.9, 1.0)
 THRESHOLDS = (0.8, 0.85, 0.9, 0.95, 0.98, 0.99)

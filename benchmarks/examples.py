@@ -151,9 +151,7 @@ class Case:
             return None
         best, pose, right = answer.best, answer.pose, False
         others = [one for one in found.others if one.inside]
-        described = describe(
-            context, best, answer.estimate, compare(context, best, others, answer.estimate.wall_sigma)
-        )
+        described = describe(context, best, answer.estimate, compare(context, best, others, answer.estimate.wall_sigma))
         if self.truth is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle

@@ -39,5 +39,5 @@ KEPT = 64  # poses, tables
 KEPT_FRACTION = 0.65  # of the best value, tables; poses below it are no alternatives
 # If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
-KEPT_FRACTION_FOR_BEAMS = 0.5
+KEPT_FRACTION_FOR_BEAMS = 0.65
 PRUNED = 4  # times as many are held before the distinct ones are picked

@@ -20,11 +20,13 @@ from ..scan.beams import together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .tuning import (
+    AS_SCORED,
     COMPARED,
     COUNTED,
     LEAST_OF_BEAM,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
+    MOST_AS_SCORED,
     OF_A_THING,
     TEMPERATURE,
     THING_WIDTH,
@@ -69,7 +71,8 @@ def compare(
     Each explanation is matched again with wide gates, since of many similar places the one that fits best shows smaller
     errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
     what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
-    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most.
+    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most. Next to that a
+    fraction of the difference in score counts, `MOST_AS_SCORED` of it at most: one thing alone never decides.
     """
     others = tuple(others[:COMPARED])
     if not others:
@@ -81,6 +84,7 @@ def compare(
     counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
     evidence = _Evidence.of(context, sets, wall_sigma)
     gaps = np.array([evidence.gap(0, k) for k in range(1, len(sets))]) + priors[0] - priors[1:]
+    gaps += AS_SCORED * np.minimum(posteriors[0] - posteriors[1:], MOST_AS_SCORED)
     return Comparison(others, gaps, counted)
 
 

@@ -32,7 +32,6 @@ from .tuning import (
     LEAST_MISFIT,
     LIKE_WALLS,
     MAX_GAP,
-    MAX_LEAD,
     MOST_DEVIATION,
     MOST_MISFIT,
     MOST_NULL,
@@ -51,7 +50,6 @@ class Role(NamedTuple):
 
 
 ROLES: Mapping[str, Role] = {
-    "lead": Role("similar_place", FOR),
     "solitude": Role("similar_place", FOR),
     "deviation": Role("single_wall", AGAINST),
     "inlier_fraction": Role("map_mismatch", FOR),
@@ -61,9 +59,7 @@ ROLES: Mapping[str, Role] = {
     "farther": Role("map_mismatch", AGAINST, needs_beams=True),
     "nearer": Role("map_mismatch", AGAINST, needs_beams=True),
     "misfit": Role("map_mismatch", EITHER),
-    "length": Role("insufficient_evidence", FOR),
     "walls": Role("insufficient_evidence", FOR),
-    "null": Role("not_on_map", AGAINST),
     "null_gap": Role("not_on_map", FOR),
 }
 
@@ -73,8 +69,6 @@ class Features(NamedTuple):
 
     Attributes
     ----------
-    lead : float
-        By how much its evidence is greater than that of the best alternative, nats.
     solitude : float
         Minus the logarithm of the evidence of all alternatives over its own, at a high temperature.
     deviation : float
@@ -91,15 +85,12 @@ class Features(NamedTuple):
         Roots of the fractions of beams that read farther, and nearer, than the map shows.
     misfit : float
         Logarithm of the mean squared offset over what the scan's sigmas alone expect.
-    length : float
-        Root of the matched length, m^0.5.
     walls : float
         Root of the number of walls that are matched.
-    null, null_gap : float
-        The score of the mirrored scan over that of the answer, and the root of the difference, nats^0.5.
+    null_gap : float
+        Root of the answer's score less that of the mirrored scan, nats^0.5.
     """
 
-    lead: float
     solitude: float
     deviation: float
     inlier_fraction: float
@@ -109,9 +100,7 @@ class Features(NamedTuple):
     farther: float
     nearer: float
     misfit: float
-    length: float
     walls: float
-    null: float
     null_gap: float
 
 
@@ -128,16 +117,13 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     """Return the features of an answer among its alternatives, with the least null score there is."""
     lines = context.lines.rows
     per_view = _views(context)
-    length = float(best.parts @ lines["length"])
     left = (1.0 - best.parts) * lines["length"]
     unmatched = float(left @ np.interp(lines["length"], LIKE_WALLS, (0.0, 1.0)))
     offsets = best.matches["offset"] ** 2 / lines["plain_variance"]
     misfit = float(best.parts @ offsets) / max(1e-9, float(best.parts.sum()))
-    gaps = comparison.gaps[comparison.counted > 0.0]
     crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.gaps) / CROWD_TEMPERATURE)
     agreement, blocked, farther, nearer = _of_beams(context, best)
     features = Features(
-        lead=min(MAX_LEAD, float(gaps.min()) if len(gaps) else MAX_LEAD),
         solitude=-math.log(float(crowd.sum()) + math.exp(LEAST_CROWD)),
         deviation=min(MOST_DEVIATION, max(estimate.weakest, float(estimate.leverages.deviations.max(initial=0.0)))),
         inlier_fraction=best.fraction(lines),
@@ -147,9 +133,7 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
         farther=math.sqrt(farther),
         nearer=math.sqrt(nearer),
         misfit=math.log(min(MOST_MISFIT, max(LEAST_MISFIT, misfit))),
-        length=math.sqrt(length),
         walls=math.sqrt(float(estimate.leverages.own.sum())),
-        null=0.0,
         null_gap=0.0,
     )
     return with_null(Described(features, comparison, NO_NULL), best, NO_NULL)
@@ -160,7 +144,7 @@ def with_null(described: Described, best: ConsensusSet, null: Null) -> Described
     ratio = min(MOST_NULL, null.ratio(best.score))
     gap = (1.0 - ratio) * best.score
     root = math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
-    return Described(described.features._replace(null=ratio, null_gap=root), described.comparison, null)
+    return Described(described.features._replace(null_gap=root), described.comparison, null)
 
 
 def _views(context: SearchContext) -> float:

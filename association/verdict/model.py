@@ -93,7 +93,8 @@ def as_model(document: Mapping[str, Any]) -> Model:
 def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     document = json.loads(files(__package__).joinpath(FILE).read_bytes())
     models = {name: as_model(part) for name, part in document["models"].items()}
-    return models, document["manifest"], Features(**document["usual"])
+    usual = Features._make(document["usual"].get(name, 0.0) for name in Features._fields)
+    return models, document["manifest"], usual
 
 
 # By the form of the scan, "segments" or "ranges". Their manifest, see `benchmarks.manifest`, and the medians of the

@@ -54,10 +54,13 @@ def taken_by_reason(model: Model, features: Features, on_map: float) -> dict[Rea
     return taken
 
 
-def weighed_reasons(model: Model, features: Features, on_map: float) -> list[ReasonCode]:
-    """Order the reasons by the decrease of the log odds by their features; at least the first of them."""
+def weighed_reasons(model: Model, features: Features, on_map: float, among: float) -> list[ReasonCode]:
+    """Order the reasons by the decrease of the log odds by their features; at least the first of them.
+
+    `among` is the probability of the answer among its alternatives.
+    """
     taken = taken_by_reason(model, features, on_map)
-    if features.lead > NO_ALTERNATIVE:
+    if among > NO_ALTERNATIVE:
         # Many places explain a little of the scan, and none explains it about as well.
         taken["insufficient_evidence"] += max(0.0, taken.pop("similar_place"))
     ordered = sorted(taken, key=lambda code: -taken[code])

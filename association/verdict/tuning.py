@@ -13,6 +13,7 @@ TEMPERATURE = 1.5  # nats, tables; how far apart two places score that are as li
 OF_A_THING = 2.0  # nats, tables
 THING_WIDTH = 1.5  # m, tables; of doors, niches, cupboards; wider things count as several
 THINGS_APART = 0.6  # m, tables; what differs at places that are nearer is one thing
+AS_SCORED, MOST_AS_SCORED = 0.15, 12.0  # cross-validated; nats: with one thing the probability stays below 0.93
 LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 UNCOUNTED, COUNTED = 0.3, 0.75  # of the best value, tables; worse alternatives are found by chance, and do not count
 
@@ -26,7 +27,6 @@ UNLIKE_SYMMETRY, SYMMETRIC = 0.7, 0.95  # tables; fractions between which a plac
 
 # --- Features ---------------------------------------------------------------------------------------------------------
 
-MAX_LEAD = 40.0  # nats, tables
 MAX_GAP = 60.0  # nats, tables
 CROWD_TEMPERATURE = 4.0  # nats, tables
 LEAST_CROWD = -12.0
@@ -41,5 +41,5 @@ NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a similar pla
 ELSEWHERE_PROBABILITY = 0.1  # tables; likewise, below it the scan is said to be out of the map
 CONTRADICTED = 0.5  # the greatest probability of an answer then
 FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
-NO_ALTERNATIVE = 8.0  # nats, tables; an explanation that scores so much less is no alternative
+NO_ALTERNATIVE = 0.99  # tables; an answer that is so probable among its alternatives has none
 TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not returned

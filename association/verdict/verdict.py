@@ -174,7 +174,7 @@ def _as_if_alone_and_fixed(described: Described) -> Features:
 
     These questions are separate: whether the scan is of this map, where on it, and whether it fixes the position there.
     """
-    return described.features._replace(lead=USUAL.lead, solitude=USUAL.solitude, deviation=USUAL.deviation)
+    return described.features._replace(solitude=USUAL.solitude, deviation=USUAL.deviation)
 
 
 def _status(
@@ -200,7 +200,9 @@ def _reasons(verdict: Verdict, on_map: float, usable_from: float) -> tuple[Reaso
         settled.append("similar_place")
     weighed: list[ReasonCode] = []
     if verdict.status is Status.AMBIGUOUS and (verdict.probability or 0.0) < usable_from:
-        weighed = weighed_reasons(verdict.model, verdict.described.features, on_map)
+        weighed = weighed_reasons(
+            verdict.model, verdict.described.features, on_map, verdict.described.comparison.probability
+        )
         weighed = weighed[: None if verdict.by_model < usable_from else 0]
     vetoes = [
         veto
