@@ -206,12 +206,12 @@ def mounted(scan: Scan, mount: RigidTransform) -> Scan:
     return assemble([View(scan, mount)])
 
 
-def index_of(endpoints: ArrayLike, sigma: float | None = None, **others: Any) -> MapIndex:
+def index_of(endpoints: Any, sigma: float | None = None, **others: Any) -> MapIndex:
     return MapIndex.build(Segments.from_array(endpoints), sigma, **others)
 
 
 def scan_of(
-    endpoints: ArrayLike,
+    endpoints: Any,
     sigma: float = 0.02,
     viewpoint: tuple[float, float] | None = None,
     beams: Beams | None = None,

@@ -247,6 +247,7 @@ def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> 
     assert again.diagnostics.dof == result.diagnostics.registration.dof
     if sigma > 0.0:
         return
+    assert again.covariance is not None
     np.testing.assert_allclose(again.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
     assert again.diagnostics.chi2 == pytest.approx(result.diagnostics.registration.chi2, rel=1e-6)
 

@@ -299,9 +299,9 @@ def test_parts_that_are_left_out_are_empty_and_change_nothing_else(asked: tuple[
     index = index_of(walls)
     whole, part = (answer_of(index, sent, on_map=1.0, usable_from=0.5, parts=parts) for parts in (PARTS, asked))
     assert whole.usable
-    for name in PARTS:
-        assert getattr(whole, name), name
-        assert bool(getattr(part, name)) == (name in asked), name
+    for one in PARTS:
+        assert getattr(whole, one), one
+        assert bool(getattr(part, one)) == (one in asked), one
     for name in ("status", "usable", "probability", "pose", "unmatched_scan", "diagnostics", "reasons", "search"):
         assert getattr(part, name) == getattr(whole, name), name
 

@@ -76,6 +76,8 @@ def test_an_exact_view_is_the_scan_in_the_frame_of_the_robot() -> None:
     assert found.beams is not None
     assert expected.beams is not None
     np.testing.assert_allclose(found.beams.angles, expected.beams.angles, atol=1e-12)
+    assert found.beams.origins is not None
+    assert expected.beams.origins is not None
     np.testing.assert_allclose(found.beams.origins, expected.beams.origins, atol=1e-12)
 
 
