@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import asdict
 
@@ -277,3 +278,20 @@ def test_uncertain_views_of_a_building_that_repeats_itself_end_soon_after_their_
         result = answer_of(index, scan, deadline=deadline, max_alternatives=50)
         assert not result.usable
         assert result.search.complete or deadline.left > -80
+
+
+def test_an_answer_takes_little_memory() -> None:
+    """Of 3,000 walls and 200 segments of a scan, beyond the index: arrays of one answer, traced byte by byte."""
+    walls = maze(2, 3000, 220.0)
+    index = index_of(walls)
+    ends = seen(walls, pose(110.0, 110.0, 0.3), noise=0.01, radius=35.0)[0]
+    scan = scan_of(ends, viewpoint=(0.0, 0.0))
+    first = answer_of(index, scan)
+    assert len(ends) > 150
+    tracemalloc.start()
+    try:
+        assert as_json(answer_of(index, scan)) == as_json(first)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 48e6
