@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -253,6 +255,10 @@ def is_wrong(result: AssociationResult, truth: RigidTransform) -> bool:
     return result.usable and not same_pose(pose_in(result), truth, 0.3, math.radians(3.0))
 
 
+def as_json(result: AssociationResult) -> str:
+    return json.dumps(asdict(result), default=lambda array: array.tolist())
+
+
 def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
     """Return the squared error of an answer's pose, normalized by its covariance: a chi-square of three."""
     found = pose_in(result)
@@ -266,3 +272,38 @@ def warning_codes(result: AssociationResult) -> list[str]:
 
 def reason_codes(result: AssociationResult) -> list[str]:
     return [reason.code for reason in result.reasons]
+
+
+# Two rooms of which one wall differs by 10 cm.
+UNLIKE_ROOMS = equal_rooms(2)
+UNLIKE_ROOMS[12, [1, 3]] += 0.1
+
+
+def drawn(seed: int) -> tuple[Floats, Scan]:
+    """Draw a map, and a scan of it: as ranges, as segments of ranges, or as pieces of walls among clutter."""
+    rng = np.random.default_rng(seed)
+    kind = seed % 6
+    if kind < 4:
+        room, at = drawn_room(rng)
+        found = ranges(room, at, seed, bias=0.02 * (kind == 1), rate=0.8 * (kind == 2))
+        walls = room + np.tile(rng.normal(0.0, 0.02, (len(room), 2)), 2) if kind == 3 else room
+        return walls, found if seed % 12 < 6 else without_beams(found)
+    return pieces_of(seed)
+
+
+def pieces_of(seed: int) -> tuple[Floats, Scan]:
+    """Draw a map and pieces of its walls among clutter: of a room, of one of two, of a corridor, of a maze."""
+    walls, ends = ends_of(seed)
+    return walls, scan_of(ends)
+
+
+def ends_of(seed: int) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(seed)
+    kind, clutter = seed % 5, int(rng.integers(0, 5))
+    if kind < 2:
+        return (ROOM, UNLIKE_ROOMS)[kind], seen(ROOM, INSIDE, noise=0.02, cut=0.5, clutter=clutter, seed=seed)[0]
+    if kind == 2:
+        return CORRIDOR, seen(CORRIDOR, pose(4.0, 0.8, 0.05), noise=0.01, cut=0.5, seed=seed)[0]
+    x, y, theta = (*rng.uniform(10.0, 20.0, 2), rng.uniform(-3.0, 3.0))
+    at = pose(x, y, theta)
+    return maze(1), seen(maze(1), at, noise=0.02, cut=0.5, clutter=clutter, seed=seed, radius=8.0)[0]

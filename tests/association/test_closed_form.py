@@ -210,7 +210,7 @@ def test_a_segment_over_several_pieces_of_a_wall_names_them_all(oriented: bool) 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.001, 0.003])
 @pytest.mark.parametrize("step", [0.012, 0.02, 0.028])
-def test_a_map_that_is_said_to_be_exact_keeps_its_steps(step: float, sigma: float) -> None:
+def test_a_map_that_is_stated_to_be_exact_keeps_its_steps(step: float, sigma: float) -> None:
     """A scan of one side of a step in a wall is where that side is."""
     hall = np.array([[8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 7], [3, 7, 0, 7], [0, 7, 0, 0]], dtype=float)
     walls = np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], hall])
@@ -234,7 +234,7 @@ def test_a_millimetre_more_of_a_step_changes_the_probability_little(low: float) 
 @pytest.mark.parametrize("sigma", [0.0, 0.001, 0.02])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> None:
-    """With the sigma of the map, where each pair is alone on its wall; of an exact map with all that is known of it."""
+    """With the sigma of the map, each pair alone on its wall; of exact maps with covariance and chi-square."""
     ends = seen(ROOM, INSIDE, noise=0.01, cut=0.4, seed=seed)[0]
     scan = scan_of(ends, 0.01)
     result = answer_of(index_of(ROOM, sigma), scan)
@@ -253,17 +253,17 @@ def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> 
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03, None])
-def test_an_exact_twin_has_the_same_numbers(sigma: float | None) -> None:
+def test_an_equal_room_has_the_same_numbers(sigma: float | None) -> None:
     """Ambiguity, reliability, score and covariance."""
     ends = seen(ROOM, INSIDE, noise=0.02, cut=0.4, clutter=2, seed=1)[0]
     result = answer_of(index_of(equal_rooms(2), sigma), scan_of(ends))
-    (twin,), diagnostics = result.alternatives, result.diagnostics
+    (other,), diagnostics = result.alternatives, result.diagnostics
     assert diagnostics is not None
-    assert (twin.score, twin.inlier_fraction) == pytest.approx((diagnostics.score, diagnostics.inlier_fraction))
-    assert twin.reliability == pytest.approx(diagnostics.registration.reliability)
+    assert (other.score, other.inlier_fraction) == pytest.approx((diagnostics.score, diagnostics.inlier_fraction))
+    assert other.reliability == pytest.approx(diagnostics.registration.reliability)
     for name in ("rotation", "translation"):
         expected = getattr(diagnostics.registration.ambiguity, name)
-        assert getattr(twin.ambiguity, name) == pytest.approx(expected, rel=1e-6)
-    assert twin.covariance is not None
-    np.testing.assert_allclose(twin.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
+        assert getattr(other.ambiguity, name) == pytest.approx(expected, rel=1e-6)
+    assert other.covariance is not None
+    np.testing.assert_allclose(other.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
     assert diagnostics.margin == pytest.approx(0.0, abs=1e-6)

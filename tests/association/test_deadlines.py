@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -36,6 +34,7 @@ from .scenes import (
     ROOM,
     Floats,
     answer_of,
+    as_json,
     equal_rooms,
     index_of,
     maze,
@@ -76,10 +75,6 @@ class CancelledAtALook(Looks):
         if self.left == -1:
             self.cancel()
         return self.left < 0
-
-
-def as_json(found: AssociationResult) -> str:
-    return json.dumps(asdict(found), default=lambda value: value.tolist())
 
 
 def answered(scan: Scan, deadline: Deadline, *, exhaustive: bool = False) -> AssociationResult:
@@ -171,7 +166,7 @@ def test_a_search_that_another_thread_cancels_returns() -> None:
     deadline, began, raised = Deadline(), threading.Event(), threading.Event()
 
     class Begun(Deadline):
-        """One that says that the search has looked at it."""
+        """One that reports the first look of the search."""
 
         @property
         def passed(self) -> bool:

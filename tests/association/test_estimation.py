@@ -111,7 +111,7 @@ def tried(errors: MapErrors = AS_BUILT, sigma: float | None = None, count: int =
     [
         pytest.param(AS_BUILT, None, {}, 0.03, 4.0, id="exact map"),
         pytest.param(AS_BUILT, None, {"with_beams": False}, 0.03, 4.0, id="exact map, as segments"),
-        pytest.param(AS_BUILT, 0.0, {}, 0.8, 5.0, id="exact map, said to be exact"),
+        pytest.param(AS_BUILT, 0.0, {}, 0.8, 5.0, id="exact map, stated to be exact"),
         pytest.param(OFF, None, {}, 0.8, 4.5, id="walls off by 2 cm"),
         pytest.param(OFF, None, {"with_beams": False}, 0.8, 4.5, id="walls off by 2 cm, as segments"),
         pytest.param(OFF, 0.02, {}, 0.8, 4.5, id="walls off by 2 cm, stated"),

@@ -88,7 +88,7 @@ def test_equal_rooms_are_not_usable(rooms: int) -> None:
         assert "about as well" in message_of(result)
 
 
-def test_the_fleets_belief_that_it_is_on_the_map_does_not_tell_equal_rooms_apart() -> None:
+def test_the_prior_to_be_on_the_map_does_not_decide_between_equal_rooms() -> None:
     walls = hotel(3)
     index = index_of(walls)
     for scan, _ in scans_in(walls, 1):
@@ -365,7 +365,7 @@ def test_a_map_that_is_far_off_is_not_degenerate_where_the_pose_is_fixed(sigma: 
 # --- Places that are not on the map -----------------------------------------------------------------------------------
 
 
-def strange(k: int) -> tuple[Floats, Scan]:
+def out_of_map(k: int) -> tuple[Floats, Scan]:
     """Return the map of one drawn room, and the scan of another."""
     room, _ = drawn_room(np.random.default_rng([1, k]))
     other, at = drawn_room(np.random.default_rng([2, k]))
@@ -376,7 +376,7 @@ def test_another_building_is_not_usable() -> None:
     """Of 80 scans; and each refused answer has its reason."""
     usable = 0
     for k in range(40):
-        walls, scan = strange(k)
+        walls, scan = out_of_map(k)
         for sent in (scan, without_beams(scan)):
             result = answer_of(index_of(walls), sent)
             usable += result.usable
@@ -385,8 +385,8 @@ def test_another_building_is_not_usable() -> None:
 
 
 def test_another_building_is_not_usable_for_a_fleet_that_cannot_leave_but_rarely() -> None:
-    """`on_map=1` says that this does not happen; walls that do not fit still speak."""
-    usable = sum(answer_of(index_of(walls), scan, on_map=1.0).usable for walls, scan in map(strange, range(40)))
+    """`on_map=1` excludes such scans; walls that do not fit still count."""
+    usable = sum(answer_of(index_of(walls), scan, on_map=1.0).usable for walls, scan in map(out_of_map, range(40)))
     assert usable <= 2
 
 
@@ -466,12 +466,12 @@ def best_of_two_rooms(walls: Floats, scan: Scan, at: RigidTransform) -> Associat
     return result
 
 
-def test_a_wall_that_the_other_room_lacks_speaks_for_this_one() -> None:
+def test_a_wall_that_the_other_room_lacks_counts_for_this_one() -> None:
     at = pose(3.0, 2.0, 0.3)
     best_of_two_rooms(equal_rooms(2)[:-1], scan_of(seen(ROOM, at, noise=0.01, seed=1)[0]), at)
 
 
-def test_a_wall_that_should_hide_another_speaks_against_a_pose() -> None:
+def test_a_wall_that_should_hide_another_counts_against_a_pose() -> None:
     """Two equal rooms, one with a screen across that the scan sees through: it is the other one."""
     rooms = np.vstack([equal_rooms(2), [[16.5, 0.5, 16.5, 3.5]]])
     at = pose(3.0, 2.0, 0.3)

@@ -18,10 +18,12 @@ from .scenes import (
     INSIDE,
     ROOM,
     answer_of,
+    drawn,
     drawn_room,
     equal_rooms,
     index_of,
     maze,
+    pieces_of,
     pose,
     pose_in,
     ranges,
@@ -31,7 +33,6 @@ from .scenes import (
     seen,
     without_beams,
 )
-from .test_equivariance import drawn, pieces_of
 
 SEEDS = st.integers(0, 10**6)
 FEW = settings(max_examples=20, deadline=None, phases=[Phase.explicit, Phase.generate])
@@ -277,7 +278,7 @@ def test_segments_may_have_to_lie_on_the_map_from_end_to_end() -> None:
 
 
 @pytest.mark.parametrize("most", [0, 2, 50])
-def test_other_poses_come_best_first_and_no_more_than_asked_for(most: int) -> None:
+def test_other_poses_come_best_first_and_no_more_than_requested(most: int) -> None:
     """Of four equal rooms the last lacks a wall."""
     index = index_of(equal_rooms(4)[:-1])
     result = answer_of(index, scan_of(seen(ROOM, INSIDE, noise=0.02, seed=1)[0]), max_alternatives=most)
@@ -291,17 +292,17 @@ def test_other_poses_come_best_first_and_no_more_than_asked_for(most: int) -> No
         assert result.alternatives[-1].inlier_fraction < result.alternatives[0].inlier_fraction
 
 
-@pytest.mark.parametrize("asked", [(), ("correspondences",), ("missing_map",), ("alternatives", "missing_map")])
-def test_parts_that_are_left_out_are_empty_and_change_nothing_else(asked: tuple[Any, ...]) -> None:
+@pytest.mark.parametrize("parts", [(), ("correspondences",), ("missing_map",), ("alternatives", "missing_map")])
+def test_parts_that_are_left_out_are_empty_and_change_nothing_else(parts: tuple[Any, ...]) -> None:
     """Of a usable answer with an alternative, and a wall through which it sees."""
     walls = np.vstack([ROOM, ROOM[:6] + np.tile([12.0, 0.0], 2), [[4.0, 3.3, 5.0, 3.4]]])
     sent = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0], viewpoint=(0.0, 0.0))
     index = index_of(walls)
-    whole, part = (answer_of(index, sent, on_map=1.0, usable_from=0.5, parts=parts) for parts in (PARTS, asked))
+    whole, part = (answer_of(index, sent, on_map=1.0, usable_from=0.5, parts=which) for which in (PARTS, parts))
     assert whole.usable
     for one in PARTS:
         assert getattr(whole, one), one
-        assert bool(getattr(part, one)) == (one in asked), one
+        assert bool(getattr(part, one)) == (one in parts), one
     for name in ("status", "usable", "probability", "pose", "unmatched_scan", "diagnostics", "reasons", "search"):
         assert getattr(part, name) == getattr(whole, name), name
 

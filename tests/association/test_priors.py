@@ -214,8 +214,8 @@ def test_a_small_window_makes_the_search_short() -> None:
         assert result.search.hypotheses < 1000
 
 
-def test_a_prior_does_not_make_a_strange_scan_usable() -> None:
-    """Two walls at right angles, however near the prior says they are."""
+def test_a_prior_does_not_make_too_few_walls_usable() -> None:
+    """Two walls at right angles, with a prior that holds all of the map."""
     index = index_of(LOBBY)
     corner = scan_of([[-3.0, -1.0, 4.5, -1.0], [4.5, -1.0, 4.5, 1.5]], viewpoint=(0.0, 0.0))
     found = answer_of(index, corner, HardPrior(pose(3.5, 1.0), 20.0, 3.2))

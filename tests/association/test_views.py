@@ -152,8 +152,8 @@ def test_a_second_view_tells_two_rooms_apart(with_beams: bool) -> None:
 
 def test_correspondences_and_unmatched_segments_are_numbered_through_all_views() -> None:
     """In the order of the views."""
-    strange = np.array([[0.5, 0.3, 1.5, 1.1]])
-    first, second = scan_of(np.vstack([ENDS, strange])), scan_of(np.vstack([strange, ENDS]))
+    clutter = np.array([[0.5, 0.3, 1.5, 1.1]])
+    first, second = scan_of(np.vstack([ENDS, clutter])), scan_of(np.vstack([clutter, ENDS]))
     scan = assemble([View(first), View(second)])
     result = answer_of(INDEX, scan)
     count = len(ENDS)
@@ -316,7 +316,7 @@ def test_a_drive_whose_last_view_is_of_another_place_is_not_usable() -> None:
 
 
 @pytest.mark.parametrize("count", [2, 4])
-def test_views_of_one_place_are_not_more_witnesses(count: int) -> None:
+def test_views_of_one_place_are_not_more_evidence(count: int) -> None:
     """Of two equal rooms, however often the robot looks."""
     index = index_of(equal_rooms(2))
     result = answer_of(
@@ -353,4 +353,4 @@ def test_a_second_view_fixes_a_corridor() -> None:
     assert same_pose(pose_in(result), here, 0.15, 0.03)
     assert result.covariance is not None
     along = math.sqrt(result.covariance[0, 0])
-    assert 0.01 < along < 0.15, "the step is not known better than that"
+    assert 0.01 < along < 0.15, "no better than the covariance of the step"
