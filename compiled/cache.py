@@ -112,35 +112,25 @@ def digest() -> str:
 
 def sources() -> list[Path]:
     """Return the files that machine code depends on, sorted within each package."""
-    here = sorted(Path(__file__).parent.glob("*.py"))
-    return here + [path for package in PACKAGES for path in _sources_of(package)]
-
-
-def _sources_of(package: str) -> Iterator[Path]:
-    spec = find_spec(package)
-    if spec is not None and spec.submodule_search_locations:
-        home = Path(spec.submodule_search_locations[0])
-        yield from sorted({path for pattern in SOURCES for path in home.glob(pattern)})
+    folders: list[tuple[Path, tuple[str, ...]]] = [(Path(__file__).parent, ("*.py",))]
+    specs = [spec for spec in map(find_spec, PACKAGES) if spec is not None]
+    folders += [(Path(home), SOURCES) for spec in specs for home in (spec.submodule_search_locations or ())[:1]]
+    return [path for folder, some in folders for path in sorted({path for one in some for path in folder.glob(one)})]
 
 
 def _processor() -> tuple[str, str]:
-    """Return the name and the features of the processor that is compiled for.
+    """Return the name and the features of the processor that is compiled for; where not on Linux, its architecture.
 
     Numba stores which processor its code is for, and compiles again on another. The directory of another is another one
     all the same, because `is_complete` holds for one processor.
     """
-    name, features = _described_by(CPU_NAME), _described_by(CPU_FEATURES)
-    return os.environ.get("NUMBA_CPU_NAME") or name, os.environ.get("NUMBA_CPU_FEATURES", features)
-
-
-def _described_by(keys: tuple[str, ...]) -> str:
-    """Return what Linux states of the first processor by some keys; of another system, the architecture."""
     try:
-        first, _, _ = Path("/proc/cpuinfo").read_text().partition("\n\n")
+        lines = Path("/proc/cpuinfo").read_text().partition("\n\n")[0].splitlines()
     except OSError:
-        return platform.machine()
-    lines = (line.partition(":") for line in first.splitlines())
-    return ", ".join(value.strip() for key, _, value in lines if key.strip() in keys)
+        lines = [f"{key}: {platform.machine()}" for key in ("model", "flags")]
+    facts = [(key.strip(), value.strip()) for key, _, value in (line.partition(":") for line in lines)]
+    name, features = (", ".join(value for key, value in facts if key in keys) for keys in (CPU_NAME, CPU_FEATURES))
+    return os.environ.get("NUMBA_CPU_NAME") or name, os.environ.get("NUMBA_CPU_FEATURES", features)
 
 
 def _candidates() -> Iterator[Path]:

@@ -1,6 +1,6 @@
 """The paper's equations as they are printed, to see what they give; nothing else uses them.
 
-What is wrong with each is reported in the docstrings; `registration.one_step` has them right.
+What is wrong with each is reported in the docstrings; `registration.sums` has them right.
 """
 
 from __future__ import annotations

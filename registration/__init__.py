@@ -1,14 +1,12 @@
 """Known correspondences: the rigid transform that fits paired line segments, and how far to trust it."""
 
-from .beams import Beams
 from .correspondences import Correspondences
 from .errors import InputError, InvalidArgumentError, InvalidSegmentsError, RegistrationError
-from .joint import JointSums
-from .one_step import OneStepSums
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
-from .segments import MeasuredSegments, Segments
+from .segments import Beams, MeasuredSegments, Segments
 from .solve import register
+from .sums import JointSums, OneStepSums
 from .transform import IDENTITY, RigidTransform, wrap_angle
 from .wall_error import register_estimating
 

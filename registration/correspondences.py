@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError
-from .kernels import pairs as kernels
-from .layout import LEAST_POINTS, PAIR, Floats, Records, X, Y
+from .layout import LEAST_POINTS, Floats, X, Y
 from .segments import MeasuredSegments, Segments
-from .tables import Drawn, Points
 
 Indices = NDArray[np.intp]
 Point = Floats | tuple[float, float]
+
+MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
+SCAN, MAP = 0, 1  # columns of the (n, 2) indices that name pairs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,11 +27,28 @@ class Correspondences:
 
     Attributes
     ----------
-    rows : (n,) PAIR
-        The values of the properties.
+    map_directions : (n, 2) unit directions of the map segments
+    map_midpoints : (n, 2) their midpoints, metres
+    map_offsets : (n,) signed distances of the map lines from the map frame's origin, metres
+    map_lengths : (n,) metres
+    directions : (n, 2) unit directions of the scan segments
+    midpoints : (n, 2) their midpoints, metres
+    lengths : (n,) metres
+    centroids : (n, 2) means of the points behind the scan segments, metres
+    spreads : (n,) second moments of those points along the scan segments, m^2
+    variances : (n,) variances of the scan segments' offsets, ``sigma^2 / points``, m^2
     """
 
-    rows: Records
+    map_directions: Floats
+    map_midpoints: Floats
+    map_offsets: Floats
+    map_lengths: Floats
+    directions: Floats
+    midpoints: Floats
+    lengths: Floats
+    centroids: Floats
+    spreads: Floats
+    variances: Floats
 
     @classmethod
     def of(cls, map_segments: Segments, scan: MeasuredSegments, pairs: ArrayLike) -> Correspondences:
@@ -49,114 +68,68 @@ class Correspondences:
             of the first row at fault.
         """
         chosen, m, s = _as_pairs(pairs), map_segments, scan.segments
-        rows = np.empty(len(chosen), PAIR)
-        on_map, of_scan = Drawn(m.directions, m.midpoints, m.lengths), Drawn(s.directions, s.midpoints, s.lengths)
-        points = Points(scan.centroids, scan.spreads, scan.sigma, scan.point_counts)
-        row, column, fewest = kernels.fill_in(rows, chosen, on_map, of_scan, points)
-        if row >= 0:
-            count, what = (len(s), "scan") if column == kernels.SCAN else (len(m), "map")
-            raise InvalidArgumentError(
-                f"expected a {what} index from 0 to {count - 1}, found {chosen[row, column]}"
-                if count
-                else f"the {what} has no segments",
-                argument="correspondences",
-                index=row,
-            )
-        if not scan.counted and fewest < LEAST_POINTS:
-            together = np.bincount(chosen[:, 1], scan.point_counts[chosen[:, 0]])[chosen[:, 1]]
-            rows["scan"]["variance"] *= np.minimum(1.0, together / LEAST_POINTS)
-        return cls(rows)
+        _require_indices(chosen, len(s), len(m))
+        i, j = chosen[:, SCAN], chosen[:, MAP]
+        sigmas, counts = scan.sigma[i], scan.point_counts[i]
+        variances = np.where(sigmas > 0.0, np.maximum(sigmas, MIN_SIGMA), 0.0) ** 2 / counts
+        if not scan.counted and scan.point_counts.min(initial=LEAST_POINTS) < LEAST_POINTS:
+            variances *= np.minimum(1.0, np.bincount(j, counts)[j] / LEAST_POINTS)
+        on_map = m.directions[j], m.midpoints[j], m.offsets[j], m.lengths[j]
+        seen = s.directions[i], s.midpoints[i], s.lengths[i], scan.centroids[i], scan.spreads[i]
+        return cls(*on_map, *seen, variances)
 
     def __len__(self) -> int:
-        return len(self.rows)
-
-    @property
-    def map_directions(self) -> Floats:
-        """Unit directions of the map segments, (n, 2)."""
-        return _vectors(self.rows["map"], "dx", "dy")
+        return len(self.lengths)
 
     @property
     def map_normals(self) -> Floats:
         """Left normals of the map segments, (n, 2)."""
-        return _left(self.map_directions)
-
-    @property
-    def map_midpoints(self) -> Floats:
-        """Midpoints of the map segments, (n, 2) metres."""
-        return _vectors(self.rows["map"], "x", "y")
-
-    @property
-    def map_offsets(self) -> Floats:
-        """Signed distances of the map lines from the map frame's origin, (n,) metres."""
-        return self.rows["map"]["offset"]
-
-    @property
-    def map_lengths(self) -> Floats:
-        """Lengths of the map segments, (n,) metres."""
-        return self.rows["map"]["length"]
-
-    @property
-    def directions(self) -> Floats:
-        """Unit directions of the scan segments, (n, 2)."""
-        return _vectors(self.rows["scan"], "dx", "dy")
-
-    @property
-    def midpoints(self) -> Floats:
-        """Midpoints of the scan segments, (n, 2) metres."""
-        return _vectors(self.rows["scan"], "x", "y")
+        return np.stack([-self.map_directions[:, Y], self.map_directions[:, X]], axis=1)
 
     @property
     def offsets(self) -> Floats:
         """Signed distances of the scan lines from the scan frame's origin, (n,) metres."""
-        return _dots(_left(self.directions), self.midpoints)
-
-    @property
-    def lengths(self) -> Floats:
-        """Lengths of the scan segments, (n,) metres."""
-        return self.rows["scan"]["length"]
-
-    @property
-    def centroids(self) -> Floats:
-        """Means of the points behind the scan segments, (n, 2) metres."""
-        return _vectors(self.rows["scan"], "centroid_x", "centroid_y")
-
-    @property
-    def spreads(self) -> Floats:
-        """Second moments of those points along the scan segments, (n,) m^2."""
-        return self.rows["scan"]["spread"]
-
-    @property
-    def variances(self) -> Floats:
-        """Variances of the scan segments' offsets, ``sigma^2 / points``, (n,) m^2."""
-        return self.rows["scan"]["variance"]
+        return cross(self.directions, self.midpoints)
 
     def angles(self, theta: float) -> Floats:
         """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
-        return kernels.relative_angles(self.rows, theta)
+        cosines = np.einsum("ij,ij->i", self.directions, self.map_directions)
+        return wrapped(np.arctan2(cross(self.directions, self.map_directions), cosines) - theta)
 
     def take(self, rows: NDArray[np.bool_] | Indices | slice) -> Correspondences:
         """Return some of the pairs."""
-        return Correspondences(self.rows[rows])
+        return Correspondences(*(getattr(self, name)[rows] for name in self.__slots__))
 
     def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
-        (map_x, map_y), (scan_x, scan_y) = map_origin, scan_origin
-        moved = np.empty(len(self), PAIR)
-        kernels.move_origins(self.rows, float(map_x), float(map_y), float(scan_x), float(scan_y), moved)
-        return Correspondences(moved)
+        on_map = self.map_midpoints - map_origin
+        return replace(
+            self,
+            map_midpoints=on_map,
+            map_offsets=cross(self.map_directions, on_map),
+            midpoints=self.midpoints - scan_origin,
+            centroids=self.centroids - scan_origin,
+        )
 
 
-def _vectors(records: Records, x: str, y: str) -> Floats:
-    return np.stack([records[x], records[y]], axis=1)
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return ``a_x b_y - a_y b_x`` of two arrays (n, 2), (n,)."""
+    return a[:, X] * b[:, Y] - a[:, Y] * b[:, X]
 
 
-def _left(directions: Floats) -> Floats:
-    return np.stack([-directions[:, Y], directions[:, X]], axis=1)
+def wrapped(angles: Floats) -> Floats:
+    """Return the same angles from -pi to pi, radians."""
+    return angles - math.tau * np.rint(angles / math.tau)
 
 
-def _dots(a: Floats, b: Floats) -> Floats:
-    products: Floats = np.einsum("ij,ij->i", a, b)
-    return products
+def _require_indices(pairs: Indices, scan_count: int, map_count: int) -> None:
+    for column, count, what in ((SCAN, scan_count, "scan"), (MAP, map_count, "map")):
+        outside = (pairs[:, column] < 0) | (pairs[:, column] >= count)
+        if outside.any():
+            row = int(np.argmax(outside))
+            expected = f"expected a {what} index from 0 to {count - 1}, found {pairs[row, column]}"
+            message = expected if count else f"the {what} has no segments"
+            raise InvalidArgumentError(message, argument="correspondences", index=row)
 
 
 def _as_pairs(pairs: ArrayLike) -> Indices:

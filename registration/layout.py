@@ -41,27 +41,6 @@ SEEN = np.dtype(
     ]
 )  # fmt: skip
 
-# The map's side of a pair: a line, and the segment on it.
-MAP_SIDE = np.dtype(
-    [
-        *LINE.descr,
-        ("x", "f8"), ("y", "f8"),  # m, midpoint
-        ("length", "f8"),  # m
-    ]
-)  # fmt: skip
-
-# The scan's side of a pair.
-SCAN_SIDE = np.dtype(
-    [
-        *SEEN.descr,
-        ("x", "f8"), ("y", "f8"),  # m, midpoint
-        ("length", "f8"),  # m
-        ("variance", "f8"),  # m^2, of the segment's offset
-    ]
-)  # fmt: skip
-
-PAIR = np.dtype([("map", MAP_SIDE), ("scan", SCAN_SIDE)])
-
 # Sums over pairs for the joint estimator: the upper triangle of Q in ``cost = x' Q x`` with ``x = [cos, sin, t_x, t_y,
 # 1]``, named by c, s, x, y and 1; Q has the unit of the weights times that of the two factors of x, which m^2 goes with
 # for c and s, m for a translation with them, and so on.
@@ -93,7 +72,6 @@ ONE_STEP_SUMS = np.dtype(
 
 # The upper triangle of a symmetric matrix of x, y (m) and theta (rad): a covariance, or its inverse, an information.
 SYMMETRIC3 = np.dtype([("xx", "f8"), ("xy", "f8"), ("xt", "f8"), ("yy", "f8"), ("yt", "f8"), ("tt", "f8")])
-COVARIANCE = SYMMETRIC3
 INFORMATION = SYMMETRIC3
 
 # p_map = R(theta) p_scan + (x, y).
@@ -101,40 +79,6 @@ POSE = np.dtype(
     [
         ("theta", "f8"),  # rad
         ("x", "f8"), ("y", "f8"),  # m
-    ]
-)  # fmt: skip
-
-# Options of a fit, with 1 for yes: by the paper's estimator, else by the joint one; whether the transform is given
-# instead; whether directions mean anything; by Wahba's rotation, else by Mitsuta's; whether the weights used are what
-# is taken for 1 / variance; whether a covariance is wanted, and the ambiguity somewhere else. Up to what chi-square of
-# their angles lines are parallel. The given transform, and the additional pose for the ambiguity, map_from_scan.
-FITTING = np.dtype(
-    [
-        *((name, "i8") for name in ("one_step", "given", "oriented", "wahba", "informed", "covariance", "elsewhere")),
-        ("parallel", "f8"),
-        ("at", POSE),
-        ("other", POSE),
-    ]
-)
-
-# The result of an estimator: the transform, map_from_scan, and its translation between the middles of both sets; its
-# covariance, where it is wanted and there is one; what is free, see `kernels.observability`, along which unit vector,
-# that points right or straight up, and how far, m; whether only one way to turn the segments round fits, and whether
-# any scan segment runs against its map segment; how many pairs count, their chi-square, and the root mean squares of
-# their offsets (m) and angles (rad); the paper's costs of translation and rotation there, at T = 0 and where else they
-# are asked; its determinant and reliability.
-FITTED = np.dtype(
-    [
-        ("pose", POSE),
-        ("between", [("x", "f8"), ("y", "f8")]),
-        ("covariance", SYMMETRIC3),
-        ("free", "i8"), ("free_x", "f8"), ("free_y", "f8"), ("slack", "f8"),
-        ("unique", "i8"), ("against", "i8"), ("count", "i8"),
-        ("chi2", "f8"), ("rms_offset", "f8"), ("rms_angle", "f8"),
-        ("translation", "f8"), ("rotation", "f8"),
-        ("translation_before", "f8"), ("rotation_before", "f8"),
-        ("translation_elsewhere", "f8"), ("rotation_elsewhere", "f8"),
-        ("determinant", "f8"), ("reliability", "f8"),
     ]
 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Validated sets of directed line segments."""
+"""Validated sets of directed line segments, and the single ranges that they are made of."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError, InvalidSegmentsError
-from .kernels.segments import are_within, lines_of
+from .kernels.arrays import lines_of
 from .layout import Floats
 from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
+from .transform import RigidTransform
 
-ALONG, ACROSS = (
-    np.array([-1.0, 1.0]),
-    np.array([1.0, -1.0]),
-)  # of y for -y
+ALONG, ACROSS = np.array([-1.0, 1.0]), np.array([1.0, -1.0])  # of y for -y
 ACROSS_BOTH = np.tile(ACROSS, 2)
 DEFAULT_POINT_SPACING = 0.05  # m, what a segment without a count of points is taken to have
 
@@ -79,11 +77,11 @@ class Segments:
                 f"expected numbers of shape (n, 4), found {raw.dtype} of shape {raw.shape}", argument=argument
             )
         e = np.array(raw, dtype=np.float64, order="C")
-        if not are_within(e.reshape(-1), -MAX_COORDINATE, MAX_COORDINATE):
+        if not _are_within(e, -MAX_COORDINATE, MAX_COORDINATE):
             _refuse(~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
             _refuse((np.abs(e) > MAX_COORDINATE).any(axis=1), f"has a coordinate beyond {MAX_COORDINATE:g} m", argument)
         found = cls._lines(e)
-        if not are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
+        if not _are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
             _refuse(found.lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
             _refuse(found.lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
         return found
@@ -101,7 +99,10 @@ class Segments:
 
     @classmethod
     def _lines(cls, e: Floats) -> Segments:
-        return cls(*map(_frozen, (e, *lines_of(e))))
+        n = len(e)
+        derived = np.empty((n, 2)), np.empty((n, 2)), np.empty(n), np.empty(n), np.empty((n, 2))
+        lines_of(e, *derived)
+        return cls(*map(_frozen, (e, *derived)))
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -131,6 +132,11 @@ class Segments:
         """Return the segments moved by a vector of 2 metres, to work near the origin."""
         offset = np.asarray(by, dtype=np.float64)
         return Segments.derived(self.endpoints + np.tile(offset, 2))
+
+
+def _are_within(values: Floats, low: float, high: float) -> bool:
+    """Tell whether all values are numbers from `low` to `high`, which are finite."""
+    return bool(((values >= low) & (values <= high)).all())  # so written that nan is not
 
 
 def _refuse(bad: NDArray[np.bool_] | np.bool_, what: str, argument: str) -> None:
@@ -163,8 +169,10 @@ class MeasuredSegments:
     def __post_init__(self) -> None:
         # For a kernel an array that may be written to is another type, and each type is compiled separately.
         for name in ("sigma", "point_counts", "centroids", "spreads"):
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-            object.__setattr__(self, name, _frozen(array.view()))
+            given = getattr(self, name)
+            if given.flags.writeable or not given.flags.c_contiguous or given.dtype != np.float64:
+                array = np.ascontiguousarray(given, dtype=np.float64)
+                object.__setattr__(self, name, _frozen(array.view()))
 
     @classmethod
     def from_segments(
@@ -222,10 +230,46 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
         array = array.reshape(shape)
     if array.shape != shape:
         raise InvalidArgumentError(f"expected shape {shape}, found {array.shape}", argument=argument)
-    if not are_within(array.reshape(-1), low, high):
+    if not _are_within(array, low, high):
         bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
         index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
         raise InvalidArgumentError(
             f"expected a number from {low:g} to {high:g}, found {array[bad][0]:g}", argument=argument, index=index
         )
     return _frozen(array)
+
+
+@dataclass(frozen=True, slots=True)
+class Beams:
+    """Single range measurements, evidence for and against a pose.
+
+    Attributes
+    ----------
+    angles : (m,) radians in the scan frame
+    ranges : (m,) metres; inf where the beam came back from nothing within `range_max`; nan where nothing is known
+    range_max : float
+        Metres; how far a beam without return is known to be free; inf where the scanner does not say.
+    origins : (m, 2) or None
+        Origin of each beam in the scan frame, metres; None: at the scan's viewpoint.
+    """
+
+    angles: Floats
+    ranges: Floats
+    range_max: float
+    origins: Floats | None = None
+
+    def mirrored(self) -> Beams:
+        """Return them with left and right exchanged, in reverse order."""
+        origins = None if self.origins is None else np.ascontiguousarray(self.origins[::-1] * ACROSS)
+        angles, ranges = np.ascontiguousarray(-self.angles[::-1]), np.ascontiguousarray(self.ranges[::-1])
+        return Beams(angles, ranges, self.range_max, origins)
+
+    def scaled(self, factor: float) -> Beams:
+        """Return them with all lengths multiplied."""
+        origins = None if self.origins is None else self.origins * factor
+        return Beams(self.angles, self.ranges * factor, self.range_max * factor, origins)
+
+    def moved(self, by: RigidTransform, viewpoint: tuple[float, float]) -> Beams:
+        """Return them in another frame; those without an origin of their own begin at `viewpoint`."""
+        origins = np.tile(np.asarray(viewpoint), (len(self.angles), 1)) if self.origins is None else self.origins
+        return Beams(self.angles + by.theta, self.ranges, self.range_max, by.apply(origins))

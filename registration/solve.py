@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import math
+import sys
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .correspondences import Correspondences
-from .diagnostics import no_answer, result_of
-from .kernels.fitting import fit
-from .layout import FITTED, FITTING, Records, record
-from .observability import most_parallel
-from .options import Estimator, RegistrationOptions, Rotation
-from .result import RegistrationResult
+from .correspondences import Correspondences, cross
+from .fitting import Fit, Problem
+from .layout import Floats
+from .observability import Free, chi_square_quantile
+from .options import RegistrationOptions
+from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .transform import RigidTransform
-from .weights import PairWeights, weigh
+from .weights import weigh
 
 DEFAULT_OPTIONS = RegistrationOptions()
-NOT_KNOWN = np.zeros(0)
+TAIL = 0.001  # probability that chi2 of right pairs is larger; an answer beyond it is not usable
 
 
 def register(
@@ -61,37 +61,73 @@ def register(
     given = Correspondences.of(map_segments, scan, pairs)
     weights = weigh(given, map_sigma, options)
     if not len(given):
-        return no_answer(options)
-
-    noise = NOT_KNOWN if weights.noise is None else weights.noise
-    fitted = record(FITTED)
-    how = _how(weights, options, at)
-    offsets, angles = fit(given.rows, weights.used, weights.information, noise, how, fitted)
-    return result_of(fitted, offsets, angles, weights, options)
+        return _no_answer(options)
+    problem, every = Problem.of(given, weights, oriented=options.oriented)
+    return _result_of(problem, every, problem.fit(options, at), weights.used, options)
 
 
-def _how(weights: PairWeights, options: RegistrationOptions, at: RigidTransform | None) -> Records:
-    """Return what the fit goes by, (1,) of `FITTING`."""
-    # None but a caller's own weights are 0.
-    count = len(weights.used) if options.weights is None else int(np.count_nonzero(weights.used))
-    informed = weights.information is weights.used
-    usual = _usual(options.estimator, options.rotation, count, oriented=options.oriented, informed=informed)
-    how = np.frombuffer(bytearray(usual), FITTING)
-    for place, pose in (("at", at), ("other", options.evaluate_at)):
-        if pose is not None:
-            how[place] = pose.theta, pose.x, pose.y
-    if at is not None:
-        how["given"] = 1
-    if options.evaluate_at is not None:
-        how["elsewhere"] = 1
-    return how
+def _no_answer(options: RegistrationOptions) -> RegistrationResult:
+    """Return what there is to say about no pairs at all."""
+    zero = Ambiguity(0.0, 0.0)
+    at = None if options.evaluate_at is None else zero
+    nothing = np.zeros(0)
+    return RegistrationResult(
+        degenerate=True,
+        usable=False,
+        pose=None,
+        covariance=None,
+        unobservable=None,
+        offsets=nothing,
+        angles=nothing,
+        weights=nothing,
+        diagnostics=RegistrationDiagnostics(zero, zero, at, None, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0),
+    )
 
 
-@lru_cache
-def _usual(estimator: Estimator, rotation: Rotation, count: int, *, oriented: bool, informed: bool) -> bytes:
-    """Return a `FITTING` without a pose, for so many pairs that count, as bytes: numpy takes long to make one."""
-    how = record(FITTING)
-    how["one_step"], how["covariance"] = estimator == "one_step", estimator == "joint"
-    how["wahba"], how["oriented"], how["informed"] = rotation == "wahba", oriented, informed
-    how["parallel"] = most_parallel(count)
-    return how.tobytes()
+def _result_of(
+    problem: Problem, every: Correspondences, fit: Fit, used: Floats, options: RegistrationOptions
+) -> RegistrationResult:
+    """Return the result of a fit to `every` pair that the estimator weighs by `used`."""
+    free, between = fit.freedom.what, fit.between
+    offsets = cross(every.map_directions, between.apply(every.midpoints)) - every.map_offsets
+    angles = every.angles(between.theta)
+    degenerate = free is not Free.NOTHING or not problem.unique
+    diagnostics = _diagnostics(problem, fit, options, offsets[used > 0.0], angles[used > 0.0])
+    fits = diagnostics.chi2 <= chi_square_quantile(diagnostics.dof, TAIL)
+    if options.oriented and (np.abs(angles) > 0.5 * math.pi).any():
+        fits = False
+    return RegistrationResult(
+        degenerate=degenerate,
+        usable=not degenerate and fits,
+        pose=fit.pose.shifted(*problem.middles[0].tolist()),
+        covariance=fit.covariance,
+        unobservable=fit.freedom.direction if free in (Free.DIRECTION, Free.PARALLEL) else None,
+        offsets=offsets,
+        angles=angles,
+        weights=used,
+        diagnostics=diagnostics,
+    )
+
+
+def _diagnostics(
+    problem: Problem, fit: Fit, options: RegistrationOptions, offsets: Floats, angles: Floats
+) -> RegistrationDiagnostics:
+    """Return the diagnostics of a fit; offsets and angles are those of the pairs that count."""
+    map_x, map_y = problem.middles[0].tolist()
+    elsewhere = [] if options.evaluate_at is None else [options.evaluate_at.shifted(-map_x, -map_y)]
+    ambiguities = problem.ambiguities([fit.pose, RigidTransform(-map_x, -map_y, 0.0), *elsewhere], options)
+    total, count = ambiguities[0].total, len(offsets)
+    determinant, reliability = problem.determinant_and_reliability()
+    return RegistrationDiagnostics(
+        ambiguity=ambiguities[0],
+        ambiguity_before=ambiguities[1],
+        ambiguity_at=ambiguities[2] if elsewhere else None,
+        similarity=1.0 / total if total > sys.float_info.min else None,
+        reliability=reliability,
+        determinant=determinant,
+        chi2=problem.chi_square(fit.between),
+        dof=2 * count - (2 if fit.freedom.what is Free.PARALLEL else 3),
+        rms_offset=math.sqrt(float(offsets @ offsets) / count),
+        rms_angle=math.sqrt(float(angles @ angles) / count),
+        pairs=count,
+    )

@@ -54,6 +54,10 @@ class RigidTransform:
             self.theta + other.theta,
         )
 
+    def shifted(self, x: float, y: float) -> RigidTransform:
+        """Return the transform with a translation of so many metres added."""
+        return RigidTransform(self.x + x, self.y + y, self.theta)
+
     def inverse(self) -> RigidTransform:
         """Return the transform that undoes this one."""
         c, s = math.cos(self.theta), math.sin(self.theta)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from .kernels.pairs import MIN_SIGMA
+from .correspondences import MIN_SIGMA, Correspondences, cross
+from .fitting import Problem
+from .layout import Floats, X, Y
 from .options import RegistrationOptions
 from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .solve import DEFAULT_OPTIONS, register
+from .weights import weigh
 
 # The error of walls before any residual, and the number of walls that it counts as: see `association.consensus.tuning`.
 USUAL_WALL_ERROR = 0.02  # m
@@ -48,48 +51,48 @@ def register_estimating(
     InvalidArgumentError
         As `register`.
     """
-    result, sigma = register(map_segments, scan, pairs, USUAL_WALL_ERROR, options), USUAL_WALL_ERROR
+    sigma, given = USUAL_WALL_ERROR, Correspondences.of(map_segments, scan, pairs)
     # A caller's own weights say all that there is to say.
-    if result.diagnostics.pairs and options.weights is None:
-        how = RegistrationOptions(oriented=options.oriented)
+    if len(given) and options.weights is None:
+        seen, walls = np.asarray(pairs).T
+        _, wall_of_pair = np.unique(walls, return_inverse=True)
+        variances = scan.sigma[seen] ** 2 / np.maximum(scan.point_counts[seen], 1.0)
         for _ in range(ROUNDS):
-            sigma = _wall_error(map_segments, scan, np.asarray(pairs), sigma, how)
-        result = register(map_segments, scan, pairs, sigma, options)
-    return result
+            sigma = _wall_error(given, variances, wall_of_pair, sigma, oriented=options.oriented)
+    return register(map_segments, scan, pairs, sigma, options)
 
 
 def _wall_error(
-    map_segments: Segments, scan: MeasuredSegments, pairs: np.ndarray, sigma: float, options: RegistrationOptions
+    given: Correspondences, variances: Floats, wall_of_pair: NDArray[np.intp], sigma: float, *, oriented: bool
 ) -> float:
     """Return the standard deviation of the walls' offsets, metres, given one that is about right.
 
     The mean residual of wall k, m_k, has the variance ``(V + 1 / s_k) (1 - h_k)`` with its leverage h_k and the
     weight s_k of what was measured on it. Hence V is about ``sum(m_k^2 - (1 - h_k) / s_k) / sum(1 - h_k)``.
     """
-    result = register(map_segments, scan, pairs, sigma, options)
-    assert result.pose is not None
-    walls, wall_of_pair = np.unique(pairs[:, 1], return_inverse=True)
-    seen = pairs[:, 0]
-    weights = 1.0 / np.maximum(scan.sigma[seen] ** 2 / np.maximum(scan.point_counts[seen], 1.0), MIN_SIGMA**2)
+    options = RegistrationOptions(oriented=oriented)
+    problem, every = Problem.of(given, weigh(given, sigma, options), oriented=oriented)
+    fit = problem.fit(options)
+    weights = 1.0 / np.maximum(variances, MIN_SIGMA**2)
     summed = np.bincount(wall_of_pair, weights)
 
-    def mean(values: np.ndarray) -> np.ndarray:
+    def mean(values: Floats) -> Floats:
         return np.asarray(np.bincount(wall_of_pair, weights * values) / summed)
 
-    # Derivatives of the residuals by x, y and theta: n, and n . (d theta x R m).
-    normals = map_segments.normals[pairs[:, 1]]
-    arms = result.pose.apply(scan.segments.midpoints[seen]) - [result.pose.x, result.pose.y]
-    turning = normals[:, 1] * arms[:, 0] - normals[:, 0] * arms[:, 1]
-    gradients = np.stack([mean(normals[:, 0]), mean(normals[:, 1]), mean(turning)], axis=1)
-    variances = sigma**2 + 1.0 / summed
-    if result.covariance is None:
+    middles = fit.between.apply(every.midpoints)
+    offsets = cross(every.map_directions, middles) - every.map_offsets
+    if fit.covariance is None:
         # Parallel walls fix their distance and the angle.
-        leverages = np.full(len(walls), min(1.0, 2.0 / len(walls)))
+        leverages = np.full(len(summed), min(1.0, 2.0 / len(summed)))
     else:
-        leverages = np.einsum("ki,ij,kj->k", gradients, result.covariance, gradients) / variances
+        # Derivatives of the residuals by x, y and theta: n, and n . (d theta x R m).
+        normals, arms = every.map_normals, middles - (fit.pose.x, fit.pose.y)
+        turning = normals[:, Y] * arms[:, X] - normals[:, X] * arms[:, Y]
+        gradients = np.stack([mean(normals[:, X]), mean(normals[:, Y]), mean(turning)])
+        leverages = ((fit.covariance @ gradients) * gradients).sum(axis=0) / (sigma**2 + 1.0 / summed)
     free = np.clip(1.0 - leverages, 0.0, 1.0)
     count = USUAL_WALLS + float(free.sum())
-    found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float((mean(result.offsets) ** 2 - free / summed).sum())
+    found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float((mean(offsets) ** 2 - free / summed).sum())
     # An estimate from few walls is uncertain: Student's t has that much more variance.
     variance = max(found / count, LEAST_WALL_ERROR**2) * (1.0 + 2.0 / max(1.0, count - 2.0))
     return float(np.sqrt(variance))

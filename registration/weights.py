@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from .correspondences import Correspondences
+from .correspondences import MIN_SIGMA, Correspondences
 from .errors import InvalidArgumentError
-from .kernels.pairs import MIN_SIGMA, inverse_variances
 from .layout import Floats
 from .limits import MAX_SIGMA
 from .options import RegistrationOptions
-from .values import value
 
 MIN_WEIGHT, MAX_WEIGHT = 1e-100, 1e100  # squares and products with 1e9 m squared stay finite
 
 
-@value(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class PairWeights:
     """Weights of n pairs; a pair that does not count has 0 in each.
 
@@ -37,6 +36,12 @@ class PairWeights:
     information: Floats
     noise: Floats | None
 
+    def take(self, rows: NDArray[np.bool_]) -> PairWeights:
+        """Return those of some of the pairs."""
+        used = self.used[rows]
+        information = used if self.information is self.used else self.information[rows]
+        return PairWeights(used, information, None if self.noise is None else self.noise[rows])
+
 
 def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions) -> PairWeights:
     """Weigh pairs as `options` say.
@@ -52,8 +57,8 @@ def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions
             f"expected a number from 0 to {MAX_SIGMA:g}, found {map_sigma:g}", argument="map.sigma"
         )
     floored = max(float(map_sigma), MIN_SIGMA) if map_sigma > 0.0 else 0.0
-    inverses, known = inverse_variances(pairs.rows, floored**2)
-    noise = inverses if known else None
+    variances = pairs.variances + floored**2
+    noise = 1.0 / variances if (variances > 0.0).all() else None
     if options.weights is not None:
         given = _checked_weights(options.weights, len(pairs))
         return PairWeights(given, given, None if noise is None else np.where(given > 0.0, noise, 0.0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments, Segments
-from registration.layout import PAIR, Floats, Records
+from registration.layout import Floats
 
 Line = tuple[Floats, Floats, float]  # Eq. (1)'s P and v, and alpha
 
@@ -23,16 +23,16 @@ def rotation(theta: float) -> Floats:
 
 def pair_rows(
     map_segments: Segments, scan: MeasuredSegments, pairs: Sequence[tuple[int, int]] | NDArray[np.intp]
-) -> Records:
-    """What is known of each pair, as `registration.layout.PAIR` has it."""
-    rows = np.zeros(len(pairs), PAIR)
-    for row, (i, j) in zip(rows, pairs, strict=True):
+) -> list[tuple[Floats | float, ...]]:
+    """What is known of each pair, in the order of the attributes of `Correspondences`."""
+    rows: list[tuple[Floats | float, ...]] = []
+    for i, j in pairs:
         m, s = map_segments, scan.segments
         sigma = max(scan.sigma[i], 1e-12) if scan.sigma[i] > 0.0 else 0.0
         offset = np.sum(TURN @ m.directions[j] * m.midpoints[j])
-        row["map"] = (*m.directions[j], offset, *m.midpoints[j], m.lengths[j])
-        measured = (*s.directions[i], *scan.centroids[i], scan.spreads[i])
-        row["scan"] = (*measured, *s.midpoints[i], s.lengths[i], sigma**2 / scan.point_counts[i])
+        on_map = m.directions[j], m.midpoints[j], offset, m.lengths[j]
+        measured = scan.centroids[i], scan.spreads[i], sigma**2 / scan.point_counts[i]
+        rows.append((*on_map, s.directions[i], s.midpoints[i], s.lengths[i], *measured))
     return rows
 
 

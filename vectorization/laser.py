@@ -12,7 +12,6 @@ from registration.layout import Floats
 from registration.limits import MAX_ANGLE, MAX_BEAMS, MAX_LENGTH, MIN_LENGTH
 
 from .errors import InvalidScanError
-from .kernels.rays import clean
 
 MIN_INCREMENT = 1e-6  # rad; neighbouring beams closer than that are one
 
@@ -144,7 +143,11 @@ class LaserScan:
 
         Ranges shorter than the shortest segment are unknown, too.
         """
-        return clean(self.ranges, max(self.range_min, MIN_LENGTH), min(self.range_max, MAX_LENGTH))
+        r, least, most = self.ranges, max(self.range_min, MIN_LENGTH), min(self.range_max, MAX_LENGTH)
+        cleaned = r.copy()
+        np.putmask(cleaned, r > most, math.inf)
+        np.putmask(cleaned, r < least, math.nan)
+        return cleaned
 
     def points(self) -> Floats:
         """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""

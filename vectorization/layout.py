@@ -50,7 +50,8 @@ FITTED = np.dtype(
     ]
 )  # fmt: skip
 
-# Properties of the scanner and its noise. The variance of a point normal to a line is ``variance (n.u)^2 + floor``.
+# Properties of the scanner and its noise, and the least segments that are wanted. The variance of a point normal to a
+# line is ``variance (n.u)^2 + floor``.
 SCANNER = np.dtype(
     [
         ("increment", "f8"),  # rad, between neighbouring rays; 0 for points without rays
@@ -60,5 +61,6 @@ SCANNER = np.dtype(
         ("default_gap", "f8"),  # m, that neighbours without rays are apart at most
         ("max_gap", "f8"),  # m, that any neighbours are apart at most
         ("longest", "f8"),  # m, that a line is continued over
+        ("least_points", "f8"), ("least_length", "f8"),  # of a segment; m
     ]
 )  # fmt: skip

@@ -13,21 +13,7 @@ from numpy.typing import NDArray
 
 from registration.layout import Floats
 
-from .tuning import (
-    DEVIATIONS,
-    JITTER,
-    LEAST_ORDERED,
-    MOST_PASSES,
-    PROBES,
-    REPEATED,
-    REPEATED_SHARE,
-    REPEATED_STEP,
-    SAME_BEAM,
-    SCATTERED,
-    STEP_WINDOW,
-    VALLEY,
-    VALLEY_DEPTH,
-)
+from . import tuning
 
 Indices = NDArray[np.int64]
 
@@ -62,20 +48,23 @@ def without_repeats(steps: Floats, near: NDArray[np.bool_]) -> Indices:
     """
     n = len(steps) + 1
     every = np.arange(n)
-    if n <= STEP_WINDOW or (steps < REPEATED * np.quantile(steps, SAME_BEAM)).sum() < REPEATED_SHARE * n:
+    if (
+        n <= tuning.STEP_WINDOW
+        or (steps < tuning.REPEATED * np.quantile(steps, tuning.SAME_BEAM)).sum() < tuning.REPEATED_SHARE * n
+    ):
         return every
     # The step between beams: few of those around are longer, however often each point is repeated.
-    half = STEP_WINDOW // 2
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, half, mode="reflect"), STEP_WINDOW)
-    usual = np.quantile(around, SAME_BEAM, axis=1)
-    repeated = int((near & (steps < REPEATED * usual)).sum())
-    between = int(((steps >= VALLEY * usual) & (steps < REPEATED_STEP * usual)).sum())
-    chance = VALLEY_DEPTH * between + DEVIATIONS * math.sqrt(repeated + between)
-    if repeated < max(REPEATED_SHARE * n, chance):
+    half = tuning.STEP_WINDOW // 2
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(steps, half, mode="reflect"), tuning.STEP_WINDOW)
+    usual = np.quantile(around, tuning.SAME_BEAM, axis=1)
+    repeated = int((near & (steps < tuning.REPEATED * usual)).sum())
+    between = int(((steps >= tuning.VALLEY * usual) & (steps < tuning.REPEATED_STEP * usual)).sum())
+    chance = tuning.VALLEY_DEPTH * between + tuning.DEVIATIONS * math.sqrt(repeated + between)
+    if repeated < max(tuning.REPEATED_SHARE * n, chance):
         return every
     left, gone = [0], 0.0
     for k, (step, limit, close) in enumerate(
-        zip(steps.tolist(), (REPEATED_STEP * usual).tolist(), near.tolist(), strict=True)
+        zip(steps.tolist(), (tuning.REPEATED_STEP * usual).tolist(), near.tolist(), strict=True)
     ):
         gone += step
         if gone >= limit or not close:
@@ -93,17 +82,17 @@ def runs_around(turns: Floats) -> bool:
         From each ray to the next, radians, -pi to pi.
     """
     n = len(turns) + 1
-    if n < LEAST_ORDERED:
+    if n < tuning.LEAST_ORDERED:
         return True
     angles = np.sort(np.mod(np.concatenate(([0.0], np.cumsum(turns))), math.tau))
     covered = math.tau - float(np.diff(angles, append=angles[0] + math.tau).max())
     # Small steps back and forth, as noise makes them, cancel.
-    small = np.abs(turns) <= max(JITTER, 2.0 * covered / n)
+    small = np.abs(turns) <= max(tuning.JITTER, 2.0 * covered / n)
     drift = float(turns[small].sum())
     forward = float(turns[~small & (turns > 0.0)].sum()) + max(0.0, drift)
     backward = -float(turns[~small & (turns < 0.0)].sum()) + max(0.0, -drift)
     # A scan may begin anywhere: one step back to its other end is none of a second pass.
-    return max(forward, backward) <= MOST_PASSES * covered
+    return max(forward, backward) <= tuning.MOST_PASSES * covered
 
 
 def runs_along(points: Floats) -> bool:
@@ -114,10 +103,10 @@ def runs_along(points: Floats) -> bool:
     points : (n, 2) metres
     """
     n = len(points)
-    if n < LEAST_ORDERED:
+    if n < tuning.LEAST_ORDERED:
         return True
-    probes = np.unique(np.linspace(0, n - 2, min(PROBES, n - 1)).astype(np.int64))
+    probes = np.unique(np.linspace(0, n - 2, min(tuning.PROBES, n - 1)).astype(np.int64))
     apart = np.hypot(*(points[probes, None, :] - points[None, :, :]).transpose(2, 0, 1))
     following = apart[np.arange(len(probes)), probes + 1]
     apart[np.arange(len(probes)), probes] = math.inf
-    return float(np.median(following)) <= SCATTERED * float(np.median(apart.min(axis=1)))
+    return float(np.median(following)) <= tuning.SCATTERED * float(np.median(apart.min(axis=1)))

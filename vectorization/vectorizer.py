@@ -8,29 +8,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from registration import Beams, MeasuredSegments, Segments
+from registration import Beams, MeasuredSegments
 from registration.layout import Floats, Records
 from registration.limits import MAX_BEAMS, MAX_COORDINATE, MAX_LENGTH
 
 from .errors import InvalidScanError
-from .kernels.rays import gather, place, quantum, ray_noise, window_noise
-from .kernels.tracing import describe, trace
+from .kernels.rays import gather
 from .laser import LaserScan, Motion
-from .layout import FITTED, SCANNER
+from .layout import POINT
 from .options import VectorizationOptions
 from .order import first_of_each, runs_along, runs_around, without_repeats
-from .tuning import (
-    GAP_NOISE,
-    LEAST_INCREMENT,
-    LEAST_SIGMA,
-    LONGEST_STEP,
-    RELATIVE_ROUGHNESS,
-    REPEATED_NOISE,
-    ROUGHNESS,
-    SPACINGS,
-    UNKNOWN_SIGMA,
-)
+from .tracing import Traced, noise_of_points, noise_of_ranges, trace
+from .tuning import LEAST_INCREMENT, REPEATED_NOISE, UNKNOWN_SIGMA
 
+AT_ORIGIN = np.zeros(2)
+USUAL = VectorizationOptions()
 Indices = NDArray[np.int64]
 
 
@@ -108,7 +100,7 @@ def vectorize(
     InvalidScanError
         When points are not finite numbers of shape (m, 2), or farther than 10 km from the first or from the viewpoint.
     """
-    options = options or VectorizationOptions()
+    options = options or USUAL
     if isinstance(scan, LaserScan):
         return _from_laser(scan, options)
     points = _checked_points(scan)
@@ -124,11 +116,10 @@ def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization
     increment = abs(scan.angle_increment)
     closed = increment * len(angles) > math.tau - 0.5 * increment
     ranges = scan.cleaned
-    order, points = gather(ranges, np.cos(angles), np.sin(angles), scan.angle_increment < 0.0, closed)
-    sigma = options.sigma or _estimated(ray_noise(points, increment), points)
-    lines = _trace(points, increment, closed, sigma, options)
-    measured, rms = _measured(lines, (0.0, 0.0))
-    return Vectorization(measured, rms, sigma, order[_spans(lines)], Beams(angles, ranges, scan.range_max))
+    order, points = _gathered(ranges, angles, scan.angle_increment < 0.0, closed)
+    sigma = options.sigma or noise_of_ranges(points, increment, points)
+    traced = trace(points, increment, closed, sigma, options, AT_ORIGIN)
+    return _vectorized(traced, sigma, order[traced.spans], Beams(angles, ranges, scan.range_max))
 
 
 def _from_moving_laser(scan: LaserScan, motion: Motion, options: VectorizationOptions) -> Vectorization:
@@ -136,17 +127,30 @@ def _from_moving_laser(scan: LaserScan, motion: Motion, options: VectorizationOp
     angles, origins = scan.angles + places[:, 2], np.ascontiguousarray(places[:, :2])
     step = scan.angle_increment + motion.omega * motion.time_increment
     # Overlapping or apart by the turn, its two ends do not meet.
-    order, as_read = gather(ranges, np.cos(angles), np.sin(angles), step < 0.0, False)
+    order, as_read = _gathered(ranges, angles, step < 0.0, False)
     middle = origins.mean(axis=0) if len(origins) else np.zeros(2)
     seen = np.stack([as_read["x"], as_read["y"]], axis=1) + origins[order] - middle
-    points = place(seen, np.hypot(seen[:, 0], seen[:, 1]))
-    sigma = options.sigma or _estimated(ray_noise(points, abs(step)), as_read)
-    lines = _trace(points, abs(step), False, sigma, options)
-    spans = _spans(lines)
-    backward = _runs_backward(lines, points)
-    spans[backward] = spans[backward, ::-1]
-    measured, rms = _measured(lines, (float(middle[0]), float(middle[1])))
-    return Vectorization(measured, rms, sigma, order[spans], Beams(angles, ranges, scan.range_max, origins))
+    points = _points(seen, np.hypot(seen[:, 0], seen[:, 1]))
+    sigma = options.sigma or noise_of_ranges(points, abs(step), as_read)
+    traced = trace(points, abs(step), False, sigma, options, middle)
+    beams = Beams(angles, ranges, scan.range_max, origins)
+    return _vectorized(traced, sigma, order[_spans_along(traced, points)], beams)
+
+
+def _gathered(ranges: Floats, angles: Floats, backward: bool, closed: bool) -> tuple[Indices, Records]:
+    """Return indices and points of the beams that have a range, counter-clockwise."""
+    order, points = np.empty(len(ranges), np.int64), np.empty(len(ranges), POINT)
+    count = gather(ranges, np.cos(angles), np.sin(angles), backward, closed, order, points)
+    return order[:count], points[:count]
+
+
+def _points(places: Floats, ranges: Floats) -> Records:
+    """Return the points at `places` (n, 2) about the sensor; those whose range is 0 have no ray."""
+    points = np.zeros(len(places), POINT)
+    points["x"], points["y"], points["range"] = places[:, 0], places[:, 1], ranges
+    seen = ranges > 0.0
+    points["ray_x"], points["ray_y"] = np.divide(places.T, ranges, out=np.zeros((2, len(places))), where=seen)
+    return points
 
 
 def _from_viewed_points(places: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
@@ -157,16 +161,12 @@ def _from_viewed_points(places: Floats, viewpoint: Floats, options: Vectorizatio
     order, turns, ordered = _around(seen, r, order, options)
     if np.sum(np.sign(turns)) < 0.0:
         order = order[::-1]
-    points = place(seen[order], r[order])
+    points = _points(seen[order], r[order])
     increment = max(LEAST_INCREMENT, float(np.median(np.abs(turns)))) if len(turns) else LEAST_INCREMENT
-    sigma = options.sigma or _estimated(ray_noise(points, increment), points)
-    lines = _trace(points, increment, False, sigma, options)
+    sigma = options.sigma or noise_of_ranges(points, increment, points)
     # The viewpoint is on the left whatever way the points run.
-    spans = _spans(lines)
-    backward = _runs_backward(lines, points)
-    spans[backward] = spans[backward, ::-1]
-    measured, rms = _measured(lines, (viewpoint[0], viewpoint[1]))
-    return Vectorization(measured, rms, sigma, order[spans], ordered=ordered)
+    traced = trace(points, increment, False, sigma, options, viewpoint)
+    return _vectorized(traced, sigma, order[_spans_along(traced, points)], ordered=ordered)
 
 
 def _around(
@@ -199,20 +199,24 @@ def _from_bare_points(every: Floats, options: VectorizationOptions) -> Vectoriza
         order = order[without_repeats(steps, np.ones(len(steps), dtype=np.bool_))]
     places = every[order]
     origin = places.mean(axis=0) if len(places) else np.zeros(2)
-    points = place(places - origin, np.zeros(len(places)))
-    sigma = options.sigma or _estimated(window_noise(points), points[:0])
-    lines = _trace(points, 0.0, False, sigma, options)
-    backward = _runs_backward(lines, points)
-    begin = lines["begin"].copy()
-    lines["begin"][backward] = lines["end"][backward]
-    lines["end"][backward] = begin[backward]
-    measured, rms = _measured(lines, (origin[0], origin[1]))
-    return Vectorization(measured, rms, sigma, order[_spans(lines)], ordered=runs_along(places))
+    points = _points(places - origin, np.zeros(len(places)))
+    sigma = options.sigma or noise_of_points(places - origin)
+    traced = trace(points, 0.0, False, sigma, options, origin)
+    backward = _runs_backward(traced.lines, points)
+    traced.found[backward, :4] = traced.found[backward][:, [2, 3, 0, 1]]
+    return _vectorized(traced, sigma, order[traced.spans], ordered=runs_along(places))
 
 
-def _spans(lines: Records) -> Indices:
-    """Return the first and the last point of each line, (k, 2)."""
-    return np.stack([lines["first"], lines["last"]], axis=1)
+def _vectorized(
+    traced: Traced, sigma: float, spans: Indices, beams: Beams | None = None, *, ordered: bool = True
+) -> Vectorization:
+    return Vectorization(traced.measured(), traced.found[:, 7], sigma, spans, beams, ordered)
+
+
+def _spans_along(traced: Traced, points: Records) -> Indices:
+    """Return the points at the begin and at the end of each line, (k, 2), whatever way the points run."""
+    backward = _runs_backward(traced.lines, points)
+    return np.where(backward[:, None], traced.spans[:, ::-1], traced.spans)
 
 
 def _runs_backward(lines: Records, points: Records) -> NDArray[np.bool_]:
@@ -260,29 +264,3 @@ def _checked_viewpoint(viewpoint: tuple[float, float], points: Floats) -> Floats
             f"expected a viewpoint within {MAX_LENGTH:g} m of all points, found {viewpoint!r}", argument="viewpoint"
         )
     return place
-
-
-def _estimated(noise: float, points: Records) -> float:
-    """Return the noise, but no less than what the quantisation of the ranges lets it be."""
-    noise = noise or UNKNOWN_SIGMA
-    return max(noise, LEAST_SIGMA, quantum(points) / math.sqrt(12.0))
-
-
-def _trace(points: Records, increment: float, closed: bool, sigma: float, options: VectorizationOptions) -> Records:
-    if len(points) < options.min_points:
-        return np.zeros(0, FITTED)
-    floor = max(ROUGHNESS, RELATIVE_ROUGHNESS * sigma) ** 2
-    max_gap = math.inf if options.max_gap is None else options.max_gap
-    default_gap, longest = 0.0, LONGEST_STEP
-    if increment == 0.0:
-        spacing = float(np.median(np.hypot(np.diff(points["x"]), np.diff(points["y"]))))
-        default_gap = longest = SPACINGS * spacing + GAP_NOISE * sigma
-    scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap))
-    return trace(points, np.array([scanner], SCANNER), closed, options.min_points, options.min_length)
-
-
-def _measured(lines: Records, origin: tuple[float, float]) -> tuple[MeasuredSegments, Floats]:
-    endpoints, sigmas, centroids, rms = describe(lines, origin[0], origin[1])
-    moments = centroids, lines["spread"]
-    measured = MeasuredSegments.from_segments(Segments.derived(endpoints), sigmas, lines["count"], moments)
-    return measured, rms

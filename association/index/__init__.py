@@ -1,1 +1,1 @@
-"""A map of segments as the search reads it: walls, wall chains, the grid over them, their crossings."""
+"""A map of segments as the search reads it: walls, wall chains, the grids over them."""

@@ -1,7 +1,7 @@
 """Several maps in one index: each is shifted to a place of its own, so far from the others that nothing crosses.
 
-One search then finds the best pose of all maps, and one verdict weighs alternatives on all of them. Wall chains,
-crossings and rays end within a map, because the gap between two maps is longer than any of them.
+One search then finds the best pose of all maps, and one verdict weighs alternatives on all of them. Wall chains and
+rays end within a map, because the gap between two maps is longer than any of them.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ..layout import Integers
 from ..tuning import EXCEEDING, FAR, FARTHER, MODEL_OFFSET, REACH
 from .map_index import MapIndex, tables_of
 from .map_points import NO_POINTS, MapPoints
+from .merging import both_ways
 from .tuning import CELL
-from .walls import both_ways
 
 MOST_MAPS = 256  # the contract
 LEAST_MAP_GAP = 100.0  # m, geometry; between two maps, for scans that are up to 65 m wide

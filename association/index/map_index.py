@@ -15,10 +15,11 @@ from registration import Segments
 from ..deadline import Deadline
 from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
-from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
+from ..tables import Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
 from ..tuning import WHOLE_GAP
-from .grids import crossing_chains, directions_near, near_walls, stopping_beams, swept_chains
+from .grids import directions_near, near_walls, stopping_beams, swept_chains
 from .map_points import NO_POINTS, MapPoints
+from .merging import blended, both_ways, chains_of, merge, tie
 from .tuning import (
     BLENDED_SIGMAS,
     BLENDED_STEP,
@@ -28,7 +29,6 @@ from .tuning import (
     ONE_LINE,
     ONE_LINE_SHARE,
 )
-from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]
 
@@ -63,8 +63,6 @@ class MapIndex:
     sweep : Sweep
         Which chains of a direction does a sweep meet? The list alone answers this, since reading a chain takes longer
         than all else.
-    crossings : Crossings
-        On which pairs of chains may two segments of a scan lie? As far as they are listed no sweep is needed.
     raster : Raster
         The quickest way to see that a segment cannot lie at a place.
     """
@@ -81,7 +79,6 @@ class MapIndex:
     chains: Walls
     grid: Grid
     sweep: Sweep
-    crossings: Crossings
     raster: Raster
 
     @classmethod
@@ -236,9 +233,7 @@ class MapIndex:
     @cached_property
     def tables(self) -> MapTables:
         """The arrays that the kernels of the search take."""
-        return MapTables(
-            Place(self.walls.rows, self.walls.bin_starts, self.grid, self.ties), self.sweep, self.crossings, self.raster
-        )
+        return MapTables(Place(self.walls.rows, self.walls.bin_starts, self.grid, self.ties), self.sweep, self.raster)
 
     def is_one_wall(self, walls: Integers, wall: int) -> NDArray[np.bool_]:
         """Return which of `walls` (k,) are rather one with another one than walls of their own."""
@@ -255,7 +250,6 @@ class MapIndex:
             self.chains,
             self.grid,
             self.sweep.sectors,
-            self.crossings,
             self.raster,
         ]
         tables.append((self.sweep.chains, self.sweep.lengths, self.sweep.present))
@@ -268,7 +262,7 @@ class MapIndex:
 
 def tables_of(
     local: Segments, sigma: float | None, deadline: Deadline | None
-) -> tuple[Integers, Pieces, Walls, Floats, Walls, Grid, Sweep, Crossings, Raster]:
+) -> tuple[Integers, Pieces, Walls, Floats, Walls, Grid, Sweep, Raster]:
     """Compute the tables of an index from segments about the origin, in the order of the fields of `MapIndex`.
 
     Raises
@@ -289,10 +283,8 @@ def tables_of(
     _require_time(deadline)
     sweep = swept_chains(chains)
     _require_time(deadline)
-    crossings = crossing_chains(sweep.chains)
-    _require_time(deadline)
     raster = directions_near(walls, chains)
-    return wall_of_piece, pieces, walls, ties, chains, near_walls(walls), sweep, crossings, raster
+    return wall_of_piece, pieces, walls, ties, chains, near_walls(walls), sweep, raster
 
 
 def _crowd(grid: Grid) -> float:

@@ -40,7 +40,7 @@ PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadlin
 # --- Grids ------------------------------------------------------------------------------------------------------------
 
 CELL = 1.0  # m, tables
-SWEEP_CELL = 2.0  # m, tables; of the sweep's grid, and of the cells of crossings about a base
+SWEEP_CELL = 2.0  # m, tables; of the sweep's grid
 SWEEP_REACH = 0.02  # m, rounding
 RASTER_CELL = 0.5  # m, tables; also of the grid of walls and points
 NEIGHBOURHOOD = 64.0  # m, squares of which the chains are numbered together; measured: 8 to 128 are as good
@@ -48,20 +48,3 @@ MAX_CELLS = 4_000_000  # memory: some 50 MB
 MAX_SWEEP_CELLS = 1_000_000  # memory
 MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
 CELL_GROWTH = 1.25  # by which cells grow until their lists fit
-
-# --- Crossings --------------------------------------------------------------------------------------------------------
-
-# Pairs of chains that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
-# entries in all lists, and pairs of chains that are near enough to be compared.
-CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
-CROSSING_BAND = 16.0  # m; height of the bands of chains among which crossings are searched
-MOST_BANDS = 200  # about
-# Tables: half of the first two take a seventh longer at 20,000 segments; twice as many take a twelfth less, for 2.3
-# times the memory. The third is some 10 us of indexing a chain.
-CROSSINGS_A_CHAIN = (80, 500, 4_000)
-# Memory, of 12 bytes each: 54 MB of entries, and 24 MB of pairs while indexing, with room for a fifth more; and 1 to
-# 1.5 s of indexing. They are compared with estimates: twice as many pairs and looks are let pass.
-MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
-FEW_CHAINS = 500  # at least so many chains count; tables: in a room all pairs are listed
-CROSSING_SAMPLE = 128  # chains by which these numbers are estimated; measured: to a fifth, by 32 to a third;
-CROSSING_SAMPLE_LOOKS = 2_000_000  # with so many looks at most: up to half a second where lines cross everywhere

@@ -7,23 +7,30 @@ poses of odometry (`association.consensus.view_estimation`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration.layout import Floats, Records
 
 from ..deadline import Deadline
-from ..layout import POINT, as_records
+from ..layout import Flags, Indices
 from ..tuning import MODEL_ANGLE, ROUGHNESS
-from .kernels.alignment import pair_lines
 from .scan import Scan, Views
 from .scan_lines import parts_of
-from .tuning import ALIGNED_LINES, ALIGNING_ROUNDS, ALIGNING_SHARE, LEAST_SPREAD
+from .tuning import (
+    ALIGNED_LINES,
+    ALIGNED_VIEWS,
+    ALIGNING_ROUNDS,
+    ALIGNING_SHARE,
+    GATE_SIGMAS,
+    LEAST_ALIGNED,
+    LEAST_SPREAD,
+    MOST_APART,
+    MOST_TURNED,
+    SAME_LINE,
+)
 from .views import corrected
-
-Indices = NDArray[np.intp]
 
 
 def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
@@ -41,31 +48,17 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
         if deadline.passed:
             break
         shifts = (views.root @ (found - views.found)).reshape(-1, 3)
-        seams = lines.moved(shifts).seams(views.root @ spread @ views.root.T, views.root)
-        weighed = seams.jacobian * (ALIGNING_SHARE / seams.variances)[:, None]
-        spread = np.asarray(np.linalg.inv(np.eye(len(found)) + seams.jacobian.T @ weighed))
-        left = seams.residuals - seams.jacobian @ found
+        pairs = lines.moved(shifts).pairs(views.root @ spread @ views.root.T)
+        residuals, variances = pairs.apart.ravel(), pairs.variances.ravel()
+        jacobian = (pairs.steps @ views.root[pairs.errors]).reshape(-1, len(found))
+        weighed = jacobian * (ALIGNING_SHARE / variances)[:, None]
+        spread = np.asarray(np.linalg.inv(np.eye(len(found)) + jacobian.T @ weighed))
+        left = residuals - jacobian @ found
         found = np.asarray(spread @ (weighed.T @ -left))
         # If lines do not fit one another as they should, some of them are not one.
-        worse = max(1.0, float(np.mean((left + seams.jacobian @ found) ** 2 / seams.variances)) if len(left) else 1.0)
+        worse = max(1.0, float(np.mean((left + jacobian @ found) ** 2 / variances)) if len(left) else 1.0)
         spread = spread * worse
     return corrected(scan, found, 0.5 * (spread + spread.T))
-
-
-@dataclass(frozen=True, slots=True)
-class _Seams:
-    """Distances of lines that are one in two views: offsets and sines of angles, with their variances.
-
-    Attributes
-    ----------
-    residuals, variances : (k,)
-    jacobian : (k, 3 u)
-        By the variates of `Views.root`.
-    """
-
-    residuals: Floats
-    variances: Floats
-    jacobian: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,32 +98,98 @@ class _Lines:
         out["dx"], out["dy"] = c * dx - s * dy, s * dx + c * dy
         return _Lines(out, self.of_view, self.places + shifts[:, :2])
 
-    def seams(self, covariance: Floats, root: Floats) -> _Seams:
-        """Return how far lines lie apart that are one; `covariance` is that of the views' poses."""
-        starts = np.searchsorted(self.of_view, np.arange(len(self.places) + 1))
-        places = as_records(POINT, self.places)
-        pairs = pair_lines(self.lines, starts, places, np.ascontiguousarray(covariance))
-        a, b = self.lines[pairs[:, 0]], self.lines[pairs[:, 1]]
-        middle = b["dx"] * (a["x"] - b["x"]) + b["dy"] * (a["y"] - b["y"])
+    def pairs(self, covariance: Floats) -> _Pairs:
+        """Pair lines of each view with those of the views before it that alone they can be.
+
+        Two can be one if they run the same way, have enough in common, and lie within the error of both and of their
+        views. A line that can be two of another view, which are farther apart than one wall is, is none of them there.
+        Each is paired at most once, with the nearest view before its own.
+        """
+        pairs = _Pairs.of(self, *self._alike())
+        lengths = self.lines["length"][pairs.rows]
+        enough = pairs.common >= np.minimum(LEAST_ALIGNED, 0.5 * lengths.min(axis=1))
+        pairs = pairs.taken(enough & (np.abs(pairs.apart[:, 0]) <= MOST_APART))
+        at = pairs.errors
+        steps = ((pairs.steps @ covariance[at[:, :, None], at[:, None]]) * pairs.steps).sum(axis=2)
+        variances = pairs.variances + np.maximum(0.0, steps)
+        return pairs.taken((np.abs(pairs.apart) <= GATE_SIGMAS * np.sqrt(variances)).all(axis=1)).nearest()
+
+    def _alike(self) -> tuple[Indices, Indices]:
+        """List the pairs of lines of a view and of those before it that run about the same way."""
+        dx, dy = self.lines["dx"], self.lines["dy"]
+        starts = np.searchsorted(self.of_view, np.arange(len(self.places) + 1)).tolist()
+        found = [np.zeros((0, 2), np.intp)]
+        for v in range(1, len(self.places)):
+            own, before = slice(starts[v], starts[v + 1]), slice(starts[max(0, v - ALIGNED_VIEWS)], starts[v])
+            sines = np.outer(dy[own], dx[before]) - np.outer(dx[own], dy[before])
+            cosines = np.outer(dx[own], dx[before]) + np.outer(dy[own], dy[before])
+            alike = np.argwhere((np.abs(sines) <= MOST_TURNED) & (cosines > 0.0))
+            found.append(alike + np.array([own.start, before.start]))
+        one, other = np.concatenate(found).T
+        return one, other
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Pairs of lines: the first of a view, the second of one before it.
+
+    Attributes
+    ----------
+    rows : (k, 2) which lines they are
+    views : (k, 2) their views
+    common : (k,) length that both cover along the second, m
+    steps : (k, 2, 6) derivatives of `apart` by x, y, theta of both views
+    apart : (k, 2) how far the first lies to the left of the second there, m, and the sine of the angle between them
+    variances : (k, 2) of these, by the lines alone, m^2 and rad^2
+    """
+
+    rows: Indices
+    views: Indices
+    common: Floats
+    steps: Floats
+    apart: Floats
+    variances: Floats
+
+    @classmethod
+    def of(cls, found: _Lines, first: Indices, second: Indices) -> _Pairs:
+        a, b, rows = found.lines[first], found.lines[second], np.stack([first, second], axis=1)
+        dx, dy, views = b["dx"], b["dy"], found.of_view[rows]
+        middle = dx * (a["x"] - b["x"]) + dy * (a["y"] - b["y"])
         low = np.maximum(middle - 0.5 * a["length"], -0.5 * b["length"])
-        at = 0.5 * (low + np.minimum(middle + 0.5 * a["length"], 0.5 * b["length"]))
-        x, y = b["x"] + at * b["dx"], b["y"] + at * b["dy"]
+        high = np.minimum(middle + 0.5 * a["length"], 0.5 * b["length"])
+        x, y = b["x"] + 0.5 * (low + high) * dx, b["y"] + 0.5 * (low + high) * dy
         along = a["dx"] * (x - a["centroid_x"]) + a["dy"] * (y - a["centroid_y"])
-        across_x, across_y = a["centroid_x"] + along * a["dx"] - x, a["centroid_y"] + along * a["dy"] - y
-        offsets = -b["dy"] * across_x + b["dx"] * across_y
-        sines = b["dx"] * a["dy"] - b["dy"] * a["dx"]
-        by_offset, by_angle = np.zeros((2, len(pairs), root.shape[1]))
-        for sign, views in ((1.0, self.of_view[pairs[:, 0]]), (-1.0, self.of_view[pairs[:, 1]])):
-            there = self.places[views]
-            levers = b["dx"] * (x - there[:, 0]) + b["dy"] * (y - there[:, 1])
-            steps = np.stack([-b["dy"], b["dx"], levers], axis=1)
-            by_views = root.reshape(-1, 3, root.shape[1])[views]
-            by_offset += sign * np.einsum("ki,kij->kj", steps, by_views)
-            by_angle += sign * by_views[:, 2]
-        noise, turning = _variances_at(a, x, y) + _variances_at(b, x, y), _angle_variances(a) + _angle_variances(b)
-        return _Seams(
-            np.concatenate([offsets, sines]), np.concatenate([noise, turning]), np.concatenate([by_offset, by_angle])
-        )
+        offset = dx * (a["centroid_y"] + along * a["dy"] - y) - dy * (a["centroid_x"] + along * a["dx"] - x)
+        apart = np.stack([offset, dx * a["dy"] - dy * a["dx"]], axis=1)
+        variances = np.add(*(np.stack([_variances_at(line, x, y), _angle_variances(line)], 1) for line in (a, b)))
+        steps = np.zeros((len(rows), 2, 2, 3))
+        steps[:, 0, :, 0], steps[:, 0, :, 1], steps[:, 1, :, 2] = -dy[:, None], dx[:, None], 1.0
+        from_x, from_y = (place[:, None] - found.places[views, k] for k, place in enumerate((x, y)))
+        steps[:, 0, :, 2] = dx[:, None] * from_x + dy[:, None] * from_y
+        steps[:, :, 1] *= -1.0
+        return cls(rows, views, high - low, steps.reshape(-1, 2, 6), apart, variances)
+
+    @property
+    def errors(self) -> Indices:
+        """Where x, y, theta of both views are among those of all, (k, 6)."""
+        return (3 * self.views[:, :, None] + np.arange(3)).reshape(-1, 6)
+
+    def taken(self, chosen: Indices | Flags) -> _Pairs:
+        """Return some of the pairs."""
+        return _Pairs(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def nearest(self) -> _Pairs:
+        """Return for each line the nearest one of the nearest view in which it can be one wall alone."""
+        if not len(self.rows):
+            return self
+        offsets = self.apart[:, 0]
+        order = np.lexsort((np.abs(offsets) / np.sqrt(self.variances[:, 0]), -self.views[:, 1], self.rows[:, 0]))
+        first, earlier, offsets = self.rows[order, 0], self.views[order, 1], offsets[order]
+        starts = np.flatnonzero(np.diff(first, prepend=-1) | np.diff(earlier, prepend=-1))
+        between = np.maximum.reduceat(offsets, starts) - np.minimum.reduceat(offsets, starts)
+        single = starts[between <= SAME_LINE]
+        _, chosen = np.unique(first[single], return_index=True)
+        return self.taken(order[single[chosen]])
 
 
 def _variances_at(lines: Records, x: Floats, y: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Measure the extents of scans."""
+"""Measure the extents of scans, and which way their segments face."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 from registration import Segments
 from registration.layout import Records
 
-from ..layout import POINT, as_records
-from .kernels.extents import extent_along
 from .scan import Scan
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for
-_DIRECTIONS = as_records(POINT, DIRECTIONS)
 
 
 def extent(ends: Records) -> float:
     """Return how wide segments, (n,) of `ENDS`, lie apart in the direction in which that is most, metres; 0 of none."""
-    return extent_along(ends, _DIRECTIONS)
+    if not len(ends):
+        return 0.0
+    along = DIRECTIONS @ ends.view(np.float64).reshape(-1, 2).T
+    return float((along.max(axis=1) - along.min(axis=1)).max())
 
 
 def inner_extent(segments: Segments) -> float:
@@ -52,3 +52,14 @@ def whole_extent(scan: Scan) -> float:
         points.append(begins + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
     every = np.concatenate(points)
     return float(np.hypot(*np.ptp(every, axis=0))) if len(every) else 0.0
+
+
+def facing_away(ends: Records, seen_from: Records, least: float) -> int:
+    """Count the segments, (n,) of `ENDS`, that have the place they were seen from on their right, by over `least` m.
+
+    `seen_from` (n,) of `POINT`, or (1,) where all were seen from there; nan where the place is unknown.
+    """
+    rows, places = ends.view(np.float64).reshape(-1, 4), seen_from.view(np.float64).reshape(-1, 2)
+    dx, dy = (rows[:, 2:] - rows[:, :2]).T
+    x, y = (places - 0.5 * (rows[:, :2] + rows[:, 2:])).T
+    return int(np.count_nonzero(dx * y - dy * x < -least * np.sqrt(dx * dx + dy * dy)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,29 +12,30 @@ from registration import MeasuredSegments
 from registration.layout import Records
 from registration.values import value
 
-from ..layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
+from ..layout import GATES, LINE_PARTS, MODEL, SIGHTING, VARIANCES, Indices, as_records, record
 from ..options import AssociationOptions
-from ..tables import Measured
-from ..tuning import FREE_ANGLE, FREE_DISTANCE, GREATEST_ANGLE_GATE, REACH
-from .kernels import describing
-from .kernels.describing import describe_labelled
-from .kernels.joining import join_lines, lines_of_a_view
+from ..tuning import FREE_ANGLE, FREE_DISTANCE, GREATEST_ANGLE_GATE, MODEL_OFFSET, REACH, ROUGHNESS
+from .kernels.joining import describe_lines, join_lines
 from .scan import Scan, Views
 from .tuning import (
     COMMON_ERROR,
+    CUT_COSINE,
+    CUT_LATERAL,
     GATE_SIGMAS,
     LEAST_ANGLE_GATE,
     LEAST_OFFSET_GATE,
     LEAST_OVERLAP,
     LINE_ANGLE,
+    LINE_COSINE,
     LINE_LATERAL,
     MOST_LATERAL,
     MOST_TURN,
     VIEW_SIGMAS,
 )
 
-_describe_view, _mirror_lines = describing.describe_view, describing.mirror_lines
-_set_map_sigma = describing.set_map_sigma
+_FIELDS = len(LINE_PARTS.names or ())
+# Lateral offsets (m) and cosines. Of a view, first what was cut is joined, then what lies about on one line.
+JOINTS = np.array([[CUT_LATERAL, CUT_COSINE], [LINE_LATERAL, LINE_COSINE]])
 
 
 @value(frozen=True, slots=True)
@@ -49,19 +49,19 @@ class ScanLines:
     model : (1,) of `MODEL`
     sightings : (k,) of `SIGHTING`
         The part of them that each view shows, view by view; of one view the rows themselves.
-    given : Measured or None
-        The input that they were made from, of a scan of one view.
+    given : (segments,) of `LINE_PARTS`, or None
+        The segments that they were made from, of a scan of one view.
     """
 
-    row_of: NDArray[np.intp]
+    row_of: Indices
     rows: Records
     model: Records
     sightings: Records
-    given: Measured | None = None
+    given: Records | None = None
 
     @classmethod
     def of(
-        cls, scan: Scan, map_sigma: float | None, options: AssociationOptions, given: Measured | None = None
+        cls, scan: Scan, map_sigma: float | None, options: AssociationOptions, given: Records | None = None
     ) -> ScanLines:
         """Join the segments that continue or repeat one another, and order them by their information; ties by index.
 
@@ -72,34 +72,38 @@ class ScanLines:
             Standard deviation of the map's lines, metres; None where it is not known.
         options : AssociationOptions
             If a tolerance is wider than the sigmas' own gate, the map is taken to be that far off.
-        given : Measured or None
+        given : (segments,) of `LINE_PARTS`, or None
             Of other lines of the same scan, where there are any.
         """
         measured = scan.measured
         variances, model = variances_of(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
-            given = given or _given(measured)
-            row_of, rows, seen = _describe_view(given, measured.counted, options.oriented, variances, model)
+            given = _given(measured) if given is None else given
+            row_of, lines = join_lines(given, JOINTS, measured.counted, options.oriented)
+            rows, seen = describe_lines(lines, variances, model)
             return cls(row_of, rows, model, seen, given)
         part_of, parts, views = parts_of(measured, scan.views, directed=options.oriented)
-        line_row, rows = describe_labelled(
-            *_joined_views(parts, scan.views, directed=options.oriented), variances, model
-        )
+        line_row, lines = _joined_views(parts, scan.views, directed=options.oriented)
+        rows, _ = describe_lines(lines, variances, model)
         return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))
 
     def mirrored(self) -> ScanLines:
         """Return those of the scan with left and right exchanged, which has to be of one view."""
-        rows, seen = _mirror_lines(self.rows)
+        rows, seen = self.rows.copy(), self.sightings.copy()
+        for values in (rows["dx"], rows["y"], rows["centroid_y"], seen["dx"], seen["y"]):
+            np.negative(values, out=values)
+        np.arctan2(rows["dy"], rows["dx"], out=rows["angle"])
         return ScanLines(self.row_of, rows, self.model, seen)
 
 
-def _given(measured: MeasuredSegments) -> Measured:
-    """Return segments as the kernels take them."""
+def _given(measured: MeasuredSegments) -> Records:
+    """Return each segment as a line of its own, (n,) of `LINE_PARTS`, without what `join_lines` writes."""
     segments = measured.segments
-    return Measured(
-        as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
-        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.point_counts,
-    )  # fmt: skip
+    rows = np.zeros((len(segments), _FIELDS))
+    rows[:, :2], rows[:, 2:4], rows[:, 4] = segments.directions, segments.midpoints, segments.lengths
+    rows[:, 6:8], rows[:, 8] = measured.centroids, measured.spreads
+    rows[:, 9], rows[:, 10] = measured.point_counts, measured.sigma
+    return as_records(LINE_PARTS, rows)
 
 
 def parts_of(
@@ -115,10 +119,10 @@ def parts_of(
     """
     part_of = np.empty(len(measured), dtype=np.intp)
     found, of_view = [np.zeros(0, LINE_PARTS)], [np.zeros(0, dtype=np.intp)]
-    covariance, before = views.covariance, 0
+    covariance, given, before = views.covariance, _given(measured), 0
     for v, pose in enumerate(views.poses):
         own = np.flatnonzero(views.of_segment == v)
-        labels, lines = lines_of_a_view(_given(_taken(measured, own)), measured.counted, directed)
+        labels, lines = join_lines(given[own], JOINTS, measured.counted, directed)
         part_of[own] = labels + before
         block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
         levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)
@@ -131,18 +135,7 @@ def parts_of(
     return part_of, np.concatenate(found), np.concatenate(of_view)
 
 
-def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegments:
-    return replace(
-        measured,
-        segments=measured.segments.take(rows),
-        sigma=measured.sigma[rows],
-        point_counts=measured.point_counts[rows],
-        centroids=measured.centroids[rows],
-        spreads=measured.spreads[rows],
-    )
-
-
-def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Integers, Records]:
+def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Indices, Records]:
     """Join the parts of a line that several views show, so that it is one piece of evidence.
 
     The uncertainty of the viewpoints lets them lie so much farther apart. The line that they make is as uncertain as
@@ -152,11 +145,7 @@ def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Inte
     if views.uncertain and len(parts):
         lateral = min(MOST_LATERAL, lateral + VIEW_SIGMAS * float(np.sqrt(parts["common_offset"].mean())))
         turn = min(MOST_TURN, turn + VIEW_SIGMAS * float(np.sqrt(parts["common_angle"].mean())))
-    labels, lines = join_lines(parts, lateral, math.cos(turn), True, directed)
-    weights = np.bincount(labels, parts["length"], len(lines))
-    for name in ("common_offset", "common_angle"):
-        lines[name] = np.bincount(labels, parts["length"] * parts[name], len(lines)) / weights
-    return labels, lines
+    return join_lines(parts, np.array([[lateral, math.cos(turn)]]), True, directed)
 
 
 def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) -> Records:
@@ -171,15 +160,14 @@ def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) 
 @lru_cache
 def variances_of(map_sigma: float, options: AssociationOptions, *, with_beams: bool) -> tuple[Records, Records]:
     """Return the terms of the variances of lines, (1,) of `VARIANCES`, and of walls, (1,) of `MODEL`."""
-    variances = record(
-        VARIANCES,
-        common=COMMON_ERROR**2 if with_beams else 0.0,
-        least_offset=((options.offset_tolerance or 0.0) / GATE_SIGMAS) ** 2,
-        least_angle=((options.angle_tolerance or 0.0) / GATE_SIGMAS) ** 2,
+    least_offset, least_angle = (
+        ((tolerance or 0.0) / GATE_SIGMAS) ** 2 for tolerance in (options.offset_tolerance, options.angle_tolerance)
     )
-    model = record(MODEL, free_distance=FREE_DISTANCE, free_angle=FREE_ANGLE)
-    _set_map_sigma(float(map_sigma), variances, model)
-    return variances, model
+    of_map, common = map_sigma * map_sigma, COMMON_ERROR**2 if with_beams else 0.0
+    variances = record(VARIANCES, map=of_map, common=common, least_offset=least_offset, least_angle=least_angle)
+    # If the tolerance is wider, the map is taken to be that far off.
+    wall = max(of_map + (MODEL_OFFSET**2 - ROUGHNESS**2), least_offset)
+    return variances, record(MODEL, wall_variance=wall, free_distance=FREE_DISTANCE, free_angle=FREE_ANGLE)
 
 
 @lru_cache

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from compiled.interpreting import interpreted
+from compiled.kernels import interpreted
 from registration import MeasuredSegments, Segments, register
 from registration.layout import Records
 from tests.registration.scenes import diagonal, pose_of

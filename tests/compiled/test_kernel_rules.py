@@ -1,4 +1,4 @@
-"""Rules of every kernel, tested in its source; see ``registration/layout.py`` and ``kernels/records.py``."""
+"""Rules of every kernel, tested in its source; see ``registration/layout.py``, ``registration/kernels/arrays.py``."""
 
 from __future__ import annotations
 

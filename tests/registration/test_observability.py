@@ -4,18 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from registration import Correspondences, MeasuredSegments, Segments
-from registration.kernels.pairs import angle_chi_square
-from registration.observability import most_parallel
+from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
-from .scenes import correspondences, noisy_pairs
-
-
-def are_parallel(pairs: Correspondences, inverse_variances: NDArray[np.float64]) -> bool:
-    unlike, count = angle_chi_square(pairs.rows, inverse_variances)
-    return bool(unlike <= most_parallel(count))
+from .scenes import diagonal, noisy_pairs
 
 
 def parallel(degrees: list[float], sigma: float, lengths: tuple[float, ...] = (4.0, 4.0, 4.0)) -> bool:
@@ -25,8 +17,8 @@ def parallel(degrees: list[float], sigma: float, lengths: tuple[float, ...] = (4
     begins = np.array([[0.0, 0.0], [5.0, 5.0], [-3.0, 8.0]])[: len(a)]
     reach = np.array(lengths[: len(a)])[:, None]
     segments = Segments.from_array(np.hstack([begins, begins + reach * directions]))
-    scan = MeasuredSegments.from_segments(segments, sigma)
-    return are_parallel(correspondences(segments, scan), scan.point_counts / sigma**2)
+    found = register(segments, MeasuredSegments.from_segments(segments, sigma), diagonal(len(a)))
+    return found.diagnostics.dof == 2 * len(a) - 2
 
 
 @pytest.mark.parametrize(
@@ -53,8 +45,8 @@ def test_a_line_counts_as_it_knows_its_angle(degrees: float, expected: bool) -> 
     assert parallel([0.0, 0.0, degrees], 0.02, (4.0, 4.0, 0.4)) is expected
 
 
-def test_fewer_than_two_are_parallel() -> None:
-    pairs = correspondences(*noisy_pairs(np.random.default_rng(0), 3))
-    assert are_parallel(pairs, np.array([0.0, 1e30, 0.0]))
-    assert are_parallel(pairs.take(slice(0, 0)), np.zeros(0))
-    assert not are_parallel(pairs, np.array([1e30, 1e30, 0.0]))
+def test_fewer_than_two_that_count_are_parallel() -> None:
+    map_segments, scan = noisy_pairs(np.random.default_rng(0), 3)
+    for weights, dof in ([0.0, 1e30, 0.0], 0), ([1e30, 1e30, 0.0], 1):
+        options = RegistrationOptions(weights=weights)
+        assert register(map_segments, scan, diagonal(3), 0.0, options).diagnostics.dof == dof

@@ -44,16 +44,6 @@ def find_gaps(
     return starts
 
 
-def farthest_point(points: Floats, rays: Floats, variance: float, floor: float) -> tuple[int, float]:
-    along = points[-1] - points[0]
-    along = along / np.linalg.norm(along)
-    normal = np.array([-along[1], along[0]])
-    cosines = np.where((rays == 0).all(axis=1), 1.0, rays @ normal)
-    squares = ((points - points[0]) @ normal) ** 2 / (variance * cosines**2 + floor)
-    k = int(np.argmax(squares[1:-1])) + 1
-    return k, float(squares[k])
-
-
 def merge(pieces: Pieces, points: Floats, rays: Floats, gaps: Container[int], variance: float, floor: float) -> Pieces:
     pieces = list(pieces)
 

@@ -7,12 +7,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from registration.layout import Floats, Record, Records
-from vectorization.kernels import lines, ordering, pieces, tracing
+from registration.layout import Floats, Records
+from vectorization import LaserScan
+from vectorization.kernels import lines, pieces
 from vectorization.kernels import rays as beams
-from vectorization.layout import FITTED, POINT, SCANNER, SUMS
-from vectorization.tuning import MEDIAN_CHI, TRUSTED, TRUSTED_MEAN_SQUARE, WINDOW, WORST_ANGLE, WORST_FIT
+from vectorization.layout import FITTED, PIECE, POINT, SCANNER, SUMS
+from vectorization.tracing import noise_of_points, noise_of_ranges
+from vectorization.tuning import (
+    LEAST_SIGMA,
+    MEDIAN_CHI,
+    TRUSTED,
+    TRUSTED_MEAN_SQUARE,
+    UNKNOWN_SIGMA,
+    WINDOW,
+    WORST_ANGLE,
+    WORST_FIT,
+)
 
 from . import reference
 
@@ -44,19 +56,25 @@ def scanner_of(
     floor: float = FLOOR,
     default_gap: float = 0.0,
     max_gap: float = math.inf,
-    longest: float = 1.5,
-) -> Record:
-    """Return what is known of a scanner as the inner kernels take it."""
-    values = (increment, math.sqrt(variance), variance, floor, default_gap, max_gap, longest)
-    return np.array([values], SCANNER)[0]
+    least: tuple[int, float] = (3, 0.0),
+) -> Records:
+    """Return what is known of a scanner as the kernels take it."""
+    values = (increment, math.sqrt(variance), variance, floor, default_gap, max_gap, 1.5, *least)
+    return np.array([values], SCANNER)
 
 
-def line_with(**fields: float) -> Record:
+def stretches(points: Records, scanner: Records) -> tuple[Records, NDArray[np.int64]]:
+    """Return the running sums of points, and where their stretches without a gap begin."""
+    sums, starts = np.zeros(len(points) + 1, SUMS), np.empty(len(points), np.int64)
+    return sums, starts[: pieces.find_gaps(points, scanner, sums, starts)]
+
+
+def line_with(**fields: float) -> Records:
     """Return a line whose other fields are 0."""
     line = np.zeros(1, FITTED)
     for name, value in fields.items():
         line[name] = value
-    return line[0]
+    return line
 
 
 def bounds(pieces: Records) -> list[tuple[int, int]]:
@@ -70,7 +88,7 @@ def bounds(pieces: Records) -> list[tuple[int, int]]:
 )
 def test_select(values: list[float], place: float) -> None:
     k, got = int(place * (len(values) - 1)), np.array(values)
-    ordering.select(got, k)
+    beams.select(got, k)
     assert got[k] == np.partition(values, k)[k]
     assert got[:k].max(initial=-1.0) <= got[k] <= got[k:].min()
     assert sorted(got) == sorted(values)
@@ -81,16 +99,9 @@ def test_select(values: list[float], place: float) -> None:
 def test_the_cost_of_a_stretch_comes_from_running_sums(seed: int, isotropic: bool, a: int, length: int) -> None:
     points, rays = drawn(seed, isotropic=isotropic)
     b = min(40, a + length)
-    sums = pieces.running_sums(records(points, rays))
+    sums, _ = stretches(records(points, rays), scanner_of())
     expected = reference.stretch_cost(points[a:b], rays[a:b], VARIANCE, FLOOR)
-    cost = pieces.line_cost(sums[a], sums[b], scanner_of())
-    assert cost == pytest.approx(expected, rel=1e-6, abs=1e-6)
-    own = np.zeros(1, SUMS)
-    pieces.subtract(sums[b], sums[a], own[0])
-    assert pieces.line_cost(sums[0], own[0], scanner_of()) == cost
-    total = np.zeros(1, SUMS)
-    pieces.add(sums[a], own[0], total[0])
-    np.testing.assert_allclose(total.view(np.float64), sums[b : b + 1].view(np.float64), rtol=1e-14)
+    assert pieces.line_cost(sums[a], sums[b], scanner_of()[0]) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 @settings(deadline=None, max_examples=40)
@@ -98,49 +109,42 @@ def test_the_cost_of_a_stretch_comes_from_running_sums(seed: int, isotropic: boo
 def test_gaps_are_where_the_twin_finds_them(seed: int, increment: float, max_gap: float) -> None:
     points, rays = drawn(seed)
     scanner = scanner_of(increment, default_gap=0.1, max_gap=max_gap)
-    starts = pieces.find_gaps(records(points, rays), scanner)
+    _, starts = stretches(records(points, rays), scanner)
     assert starts.tolist() == reference.find_gaps(points, rays, increment, 0.02, 0.1, max_gap)
-
-
-@settings(deadline=None, max_examples=40)
-@given(seed=seeds, isotropic=st.booleans())
-def test_the_farthest_point_is_the_twins(seed: int, isotropic: bool) -> None:
-    points, rays = drawn(seed, isotropic=isotropic)
-    k, square = pieces.farthest_point(records(points, rays), 0, len(points), scanner_of())
-    expected_k, expected_square = reference.farthest_point(points, rays, VARIANCE, FLOOR)
-    assert k == expected_k
-    assert square == pytest.approx(expected_square)
 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
 def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed: int) -> None:
     points, rays = drawn(seed)
-    measured = records(points, rays)
-    gaps = pieces.find_gaps(measured, scanner_of())
-    sums = pieces.running_sums(measured)
-    parts = pieces.split(measured, sums, gaps, scanner_of())
+    measured, scanner = records(points, rays), scanner_of()
+    sums, gaps = stretches(measured, scanner)
+    parts, stack, growth = np.empty(len(points), PIECE), np.empty(len(points), PIECE), np.empty(len(points))
+    parts = parts[: pieces.split(measured, sums, gaps, scanner, parts, stack)]
     assert parts["first"][0] == 0
     assert parts["end"][-1] == len(points)
     np.testing.assert_array_equal(parts["first"][1:], parts["end"][:-1])
     assert set(gaps) <= set(parts["first"])
-    left = pieces.merge(parts, sums, gaps, scanner_of())
-    assert bounds(left) == reference.merge(bounds(parts), points, rays, set(gaps), VARIANCE, FLOOR)
+    before = bounds(parts)
+    left = parts[: pieces.merge(parts, sums, gaps, scanner, growth)]
+    assert bounds(left) == reference.merge(before, points, rays, set(gaps), VARIANCE, FLOOR)
     before = bounds(left)
     expected = reference.settle_breaks(before, points, rays, set(gaps), VARIANCE, FLOOR)
-    moved = pieces.settle_breaks(left, sums, gaps, scanner_of())
+    moved = pieces.move_breaks(left, sums, gaps, scanner)
     assert bounds(left) == expected
     assert moved == (before != expected)
 
 
-def test_the_best_break_of_a_corner_is_the_corner() -> None:
+def test_a_corner_is_split_at_the_corner() -> None:
     points = np.vstack(
         [np.stack([np.arange(10.0), np.zeros(10)], 1), np.stack([np.full(8, 9.5), np.arange(1.0, 9)], 1)]
     )
-    sums = pieces.running_sums(records(points, np.zeros_like(points)))
-    place, cost = pieces.best_break(sums, 0, 18, 3, 15, 1, scanner_of())
-    assert place == 10
-    assert cost == pytest.approx(0.0, abs=1e-6)
+    measured, scanner = records(points, np.zeros_like(points)), scanner_of(0.0, default_gap=2.0)
+    sums, gaps = stretches(measured, scanner)
+    parts = np.array([(0, 7), (7, 18)], PIECE)
+    for _ in range(3):
+        pieces.move_breaks(parts, sums, gaps, scanner)
+    assert bounds(parts) == [(0, 10), (10, 18)]
 
 
 def noisy_wall(seed: int, n: int = 60, sigma: float = 0.02) -> tuple[Floats, Floats]:
@@ -152,23 +156,20 @@ def noisy_wall(seed: int, n: int = 60, sigma: float = 0.02) -> tuple[Floats, Flo
     return ranges, rays
 
 
-def first_guess(points: Records) -> Record:
-    """Return the total least squares line of all points."""
-    line = line_with()
-    lines.line_of(pieces.running_sums(points)[-1], line)
-    return line
+def fitted(points: Records, scanner: Records) -> Any:
+    """Return the one line of all points."""
+    sums, _ = stretches(points, scanner)
+    whole, found = np.array([(0, len(points))], PIECE), np.zeros(1, FITTED)
+    assert lines.fit_lines(points, whole, sums[-1:], scanner, np.zeros(len(points), np.bool_), found) == 1
+    return found[0]
 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
 def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed: int) -> None:
     ranges, rays = noisy_wall(seed)
-    points = records(ranges[:, None] * rays, rays)
-    line = first_guess(points)
-    own = np.zeros(len(ranges), dtype=bool)
     # A variance this large lets no point be gated out; it cancels in the estimate.
-    assert lines.fit_line(points, 0, len(ranges), scanner_of(variance=1.0, floor=0.0), line, own)
-    assert own.all()
+    line = fitted(records(ranges[:, None] * rays, rays), scanner_of(variance=1.0, floor=0.0))
     assert line["count"] == len(ranges)
     (angle, distance), information = reference.fit_line(ranges, rays, math.atan2(line["ny"], line["nx"]), line["p"])
     assert math.atan2(line["ny"], line["nx"]) == pytest.approx(angle, abs=1e-5)
@@ -183,13 +184,11 @@ def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed
 
 def test_a_point_off_the_line_does_not_pull_it() -> None:
     ranges, rays = noisy_wall(1, sigma=0.0)
-    line = first_guess(records(ranges[:, None] * rays, rays))
-    expected = [line["nx"], line["ny"], line["p"]]
+    whole = fitted(records(ranges[:, None] * rays, rays), scanner_of())
     ranges[20] += 0.5
-    own = np.zeros(len(ranges), dtype=bool)
-    lines.fit_line(records(ranges[:, None] * rays, rays), 0, len(ranges), scanner_of(), line, own)
-    assert np.flatnonzero(~own).tolist() == [20]
-    np.testing.assert_allclose([line["nx"], line["ny"], line["p"]], expected, atol=1e-9)
+    line = fitted(records(ranges[:, None] * rays, rays), scanner_of())
+    assert line["count"] == len(ranges) - 1
+    np.testing.assert_allclose([line[k] for k in ("nx", "ny", "p")], [whole[k] for k in ("nx", "ny", "p")], atol=1e-9)
 
 
 @settings(deadline=None, max_examples=40)
@@ -200,23 +199,23 @@ def test_the_noise_estimates_are_the_twins(seed: int) -> None:
     angles = np.arctan2(rays[:, 1], rays[:, 0])
     expected = reference.ray_noise(ranges, angles, 0.01, TRUSTED, TRUSTED_MEAN_SQUARE)
     measured = records(points, rays)
-    assert beams.ray_noise(measured, 0.01) == pytest.approx(expected)
+    assert noise_of_ranges(measured, 0.01, measured) == pytest.approx(max(expected or UNKNOWN_SIGMA, LEAST_SIGMA))
     expected = reference.window_noise(points, WINDOW, MEDIAN_CHI)
-    assert beams.window_noise(measured) == pytest.approx(expected)
+    assert noise_of_points(points) == pytest.approx(max(expected, LEAST_SIGMA))
 
 
 @pytest.mark.parametrize("sigma", [0.005, 0.02, 0.05])
 def test_the_noise_of_a_wall_is_found(sigma: float) -> None:
     ranges, rays = noisy_wall(4, 4000, sigma)
-    step = math.acos(rays[0] @ rays[1])
-    assert beams.ray_noise(records(ranges[:, None] * rays, rays), step) == pytest.approx(sigma, rel=0.08)
+    step, points = math.acos(rays[0] @ rays[1]), records(ranges[:, None] * rays, rays)
+    assert noise_of_ranges(points, step, points) == pytest.approx(sigma, rel=0.08)
 
 
 def test_too_few_points_say_nothing_of_noise() -> None:
     ranges, rays = noisy_wall(4, 9)
     points = records(ranges[:, None] * rays, rays)
-    assert beams.ray_noise(points, 1.0) == 0.0
-    assert beams.window_noise(points) == 0.0
+    assert noise_of_ranges(points, 1.0, points) == UNKNOWN_SIGMA
+    assert noise_of_points(ranges[:, None] * rays) == UNKNOWN_SIGMA
 
 
 @settings(deadline=None, max_examples=40)
@@ -226,7 +225,9 @@ def test_beams_are_gathered_as_by_the_twin(seed: int, backward: bool, closed: bo
     ranges = rng.uniform(1, 5, 30)
     ranges[rng.random(30) < lost] = rng.choice([np.nan, np.inf])
     angles = np.arange(30.0) * (-0.2 if backward else 0.2)
-    order, points = beams.gather(ranges, np.cos(angles), np.sin(angles), backward, closed)
+    order, points = np.empty(30, np.int64), np.empty(30, POINT)
+    count = beams.gather(ranges, np.cos(angles), np.sin(angles), backward, closed, order, points)
+    order, points = order[:count], points[:count]
     expected_order, expected_r, expected_rays = reference.gather(ranges, angles, backward, closed)
     np.testing.assert_array_equal(order, expected_order)
     np.testing.assert_array_equal(points["range"], expected_r)
@@ -234,14 +235,9 @@ def test_beams_are_gathered_as_by_the_twin(seed: int, backward: bool, closed: bo
     np.testing.assert_allclose([points["x"], points["y"]], expected_r * expected_rays)
 
 
-def test_placed_points_have_rays_where_they_have_ranges() -> None:
-    points = beams.place(np.array([[3.0, 4.0], [1.0, 2.0]]), np.array([5.0, 0.0]))
-    assert points.tolist() == [(3.0, 4.0, 0.6, 0.8, 5.0), (1.0, 2.0, 0.0, 0.0, 0.0)]
-
-
 def test_ranges_are_cleaned_by_rep_117() -> None:
     ranges = np.array([np.nan, np.inf, -np.inf, 0.05, 0.0, -1.0, 0.1, 5.0, 5.01])
-    cleaned = beams.clean(ranges, 0.1, 5.0)
+    cleaned = LaserScan(0.0, 0.1, ranges, 0.1, 5.0).cleaned
     np.testing.assert_array_equal(cleaned, [np.nan, np.inf, np.nan, np.nan, np.nan, np.nan, 0.1, 5.0, np.inf])
 
 
@@ -252,7 +248,7 @@ def test_ranges_are_cleaned_by_rep_117() -> None:
 def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges: Floats, expected: Any) -> None:
     points = np.zeros(len(ranges), POINT)
     points["range"] = np.array(ranges, dtype=np.float32)
-    assert beams.quantum(points) == pytest.approx(expected)
+    assert beams.misfits_and_quantum(points, 0.0, points, np.empty(len(points)))[1] == pytest.approx(expected)
 
 
 GOOD = {
@@ -278,9 +274,10 @@ GOOD = {
     ],
 )  # fmt: skip
 def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field: str, value: Any, accepted: bool) -> None:
-    line = line_with(**{**GOOD, field: value})
-    assert bool(tracing.large_enough(line, 10, 1.0) and tracing.acceptable(line, True)) is accepted
+    scanner = scanner_of(least=(10, 1.0))
+    assert lines.rejoin(np.zeros(0, POINT), line_with(**{**GOOD, field: value}), scanner, line_with()) == accepted
 
 
 def test_points_without_rays_may_lie_on_a_line_through_their_middle() -> None:
-    assert tracing.acceptable(line_with(**{**GOOD, "p": 0.0}), False)
+    scanner = scanner_of(0.0, least=(10, 1.0))
+    assert lines.rejoin(np.zeros(0, POINT), line_with(**{**GOOD, "p": 0.0}), scanner, line_with()) == 1

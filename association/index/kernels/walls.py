@@ -1,11 +1,11 @@
-"""Compiled parts of building a map index: merging collinear pieces, and the grid over the walls."""
+"""Compiled parts of building a map index: joining collinear pieces, tying walls, and the cells of a grid."""
 
 import math
 
 import numpy as np
 
 from compiled import kernel
-from registration.layout import Floats, Record, Records
+from registration.layout import Floats, Records
 
 from ...layout import Integers
 from ...tables import JoinGates
@@ -21,83 +21,97 @@ def fade(value: float, whole: float, apart: float) -> float:
 
 
 @kernel
-def tie_between(before: Record, after: Record, apart: float) -> float:
-    """Return minus the log of how much two linked walls are one, up to `TIE_FREE`; with a step of `apart`, m, none.
-
-    The second one begins behind the begin of the first one. The step is the farthest that the shorter one is off the
-    line of the other, so that walls that bend are not one either.
-    """
-    begin, first = seen_from(before, after, after.begin)
-    _, last = seen_from(before, after, after.end)
-    if before.end - before.begin < after.end - after.begin:
-        _, first = seen_from(after, before, before.begin)
-        _, last = seen_from(after, before, before.end)
-    step = max(abs(first), abs(last))
-    correlation = fade(step, 0.0, apart) * fade(begin - before.end, WHOLE_GAP, APART_GAP)
-    return -math.log(correlation) if correlation > math.exp(-TIE_FREE) else TIE_FREE
-
-
-@kernel
-def seen_from(wall: Record, other: Record, at: float) -> tuple[float, float]:
-    """Return the abscissa on a wall of the place at an abscissa of another, and how far that is to its left, metres."""
-    x = other.dx * at - other.dy * other.offset
-    y = other.dy * at + other.dx * other.offset
-    return wall.dx * x + wall.dy * y, wall.dx * y - wall.dy * x - wall.offset
-
-
-@kernel
 def tie_walls(walls: Records, order: Integers, group: Integers, apart: float) -> Floats:
     """Return where in its group each wall is, (m,), as of `Place.ties`; in `order` they are group by group, by begin.
 
-    Each is tied to that of the walls before it to which it is tied best; with a step of `apart`, metres, to none.
+    Each is tied to that of the walls before it to which it is tied best. How much two walls are one falls with the gap
+    between them and with the step, up to `apart`, metres. The step is the farthest that the shorter one is off the line
+    of the other, so that walls that bend are not one either.
     """
     ties = np.empty(len(walls), np.float64)
     at = 0.0
     for k in range(len(order)):
         w = order[k]
+        after = walls[w]
         place = at + TIE_FREE
+        grouped = k + 1 < len(order) and group[order[k + 1]] == group[w]
         for back in range(1, min(k, TIES_BEFORE) + 1):
             v = order[k - back]
             if group[v] != group[w]:
                 break
-            here = tie_between(walls[v], walls[w], apart)
-            if here < TIE_FREE and ties[v] + here < place:
-                place = ties[v] + here
-        ties[w] = place
+            grouped = True
+            before = walls[v]
+            x = after.dx * after.begin - after.dy * after.offset
+            y = after.dy * after.begin + after.dx * after.offset
+            gap = before.dx * x + before.dy * y - before.end
+            longer, shorter = before, after
+            if before.end - before.begin < after.end - after.begin:
+                longer, shorter = after, before
+            step = 0.0
+            for along in (shorter.begin, shorter.end):
+                x = shorter.dx * along - shorter.dy * shorter.offset
+                y = shorter.dy * along + shorter.dx * shorter.offset
+                step = max(step, abs(longer.dx * y - longer.dy * x - longer.offset))
+            correlation = fade(step, 0.0, apart) * fade(gap, WHOLE_GAP, APART_GAP)
+            if correlation > math.exp(-TIE_FREE) and ties[v] - math.log(correlation) < place:
+                place = ties[v] - math.log(correlation)
+        # One alone keeps the place it would have, for those after it.
+        ties[w] = place if grouped else -1.0
         at = max(at, place)
-    for k in range(len(order)):
-        first = k == 0 or group[order[k - 1]] != group[order[k]]
-        if first and (k + 1 == len(order) or group[order[k + 1]] != group[order[k]]):
-            ties[order[k]] = -1.0
     return ties
 
 
 @kernel
-def _find(parent: Integers, i: int) -> int:
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
+def blend_walls(
+    walls: Records, lengths: Floats, order: Integers, group: Integers, ties: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return the line of each wall with those that it is tied to: their means, by length and tie.
+
+    `order` as of `tie_walls`. Returns the unit directions, by x and y, and the offsets, (m,) each.
+    """
+    lines = np.empty((3, len(walls)), np.float64)
+    for k in range(len(order)):
+        w = order[k]
+        dx, dy, x, y, total = 0.0, 0.0, 0.0, 0.0, 0.0
+        for way in (0, -1, 1):
+            j = k + way
+            while 0 <= j < len(order) and abs(j - k) <= BLENDED_WALLS and group[order[j]] == group[w]:
+                other = walls[order[j]]
+                part = lengths[order[j]] * math.exp(-abs(ties[order[j]] - ties[w]))
+                middle = 0.5 * (other.begin + other.end)
+                dx += part * other.dx
+                dy += part * other.dy
+                x += part * (other.dx * middle - other.dy * other.offset)
+                y += part * (other.dy * middle + other.dx * other.offset)
+                total += part
+                if way == 0:
+                    break
+                j += way
+        size = math.hypot(dx, dy)
+        lines[0, w] = dx / size
+        lines[1, w] = dy / size
+        lines[2, w] = (dx / size * y - dy / size * x) / total
+    return lines[0], lines[1], lines[2]
 
 
 @kernel
-def list_begins(ends: Records, cell: float) -> tuple[Integers, Integers]:
-    """List where pieces begin, by a hash of their cell: memory does not grow with the extent.
+def cell_hash(column: int, row: int, buckets: int) -> int:
+    """Return the list of a cell among a power of two of lists."""
+    return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
 
-    `ends` (n,) of `ENDS`, `cell` metres. Returns (buckets,) the last piece of each hash, and (n,) the one before each
-    piece in the same list; -1 where there is none.
+
+@kernel
+def list_begins(ends: Records, cell: float, heads: Integers) -> Integers:
+    """List where pieces (n,) of `ENDS` begin, by a hash of their cell, so that memory does not grow with the extent.
+
+    Writes the last piece of each list to `heads`, a power of two of -1. Returns (n,) the piece before each, or -1.
     """
-    n = len(ends)
-    buckets = 1
-    while buckets < 2 * n:
-        buckets *= 2
-    heads = np.full(buckets, -1)
-    following = np.full(n, -1)
-    for i in range(n):
-        key = _cell_hash(math.floor(ends[i].x1 / cell), math.floor(ends[i].y1 / cell), buckets)
+    following = np.empty(len(ends), np.int64)
+    for i in range(len(ends)):
+        key = cell_hash(math.floor(ends[i].x1 / cell), math.floor(ends[i].y1 / cell), len(heads))
         following[i] = heads[key]
         heads[key] = i
-    return heads, following
+    return following
 
 
 @kernel
@@ -113,151 +127,70 @@ def join_collinear(
 ) -> None:
     """Join pieces `first` to `last` with those that they continue or repeat, in `parent` (n,), a union-find forest.
 
-    Around each piece the begins of others are looked up. Some are not merged if more than `MOST_LOOKS` begin about one
-    piece, or beyond `MOST_STEPS` places before its end. No map of a building has so many. `ends` (n,) of `ENDS`,
-    `directions` (n,) of `POINT`; `heads` and `following` of `list_begins`.
+    A piece continues another if it begins within the gap of its end. It repeats it if it begins along it and ends near
+    its line. The lower index becomes the root. Around each piece the begins of others are looked up. Some are not
+    joined if more than `MOST_LOOKS` begin about one piece, or beyond `MOST_STEPS` places before its end. No map of a
+    building has so many. `ends` (n,) of `ENDS`; `directions` (n,) of `POINT`; `heads` and `following` of `list_begins`.
     """
+    cell, gap, lateral, least_cosine = gates.cell, gates.gap, gates.lateral, gates.least_cosine
     buckets = len(heads)
-    spacing = 1.98 * (gates.cell - gates.lateral)
+    spacing = 1.98 * (cell - lateral)
     for i in range(first, last):
-        length = math.hypot(ends[i].x2 - ends[i].x1, ends[i].y2 - ends[i].y1)
+        x1, y1, x2, y2 = ends[i].x1, ends[i].y1, ends[i].x2, ends[i].y2
+        dx, dy = directions[i].x, directions[i].y
+        length = math.hypot(x2 - x1, y2 - y1)
         looks = 0
         # At places from the end backwards, evenly spread, the last of them the begin.
         steps = math.ceil(length / spacing)
         for step in range(min(steps, MOST_STEPS) + 1):
             back = step * length / steps if step < MOST_STEPS else length
-            column = math.floor((ends[i].x2 - back * directions[i].x) / gates.cell)
-            row = math.floor((ends[i].y2 - back * directions[i].y) / gates.cell)
-            for a in range(-1, 2):
-                for b in range(-1, 2):
-                    j = heads[_cell_hash(column + a, row + b, buckets)]
-                    while j >= 0 and looks < MOST_LOOKS:
-                        looks += 1
-                        if j != i and continues(ends[i], directions[i], length, ends[j], directions[j], gates):
-                            _join(parent, i, j)
-                        j = following[j]
+            column = math.floor((x2 - back * dx) / cell)
+            row = math.floor((y2 - back * dy) / cell)
+            for around in range(9):
+                later = heads[cell_hash(column + around // 3 - 1, row + around % 3 - 1, buckets)]
+                while later >= 0 and looks < MOST_LOOKS:
+                    looks += 1
+                    j = later
+                    later = following[j]
+                    gx = ends[j].x1 - x2
+                    gy = ends[j].y1 - y2
+                    along = gx * dx + gy * dy
+                    if j == i or not -length - gap <= along <= gap or abs(gy * dx - gx * dy) > lateral:
+                        continue
+                    if directions[j].x * dx + directions[j].y * dy < least_cosine:
+                        continue
+                    if abs(along) > gap and abs((ends[j].y2 - y2) * dx - (ends[j].x2 - x2) * dy) > lateral:
+                        continue
+                    one = i
+                    while parent[one] != one:
+                        parent[one] = parent[parent[one]]
+                        one = parent[one]
+                    other = j
+                    while parent[other] != other:
+                        parent[other] = parent[parent[other]]
+                        other = parent[other]
+                    parent[max(one, other)] = min(one, other)
 
 
 @kernel
-def continues(
-    piece: Record, direction: Record, length: float, other: Record, other_direction: Record, gates: JoinGates
-) -> bool:
-    """Return whether another piece continues or repeats a piece of some length.
+def grid_cells(
+    ends: Records, sectors: Integers, radius: float, shape: Records, listing: bool
+) -> tuple[Integers, Integers, Integers]:
+    """List for every cell of a uniform grid the walls that come within `radius` of the cell, and their directions.
 
-    It begins along the piece, or within the gap of its end. If it begins along it, it has to end near its line, too.
+    `ends` (m,) of `ENDS`; `sectors` (m,) of the directions; `shape` (1,) of `GRID_SHAPE`. Returns ``(starts, items,
+    bits)``: cell ``c = row * columns + column`` holds ``items[starts[c]:starts[c + 1]]``, in ascending order, and bit
+    ``sectors[i]`` of ``bits[c]`` is set for each wall i of these. Unless `listing`, only the bits are of use.
     """
-    dx = direction.x
-    dy = direction.y
-    gx = other.x1 - piece.x2
-    gy = other.y1 - piece.y2
-    along = gx * dx + gy * dy
-    return (
-        -length - gates.gap <= along <= gates.gap
-        and abs(gy * dx - gx * dy) <= gates.lateral
-        and other_direction.x * dx + other_direction.y * dy >= gates.least_cosine
-        and (abs(along) <= gates.gap or abs((other.y2 - piece.y2) * dx - (other.x2 - piece.x2) * dy) <= gates.lateral)
-    )
-
-
-@kernel
-def _join(parent: Integers, i: int, j: int) -> None:
-    """Join two trees of a union-find forest; the lower index becomes the root."""
-    one = _find(parent, i)
-    other = _find(parent, j)
-    if one < other:
-        parent[other] = one
-    else:
-        parent[one] = other
-
-
-@kernel
-def label_groups(parent: Integers) -> None:
-    """Turn a union-find forest (n,) into labels, the lowest index of each group."""
-    for i in range(len(parent)):
-        parent[i] = _find(parent, i)
-
-
-@kernel
-def blend_walls(
-    walls: Records, lengths: Floats, order: Integers, group: Integers, ties: Floats, lines: Records
-) -> None:
-    """Write the line of each wall with those that it is tied to, (m,) of `LINE`: their means, by length and tie.
-
-    `order` as of `tie_walls`.
-    """
-    for k in range(len(order)):
-        w = order[k]
-        dx = lengths[w] * walls[w].dx
-        dy = lengths[w] * walls[w].dy
-        x, y = middle_of(walls[w])
-        x *= lengths[w]
-        y *= lengths[w]
-        total = lengths[w]
-        for way in (-1, 1):
-            j = k + way
-            while 0 <= j < len(order) and abs(j - k) <= BLENDED_WALLS and group[order[j]] == group[w]:
-                v = order[j]
-                part = lengths[v] * math.exp(-abs(ties[v] - ties[w]))
-                dx += part * walls[v].dx
-                dy += part * walls[v].dy
-                at_x, at_y = middle_of(walls[v])
-                x += part * at_x
-                y += part * at_y
-                total += part
-                j += way
-        size = math.hypot(dx, dy)
-        line = lines[w]
-        line.dx = dx / size
-        line.dy = dy / size
-        line.offset = (line.dx * y - line.dy * x) / total
-
-
-@kernel
-def middle_of(wall: Record) -> tuple[float, float]:
-    """Return the midpoint of a wall, metres."""
-    middle = 0.5 * (wall.begin + wall.end)
-    return wall.dx * middle - wall.dy * wall.offset, wall.dy * middle + wall.dx * wall.offset
-
-
-@kernel
-def _cell_hash(column: int, row: int, buckets: int) -> int:
-    return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
-
-
-@kernel
-def _column_span(
-    x1: float, y1: float, x2: float, y2: float, radius: float, low: float, high: float
-) -> tuple[float, float]:
-    """Return the span of y that a segment dilated by `radius` may have between two values of x."""
-    left = max(low - radius, min(x1, x2))
-    right = min(high + radius, max(x1, x2))
-    if left > right:
-        # Beyond the ends: the disc around the nearer one.
-        left = min(max(left, min(x1, x2)), max(x1, x2))
-        right = left
-    if abs(x2 - x1) < 1e-9:
-        ya = min(y1, y2)
-        yb = max(y1, y2)
-    else:
-        ya = y1 + (left - x1) / (x2 - x1) * (y2 - y1)
-        yb = y1 + (right - x1) / (x2 - x1) * (y2 - y1)
-    return min(ya, yb) - radius, max(ya, yb) + radius
-
-
-@kernel
-def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, Integers]:
-    """List for every cell of a uniform grid the walls that come within `radius` of the cell.
-
-    `shape` (1,) of `GRID_SHAPE`. Returns ``(starts, items)``: cell ``c = row * columns + column``
-    holds ``items[starts[c]:starts[c + 1]]``, in ascending order.
-    """
-    x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
-    columns, rows = shape[0].columns, shape[0].rows
+    x0, y0, cell, columns, rows = shape[0].x0, shape[0].y0, shape[0].cell, shape[0].columns, shape[0].rows
     places = columns * rows
     starts = np.zeros(places + 1, np.int32)
+    bits = np.zeros(places, np.uint16)
     items = np.zeros(0, np.int32)
     for counting in (True, False):
         if not counting:
+            if not listing:
+                break
             total = 0
             for c in range(places + 1):
                 here = starts[c]
@@ -265,46 +198,33 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
                 total += here
             items = np.zeros(total, np.int32)
         for i in range(len(ends)):
-            x1 = ends[i].x1
-            y1 = ends[i].y1
-            x2 = ends[i].x2
-            y2 = ends[i].y2
-            first = max(0, int((min(x1, x2) - radius - x0) / cell))
-            last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
+            x1, y1, x2, y2 = ends[i].x1, ends[i].y1, ends[i].x2, ends[i].y2
+            least, most = min(x1, x2), max(x1, x2)
+            bit = np.uint16(1 << sectors[i])
+            first = max(0, int((least - radius - x0) / cell))
+            last = min(columns - 1, int((most + radius - x0) / cell))
             for column in range(first, last + 1):
-                low = x0 + column * cell
-                ya, yb = _column_span(x1, y1, x2, y2, radius, low, low + cell)
-                bottom = max(0, int((ya - y0) / cell))
-                top = min(rows - 1, int((yb - y0) / cell))
+                # The part of the wall that lies within `radius` of the column; beyond its ends, the nearer one.
+                left = max(x0 + column * cell - radius, least)
+                right = min(x0 + column * cell + cell + radius, most)
+                if left > right:
+                    left = right = min(max(left, least), most)
+                ya, yb = y1, y2
+                if most - least >= 1e-9:
+                    ya = y1 + (left - x1) / (x2 - x1) * (y2 - y1)
+                    yb = y1 + (right - x1) / (x2 - x1) * (y2 - y1)
+                bottom = max(0, int((min(ya, yb) - radius - y0) / cell))
+                top = min(rows - 1, int((max(ya, yb) + radius - y0) / cell))
                 for row in range(bottom, top + 1):
                     c = row * columns + column
-                    if not counting:
+                    if counting:
+                        bits[c] |= bit
+                    else:
                         items[starts[c]] = i
                     starts[c] += 1
-    # The second pass moved every start to the next one's place.
-    for c in range(places, 0, -1):
-        starts[c] = starts[c - 1]
-    starts[0] = 0
-    return starts, items
-
-
-@kernel
-def direction_raster(ends: Records, radius: float, shape: Records, sectors: Integers, bits: Integers) -> None:
-    """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of, in `bits` (rows * columns,)."""
-    x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
-    columns, rows = shape[0].columns, shape[0].rows
-    for i in range(len(ends)):
-        x1 = ends[i].x1
-        y1 = ends[i].y1
-        x2 = ends[i].x2
-        y2 = ends[i].y2
-        bit = np.uint32(1 << sectors[i])
-        first = max(0, int((min(x1, x2) - radius - x0) / cell))
-        last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
-        for column in range(first, last + 1):
-            low = x0 + column * cell
-            ya, yb = _column_span(x1, y1, x2, y2, radius, low, low + cell)
-            bottom = max(0, int((ya - y0) / cell))
-            top = min(rows - 1, int((yb - y0) / cell))
-            for row in range(bottom, top + 1):
-                bits[row * columns + column] |= bit
+    if listing:
+        # The second pass moved every start to the next one's place.
+        for c in range(places, 0, -1):
+            starts[c] = starts[c - 1]
+        starts[0] = 0
+    return starts, items, bits

@@ -1,4 +1,4 @@
-"""The freedom that a line, or a set of lines, takes from a pose, in nats."""
+"""The freedom that a set of lines takes from a pose, in nats."""
 
 import math
 
@@ -25,17 +25,3 @@ def log_determinant(information: Record, model: Record) -> float:
     second = max(1.0, yy - xy / xx * xy)
     third = max(1.0, tt - xt / xx * xt - left / second * left)
     return 0.5 * math.log(xx * second * third)
-
-
-@kernel
-def freedom_alone(line: Record, model: Record, information: Record) -> float:
-    """Return the freedom that a line alone takes from a pose, nats: no set with it takes less."""
-    weight = line.weight / (1.0 + line.weight * model.wall_variance)
-    lever = line.dx * line.centroid_x + line.dy * line.centroid_y
-    information.xx = weight  # across the line
-    information.xy = 0.0
-    information.xt = weight * lever
-    information.yy = 0.0
-    information.yt = 0.0
-    information.tt = weight * lever * lever + line.weight * line.spread
-    return log_determinant(information, model)

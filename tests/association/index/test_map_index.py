@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from association import InvalidMapError, MapIndex
+from association.index.merging import ends_of
 from association.index.tuning import (
     CELL,
     LEAST_DIFFERENCE,
@@ -22,7 +23,6 @@ from association.index.tuning import (
     NEIGHBOURHOOD,
     SWEEP_CELL,
 )
-from association.index.walls import ends_of
 from association.tables import Walls
 from association.tuning import REACH, SECTORS
 from registration import Segments
@@ -164,14 +164,14 @@ def test_built_without_directions_it_is_its_own_undirected() -> None:
     assert np.array_equal(index.segments.endpoints, np.vstack([segments.endpoints, turned]))
 
 
-def test_the_sweep_lists_the_sector_of_every_run() -> None:
+def test_the_sweep_lists_the_sector_of_every_chain() -> None:
     chains, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
     off = (MAZE_INDEX.sweep.chains["angle"][chains] + math.pi - sectors * math.tau / SECTORS) % math.tau
     assert set(chains) == set(range(len(MAZE_INDEX.chains.rows)))
     assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
 
 
-def test_the_sweep_lists_runs_where_they_are() -> None:
+def test_the_sweep_lists_chains_where_they_are() -> None:
     sweep = MAZE_INDEX.sweep
     starts, shape, ends = (
         sweep.sectors.starts,
@@ -187,7 +187,7 @@ def test_the_sweep_lists_runs_where_they_are() -> None:
         assert {s for s in range(SECTORS) if present >> s & 1} == there
 
 
-def test_runs_that_are_near_one_another_are_numbered_together() -> None:
+def test_chains_that_are_near_one_another_are_numbered_together() -> None:
     """What is swept one after the other is then read from one place."""
     corners = np.random.default_rng(0).uniform(0.0, 300.0, (400, 2))
     index = index_of(np.hstack([corners, corners + np.array([3.0, 0.0])]))
@@ -198,29 +198,13 @@ def test_runs_that_are_near_one_another_are_numbered_together() -> None:
     assert len([*itertools.groupby(squares)]) == len(set(squares)) > 20
 
 
-def test_what_the_verdict_takes_from_a_map() -> None:
-    """Two walls of 4 m and 2 m the same way, one of 3 m across, one of 1 m the other way round."""
+def test_area_and_crowd_are_those_of_the_grid() -> None:
     index = index_of([[0, 0, 4, 0], [0, 5, 2, 5], [8, 0, 8, 3], [3, 3, 2, 3]])
-    ascending, beyond, agreeing, area = index.wall_lengths
-    np.testing.assert_allclose(ascending, [1, 2, 3, 4])
-    np.testing.assert_allclose(beyond, [10, 9, 7, 4, 0])
-    assert agreeing == pytest.approx(0.6 * 0.6 + 0.3 * 0.3 + 0.1 * 0.1)
     columns, rows = index.grid.shape["columns"][0], index.grid.shape["rows"][0]
-    assert index.area == area == pytest.approx(CELL**2 * columns * rows)
+    assert index.area == pytest.approx(CELL**2 * columns * rows)
     assert (8.0 + 2.0 * REACH) * (5.0 + 2.0 * REACH) < index.area < 13.0 * 10.0
     counts = np.diff(index.grid.starts)
     assert index.crowd == pytest.approx((counts**2).sum() / counts.sum())
-
-
-def test_neighbouring_directions_agree() -> None:
-    """Also over the bin where the directions begin."""
-    small = math.radians(3.0)
-    ends = [
-        [0.0, 3.0 * k, math.cos(a), 3.0 * k + math.sin(a)] for k, a in enumerate((math.pi - small, small - math.pi))
-    ]
-    assert index_of(ends).wall_lengths.agreeing == pytest.approx(1.0)
-    ends[1] = [0.0, 3.0, math.cos(3.0 * small - math.pi), 3.0 + math.sin(3.0 * small - math.pi)]
-    assert index_of(ends).wall_lengths.agreeing == pytest.approx(0.5)
 
 
 def test_its_memory_is_known() -> None:
@@ -278,5 +262,5 @@ def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
 def test_what_every_search_asks_of_a_map_is_there_before_the_first() -> None:
     """Else that one takes as long again, in a small map."""
     index = index_of(ROOM)
-    assert vars(index).keys() >= {"wall_lengths", "crowd", "area", "diagonal", "tables"}
+    assert vars(index).keys() >= {"crowd", "area", "diagonal", "tables"}
     assert "undirected" not in vars(index), "which is as large, and seldom asked for"

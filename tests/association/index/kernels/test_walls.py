@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 
 from association.index.kernels import walls
+from association.index.merging import collinear_groups, join_gates
 from association.index.tuning import CHAIN_GAP, MOST_LOOKS
-from association.index.walls import collinear_groups, join_gates
 from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
+from association.tuning import SECTORS
 from registration import Segments
 from registration.layout import Floats, Records
 
@@ -20,6 +21,7 @@ from ...kernels.drawn import SEEDS
 from ...reference import walls as twin
 from ...scenes import maze
 
+NO_SECTORS = np.zeros(100, np.int32)
 SHAPE = record(GRID_SHAPE, x0=-7.3, y0=-9.1, cell=1.7, columns=27, rows=29)  # holds the maze and 6 m around it
 
 
@@ -117,7 +119,7 @@ def turned_maze(seed: int) -> Floats:
 
 
 def lists_of(ends: Floats, radius: float, shape: Records) -> list[list[int]]:
-    starts, items = walls.grid_cells(as_records(ENDS, ends), radius, shape)
+    starts, items, _ = walls.grid_cells(as_records(ENDS, ends), NO_SECTORS[: len(ends)], radius, shape, True)
     assert starts[0] == 0
     assert starts[-1] == len(items)
     return [items[a:b].tolist() for a, b in itertools.pairwise(starts)]
@@ -143,9 +145,10 @@ def test_every_wall_is_listed_where_it_is_near() -> None:
 
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
-def test_direction_raster(seed: int) -> None:
+def test_directions_near_each_cell(seed: int) -> None:
+    """With lists or without."""
     ends = turned_maze(seed)
-    sectors = np.random.default_rng(seed).integers(0, 32, len(ends)).astype(np.int32)
-    bits = np.zeros(int(SHAPE["columns"][0] * SHAPE["rows"][0]), np.uint32)
-    walls.direction_raster(as_records(ENDS, ends), 0.43, SHAPE, sectors, bits)
-    assert bits.tolist() == twin.direction_raster(ends, 0.43, SHAPE, sectors)
+    sectors = np.random.default_rng(seed).integers(0, SECTORS, len(ends)).astype(np.int32)
+    expected = twin.direction_raster(ends, 0.43, SHAPE, sectors)
+    for listing in (True, False):
+        assert walls.grid_cells(as_records(ENDS, ends), sectors, 0.43, SHAPE, listing)[2].tolist() == expected

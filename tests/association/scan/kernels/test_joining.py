@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from numpy.typing import ArrayLike
 
-from association import Scan, mirrored
-from association.layout import POINT, VARIANCES, Integers, as_records, record
-from association.scan.kernels import describing, joining
+from association import AssociationOptions, Scan, mirrored
+from association.layout import LINE_PARTS, VARIANCES, record
+from association.scan.kernels.joining import describe_lines, join_lines
+from association.scan.scan_lines import ScanLines, variances_of
 from association.scan.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
-from association.tables import Measured
 from registration import MeasuredSegments, Segments
 from registration.layout import LEAST_POINTS, Floats, Records
 
@@ -48,16 +48,14 @@ def measured_of(rng: np.random.Generator, ends: ArrayLike) -> MeasuredSegments:
     return MeasuredSegments.from_segments(segments, rng.uniform(0.005, 0.1, n), points, moments)
 
 
-def given_to(measured: MeasuredSegments) -> Measured:
-    segments = measured.segments
-    return Measured(
-        as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
-        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.point_counts,
-    )  # fmt: skip
-
-
 def given_of(measured: MeasuredSegments) -> Records:
-    return joining.as_lines(given_to(measured))
+    segments, given = measured.segments, np.zeros(len(measured), LINE_PARTS)
+    columns = *segments.directions.T, *segments.midpoints.T, segments.lengths, *measured.centroids.T, measured.spreads
+    names = "dx", "dy", "x", "y", "length", "centroid_x", "centroid_y", "spread"
+    for name, values in zip(names, columns, strict=True):
+        given[name] = values
+    given["sigma"], given["points"] = measured.sigma, measured.point_counts
+    return given
 
 
 def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
@@ -69,33 +67,17 @@ def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
     return MeasuredSegments(segments, lines["sigma"], lines["points"], centroids, lines["spread"], counted)
 
 
-def labelled(
+def joined(
     measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE, *, directed: bool = True
-) -> list[int]:
-    order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
-    return [int(label) for label in joining.collinear_lines(given_of(measured), order, lateral, cosine, directed)]
+) -> tuple[list[int], Records]:
+    """Return the line of each segment, and the lines."""
+    labels, lines = join_lines(given_of(measured), np.array([[lateral, cosine]]), measured.counted, directed)
+    return labels.tolist(), lines
 
 
-def joined(measured: MeasuredSegments, labels: list[int] | None = None) -> Records:
-    """Join the segments of each label; by default those that continue one another."""
-    order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
-    of_line: Integers = np.array(labelled(measured) if labels is None else labels, np.intp)
-    return joining.join_labelled(given_of(measured), order, of_line, measured.counted)
-
-
-def test_union_length() -> None:
-    lows, highs = np.array([3.0, 0.0, 0.5, 3.0, 9.0]), np.array([4.0, 2.0, 1.0, 5.0, 9.5])
-    assert [joining.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
-
-
-@given(SEEDS)
-@settings(max_examples=100, deadline=None)
-def test_union_length_of_many(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lows = rng.integers(0, 40, 12).astype(float)
-    highs = lows + rng.integers(0, 9, 12).astype(float)
-    cells = {x for low, high in zip(lows, highs, strict=True) for x in range(int(low), int(high))}
-    assert joining.union_length(lows, highs, 12) == len(cells)
+def same_groups(one: list[int], other: list[int]) -> bool:
+    """Return whether labels mean the same groups, whatever their numbers are."""
+    return [one.index(label) for label in one] == [other.index(label) for label in other]
 
 
 @given(SEEDS)
@@ -109,7 +91,7 @@ def test_collinear_segments(seed: int) -> None:
     for lateral, cosine in ((LINE_LATERAL, LINE_COSINE), (CUT_LATERAL, CUT_COSINE)):
         for directed in (True, False):
             expected = twin.collinear_segments(measured, lateral, cosine, directed=directed)
-            assert labelled(measured, lateral, cosine, directed=directed) == expected
+            assert same_groups(joined(measured, lateral, cosine, directed=directed)[0], expected)
 
 
 @pytest.mark.parametrize(
@@ -132,14 +114,14 @@ def test_collinear_segments(seed: int) -> None:
 )
 def test_what_continues_or_repeats_another_is_of_its_line(other: list[float], one_line: bool) -> None:
     for ends in ([[0.0, 0.0, 4.0, 0.0], other], [other, [0.0, 0.0, 4.0, 0.0]]):
-        assert (len(set(labelled(measured_of(np.random.default_rng(0), ends)))) == 1) is one_line
+        assert (len(joined(measured_of(np.random.default_rng(0), ends))[1]) == 1) is one_line
 
 
 def test_pieces_are_taken_on_one_after_the_other() -> None:
     """The last is far from the first, and near another one that is near it; what lies beyond a gap is another line."""
     cuts = [(0.0, 4.0), (6.0, 8.0), (4.2, 5.8), (8.4, 9.0)]
     measured = measured_of(np.random.default_rng(0), [[a, 0.0, b, 0.0] for a, b in cuts])
-    assert labelled(measured) == [0, 0, 0, 1]
+    assert joined(measured)[0] == [0, 0, 0, 1]
 
 
 @given(SEEDS)
@@ -151,7 +133,11 @@ def test_join_segments(seed: int) -> None:
     if seed % 3 == 0:
         measured = replace(measured, sigma=np.where(rng.random(len(measured)) < 0.2, 0.0, measured.sigma))
     labels = twin.collinear_segments(measured, LINE_LATERAL, LINE_COSINE)
-    assert_records(joined(measured, labels), twin.join_segments(measured, labels), rtol=1e-8, atol=1e-9)
+    expected = twin.join_segments(measured, labels)
+    got_labels, got = joined(measured)
+    order = [labels[got_labels.index(k)] for k in range(len(got))]
+    assert (np.diff(got["length"]) <= 0.0).all()
+    assert_records(got, expected[order], rtol=1e-8, atol=1e-9)
 
 
 @given(SEEDS)
@@ -171,7 +157,7 @@ def test_a_segment_in_pieces_or_twice_is_the_segment(seed: int) -> None:
         Segments.from_array([[*begin, *end]]), 0.03, None if points is None else np.array([400.0])
     )
     pieces = MeasuredSegments.from_segments(Segments.from_array(ends), 0.03, points)
-    assert_records(joined(pieces), joined(whole), rtol=1e-6, atol=1e-6)
+    assert_records(joined(pieces)[1], joined(whole)[1], rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -190,7 +176,7 @@ def test_a_segment_in_pieces_or_twice_is_the_segment(seed: int) -> None:
 )
 def test_points_of_a_line(ends: list[list[float]], points: list[float] | None, expected: float) -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.03, points)
-    (line,) = joined(measured)
+    (line,) = joined(measured)[1]
     assert line["variance"] == pytest.approx(0.03**2 / expected)
 
 
@@ -200,22 +186,21 @@ def test_describe_lines(seed: int) -> None:
     """Some are equally long; variances are below and above what they come to at least."""
     rng = np.random.default_rng(seed)
     measured = measured_of(rng, in_pieces(rng))
-    lines = joined(measured, list(range(len(measured))))
+    lines = twin.join_segments(measured, list(range(len(measured))))
+    lines = lines[twin.longest_first(lines["length"])]
     lines["spread"] *= rng.choice([1e-6, 1.0], len(lines))
     lines["variance"] *= rng.choice([0.0, 1.0], len(lines))
     lines["covered"] *= rng.uniform(0.5, 1.0, len(lines))
     names = ("map", "common", "least_offset", "least_angle")
     variances = record(VARIANCES, **dict(zip(names, rng.choice([0.0, 1e-10, 1e-3, 1.0], 4), strict=True)))
     model = model_of(float(rng.choice([1e-4, 1e-2])), 0.3, 0.1)
-    order, expected = twin.describe_lines(lines, variances[0], model[0])
-    got = describing.describe_lines(lines, np.array(order), variances, model)
+    _, expected = twin.describe_lines(lines, variances[0], model[0])
+    got, seen = describe_lines(lines, variances, model)
     assert_records(got, expected, rtol=1e-8, atol=1e-12)
-
-
-def view_of(seed: int) -> tuple[MeasuredSegments, Records, Records]:
-    """Return segments, and what goes into the variances of lines and of walls."""
-    rng = np.random.default_rng(seed)
-    return measured_of(rng, in_pieces(rng)), record(VARIANCES, map=1e-4), model_of(1e-3, 0.3, 0.1)
+    assert seen["row"].tolist() == list(range(len(got)))
+    assert (seen["sensor"] == 0).all()
+    for name in ("dx", "dy", "x", "y", "length"):
+        np.testing.assert_array_equal(seen[name], got[name])
 
 
 def assert_rows(got: Records, expected: Records, rtol: float) -> None:
@@ -228,39 +213,36 @@ def assert_rows(got: Records, expected: Records, rtol: float) -> None:
 
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
-def test_describe_view(seed: int) -> None:
-    """First what was cut is joined, then what lies about on a line; the longest comes first, and is seen as it is."""
-    measured, variances, model = view_of(seed)
+def test_lines_of_a_view(seed: int) -> None:
+    """First what was cut is joined, then what lies about on a line; the longest comes first."""
+    rng, options = np.random.default_rng(seed), AssociationOptions()
+    measured = measured_of(rng, in_pieces(rng))
     cut = twin.collinear_segments(measured, CUT_LATERAL, CUT_COSINE)
     once = as_measured(twin.join_segments(replace(measured, counted=True), cut), counted=measured.counted)
     if len(once) == len(measured):
         once, cut = measured, list(range(len(measured)))
     apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE)
+    variances, model = variances_of(0.01, options, with_beams=False)
     order, expected = twin.describe_lines(twin.join_segments(once, apart), variances[0], model[0])
-    row_of, rows, seen = describing.describe_view(given_to(measured), measured.counted, True, variances, model)
-    assert row_of.tolist() == [order.index(apart[line]) for line in cut]
-    assert_rows(rows, expected, 1e-7)
-    assert seen["row"].tolist() == list(range(len(rows)))
-    assert (seen["sensor"] == 0).all()
-    for name in ("dx", "dy", "x", "y", "length"):
-        np.testing.assert_array_equal(seen[name], rows[name])
+    lines = ScanLines.of(Scan(measured), 0.01, options)
+    assert lines.row_of.tolist() == [order.index(apart[line]) for line in cut]
+    assert_rows(lines.rows, expected, 1e-7)
 
 
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
-def test_mirror_lines(seed: int) -> None:
+def test_mirrored_lines(seed: int) -> None:
     """Those of the mirrored scan, to rounding: its segments lie in the same order, and go together in the same way."""
-    measured, variances, model = view_of(seed)
-    row_of, rows, _ = describing.describe_view(given_to(measured), measured.counted, True, variances, model)
-    other = mirrored(Scan(measured)).measured
-    expected_row_of, expected, _ = describing.describe_view(given_to(other), other.counted, True, variances, model)
-    assert row_of.tolist() == expected_row_of.tolist()
-    got, got_seen = describing.mirror_lines(rows)
-    assert_rows(got, expected, 1e-9)
-    np.testing.assert_array_equal(got_seen, describing.seen_at_once(got))
+    rng, options = np.random.default_rng(seed), AssociationOptions()
+    scan = Scan(measured_of(rng, in_pieces(rng)))
+    got, expected = ScanLines.of(scan, 0.01, options).mirrored(), ScanLines.of(mirrored(scan), 0.01, options)
+    assert got.row_of.tolist() == expected.row_of.tolist()
+    assert_rows(got.rows, expected.rows, 1e-9)
+    assert_records(got.sightings, expected.sightings, rtol=1e-9, atol=1e-9)
 
 
 def test_a_scan_of_nothing_has_no_lines() -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(np.zeros((0, 4))))
-    assert labelled(measured) == []
-    assert len(joined(measured)) == 0
+    labels, lines = joined(measured)
+    assert labels == []
+    assert len(lines) == 0
