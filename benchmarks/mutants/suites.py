@@ -54,18 +54,8 @@ SUITES = {
         )
     ),
     "vectorization/": Suite(("tests/vectorization",)),
-    "association/consensus/kernels/view_estimation.py": Suite(("tests/association/scan/test_views.py",)),
     "association/index/kernels/": Suite(("tests/association/index/kernels",)),
     "association/scan/kernels/": Suite(("tests/association/scan/kernels",)),
-    "association/consensus/kernels/": Suite(("tests/association/consensus/kernels",)),
-    "association/search/kernels/": Suite(("tests/association/search/kernels",)),
-    "association/verdict/kernels/": Suite(("tests/association/verdict/kernels",)),
-    "association/verdict/verdict.py": Suite(
-        tuple(
-            f"tests/association/{name}.py"
-            for name in ("verdict/test_verdict", "test_drawn_verdicts", "scan/test_views")
-        )
-    ),
     "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),

@@ -1,0 +1,151 @@
+"""Points of a map stop beams, as legs of tables do; they are never part of a hypothesis."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from association import NO_POINTS, InvalidMapError, MapIndex, MapPart, MapPoints, associate, associate_on_maps, map_set
+from registration import RigidTransform, Segments
+
+from .scenes import (
+    INSIDE,
+    ROOM,
+    Floats,
+    answer_of,
+    box,
+    equal_rooms,
+    index_of,
+    pose,
+    pose_in,
+    probability_in,
+    ranges,
+    same_pose,
+    scan_of,
+    seen,
+    without_beams,
+)
+
+WALLS = Segments.from_array(ROOM)
+POST = (2.0, 2.5)
+# Legs in the second of two equal rooms, 4 cm thick.
+LEGS = np.array([[14.2, 2.0], [14.2, 3.4], [16.5, 1.2], [17.4, 2.9], [13.4, 1.4], [16.0, 5.2]])
+SHIFT = np.array([12.0, 0.0])
+
+
+def furnished(walls: Floats, legs: Floats) -> Floats:
+    """Return walls and things of 4 cm."""
+    return np.vstack([walls, *(box(x - 0.02, y - 0.02, 0.04, 0.04) for x, y in legs.tolist())])
+
+
+def with_points(walls: Floats, points: Floats, sigma: float | None = None) -> MapIndex:
+    return MapIndex.build(Segments.from_array(walls), points=MapPoints.of(points, sigma))
+
+
+def test_points_tell_equal_rooms_apart() -> None:
+    """Beams read them; without beams the rooms are equal."""
+    bare, pointed = index_of(equal_rooms(2)), with_points(equal_rooms(2), LEGS)
+    at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
+    truth = furnished(equal_rooms(2), LEGS)
+    scan = ranges(truth, at, 1, beams=1440)
+    assert not answer_of(bare, scan).usable
+    found = answer_of(pointed, scan)
+    assert same_pose(pose_in(found), at)
+    other = next(one for one in found.alternatives if same_pose(one.pose, INSIDE))
+    assert probability_in(found) > 2.0 * (other.probability or 0.0)
+    blind = answer_of(pointed, without_beams(scan))
+    assert blind.diagnostics is not None
+    assert blind.diagnostics.margin == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_beam_that_passes_a_point_is_no_evidence() -> None:
+    """The legs of the map are gone: some centimetres would suffice to miss them."""
+    at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
+    scan = ranges(equal_rooms(2), at, 1)
+    bare, pointed = (answer_of(one, scan) for one in (index_of(equal_rooms(2)), with_points(equal_rooms(2), LEGS)))
+    assert pointed.diagnostics is not None
+    assert bare.diagnostics is not None
+    assert (pointed.status, pointed.usable) == (bare.status, bare.usable)
+    assert pointed.diagnostics.margin == pytest.approx(bare.diagnostics.margin, abs=1.0)
+
+
+def test_points_are_never_a_base_or_a_pair() -> None:
+    """A scan of nothing but legs has no pose; correspondences name segments of the map."""
+    pointed = with_points(ROOM, LEGS - SHIFT)
+    scan = ranges(furnished(ROOM, LEGS - SHIFT), INSIDE, 2, beams=1440)
+    result = answer_of(pointed, scan)
+    assert result.usable
+    assert all(pair.map < len(ROOM) for pair in result.correspondences)
+    assert answer_of(pointed, scan_of(np.zeros((0, 4)))).pose is None
+
+
+def test_without_beams_points_change_nothing() -> None:
+    for seed in range(3):
+        scan = scan_of(seen(ROOM, INSIDE, noise=0.02, cut=0.4, clutter=2, seed=seed)[0], viewpoint=(0.0, 0.0))
+        bare, pointed = (answer_of(index, scan) for index in (index_of(ROOM), with_points(ROOM, LEGS - SHIFT)))
+        assert (pointed.status, pointed.usable, pointed.pose) == (bare.status, bare.usable, bare.pose)
+        assert pointed.probability == pytest.approx(bare.probability, abs=1e-9)
+
+
+def test_points_move_with_the_map() -> None:
+    """A point stops beams over a width that is not the same in all directions of the map, hence the tolerance."""
+    by = RigidTransform(4e4, -2e4, 1.1)
+    at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
+    scan = ranges(furnished(equal_rooms(2), LEGS), at, 1, beams=1440)
+    moved = by.apply(equal_rooms(2).reshape(-1, 2)).reshape(-1, 4)
+    one, other = answer_of(with_points(equal_rooms(2), LEGS), scan), answer_of(with_points(moved, by.apply(LEGS)), scan)
+    assert (one.status, one.usable) == (other.status, other.usable)
+    assert same_pose(by.compose(pose_in(one)), pose_in(other), 1e-6, 1e-6)
+    assert one.probability == pytest.approx(other.probability, abs=0.005)
+
+
+def test_a_map_without_directions_has_its_points() -> None:
+    at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
+    scan = ranges(furnished(equal_rooms(2), LEGS), at, 1, beams=1440)
+    found = answer_of(with_points(equal_rooms(2), LEGS), scan, oriented=False)
+    assert same_pose(pose_in(found), at)
+
+
+def test_points_of_several_maps_lie_on_their_own() -> None:
+    """Two equal rooms as two maps, and the legs are in the second."""
+    legs = LEGS - SHIFT
+    maps = map_set({"bare": MapPart(WALLS, points=NO_POINTS), "legs": MapPart(WALLS, points=MapPoints.of(legs))})
+    scan = ranges(furnished(ROOM, legs), INSIDE, 1, beams=1440)
+    found = associate_on_maps(maps, scan)
+    assert found.map_id == "legs"
+    assert same_pose(pose_in(found), INSIDE)
+    alone = associate(with_points(ROOM, legs), scan)
+    assert same_pose(pose_in(found), pose_in(alone), 1e-6, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("points", "sigma", "argument", "message"),
+    [
+        ([[1.0, 2.0, 3.0]], None, "map.points", "found an array of shape"),
+        ([1.0, 2.0], None, "map.points", "found an array of shape"),
+        ([[1.0, 2.0], [3.0]], None, "map.points", "rows"),
+        ([["a", "b"]], None, "map.points", "rows"),
+        ([[0.0, 0.0], [math.nan, 0.0]], None, "map.points.1", "finite"),
+        (np.zeros((200_001, 2)), None, "map.points", "at most 200000 points, found 200001"),
+        ([POST], 0.0, "map.points_sigma", "above 0"),
+        ([POST], -1.0, "map.points_sigma", "above 0"),
+        ([POST], 10.1, "map.points_sigma", "found 10.1"),
+        ([POST], math.nan, "map.points_sigma", "above 0"),
+    ],
+)
+def test_arrays_that_are_no_points_are_rejected(
+    points: object, sigma: float | None, argument: str, message: str
+) -> None:
+    with pytest.raises(InvalidMapError, match=message) as error:
+        MapPoints.of(points, sigma)  # type: ignore[arg-type]
+    assert error.value.argument == argument
+
+
+def test_points_are_counted_and_those_far_outside_are_left_out() -> None:
+    far = MapPoints.of([POST, [90.0, 0.0], [2e5, 0.0], [0.0, -90.0]])
+    assert len(far) == 4
+    index = MapIndex.build(WALLS, points=far)
+    np.testing.assert_array_equal(index.points.positions, [POST])
+    assert len(MapIndex.build(WALLS).points) == len(NO_POINTS) == 0

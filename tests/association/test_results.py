@@ -1,0 +1,458 @@
+"""The parts of an answer agree with one another, in every kind of answer; warnings, messages and explanations."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from dataclasses import asdict, replace
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+import association
+from association import (
+    AS_WELL,
+    AssociationOptions,
+    AssociationResult,
+    AssociationWarning,
+    Beams,
+    HardPrior,
+    InvalidMapError,
+    MapIndex,
+    Prior,
+    ReasonCode,
+    Scan,
+    SoftPrior,
+    Status,
+    View,
+    WarningCode,
+    assemble,
+    associate,
+    explain_verdict,
+    message_of,
+    mirrored,
+    scaled,
+    turned_round,
+)
+from registration import Segments
+from simulation import corridor, l_room, rectangle_room, square_room
+
+from .scenes import (
+    CORRIDOR,
+    INSIDE,
+    LOBBY,
+    ROOM,
+    SQUARE,
+    Floats,
+    answer_of,
+    as_json,
+    carried,
+    drawn,
+    drawn_room,
+    equal_rooms,
+    index_of,
+    maze,
+    pieces_of,
+    pose,
+    probability_in,
+    ranges,
+    reason_codes,
+    same_pose,
+    scan_of,
+    seen,
+    warning_codes,
+)
+
+SEEDS = st.integers(0, 10**6)
+FEW = settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.generate])
+ROOM_INDEX = index_of(ROOM)
+
+
+def drawn_question(seed: int) -> tuple[MapIndex, Scan, Prior | None]:
+    """Draw a question of any kind: in a map or out of it, with a prior or without."""
+    walls, scan = drawn(seed) if seed % 2 else pieces_of(seed)
+    if seed % 7 == 0:
+        walls = LOBBY + 3.0
+    rng = np.random.default_rng(seed)
+    near = pose(rng.uniform(0.0, 12.0), rng.uniform(0.0, 12.0), rng.uniform(-3.0, 3.0))
+    prior: Prior | None = None
+    if seed % 5 == 1:
+        prior = HardPrior(near, 3.0, 2.0)
+    if seed % 5 == 2:
+        prior = SoftPrior(near, np.diag([4.0, 4.0, 1.0]))
+    return index_of(walls, (None, 0.0, 0.02)[seed % 3]), scan, prior
+
+
+def assert_consistent(result: AssociationResult, scan: Scan, index: MapIndex, prior: Prior | None) -> None:
+    """Check what holds of every answer."""
+    status, diagnostics = result.status, result.diagnostics
+    assert result.usable == (status is Status.OK)
+    assert bool(result.reasons) != result.usable
+    assert set(reason_codes(result)) <= set(get_args(ReasonCode))
+    assert set(warning_codes(result)) <= set(get_args(WarningCode))
+    assert len(set(reason_codes(result))) == len(result.reasons)
+    assert (result.pose is None) == (status is Status.NO_MATCH)
+    assert (result.probability is None) == (status is Status.DEGENERATE)
+    assert result.probability is None or 0.0 <= result.probability <= 1.0
+    if status in (Status.NO_MATCH, Status.DEGENERATE):
+        assert result.covariance is None
+    else:
+        assert result.covariance is not None
+        assert np.linalg.eigvalsh(result.covariance).min() > 0.0
+        np.testing.assert_allclose(result.covariance, result.covariance.T)
+    assert (result.unobservable is not None) <= (status is Status.DEGENERATE)
+    matched = [pair.scan for pair in result.correspondences]
+    assert matched == sorted(set(matched))
+    assert sorted([*matched, *result.unmatched_scan]) == list(range(len(scan.measured)))
+    for pair in result.correspondences:
+        assert 0 <= pair.map < len(index.segments)
+        assert pair.map not in pair.alternatives
+        assert 0.0 <= pair.overlap <= 1.0 + 1e-9
+        assert pair.weight > 0.0
+    assert not set(result.missing_map) & {pair.map for pair in result.correspondences}
+    scores = [one.score for one in result.alternatives]
+    assert prior is not None or scores == sorted(scores, reverse=True)
+    assert len(scores) <= 5
+    places = [one.pose for one in result.alternatives] + ([] if result.pose is None else [result.pose])
+    for k, one in enumerate(places):
+        assert not any(same_pose(one, other, 0.05, 0.02) for other in places[:k])
+    if result.probability is not None:
+        assert result.probability + sum(one.probability or 0.0 for one in result.alternatives) <= 1.0 + 1e-9
+    if diagnostics is None:
+        assert status is Status.NO_MATCH
+        return
+    assert (diagnostics.margin is None) == (diagnostics.runner_up is None)
+    assert diagnostics.margin is None or diagnostics.margin >= 0.0
+    assert diagnostics.runner_up is None or diagnostics.runner_up >= 0.0
+    assert 0.0 <= diagnostics.inlier_fraction <= 1.0
+    assert diagnostics.registration.pairs == len(result.correspondences)
+    if diagnostics.critical_wall is not None:
+        wall = diagnostics.critical_wall
+        assert set(wall.scan) <= set(matched)
+        assert np.hypot(*wall.direction) == pytest.approx(1.0)
+        assert wall.displacement > 0.0
+    assert message_of(result)
+
+
+@given(SEEDS)
+@FEW
+def test_the_parts_of_an_answer_agree(seed: int) -> None:
+    index, scan, prior = drawn_question(seed)
+    assert_consistent(answer_of(index, scan, prior), scan, index, prior)
+
+
+def test_questions_of_all_kinds_are_drawn() -> None:
+    """So that the test above means something."""
+    statuses = {answer_of(*drawn_question(seed)).status for seed in range(40)}
+    assert statuses == set(Status)
+
+
+def test_results_are_values() -> None:
+    result = answer_of(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        result.usable = False  # type: ignore[misc]
+    assert result == replace(result)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_answer_has_no_number_that_is_not_finite(seed: int) -> None:
+    result = answer_of(*drawn_question(seed))
+    assert json.dumps(asdict(result), default=lambda array: array.tolist(), allow_nan=False)
+
+
+def test_exported_names_exist() -> None:
+    for name in association.__all__:
+        assert getattr(association, name) is not None
+    assert len(set(association.__all__)) == len(association.__all__)
+
+
+# --- Messages ---------------------------------------------------------------------------------------------------------
+
+
+def whole_of(world: Any) -> AssociationResult:
+    """Return the answer to a scan of all walls of a world."""
+    ends = carried(world.segments.endpoints, pose(0.3, 0.2, 0.4).inverse())
+    return associate(MapIndex.build(world.segments, 0.0), scan_of(ends))
+
+
+def test_the_message_of_a_usable_answer_states_its_probability() -> None:
+    result = whole_of(l_room())
+    percent = 100.0 * min(probability_in(result), 0.9999)
+    assert message_of(result) == f"The robot is at this pose with a probability of {percent:.2f} %."
+
+
+@pytest.mark.parametrize(
+    ("world", "count"), [(rectangle_room(), "1 other pose fits"), (square_room(), "3 other poses fit")]
+)
+def test_the_message_counts_poses_that_fit_about_as_well(world: Any, count: str) -> None:
+    result = whole_of(world)
+    assert message_of(result) == f"{count} the scan about as well. The scan alone does not decide between them."
+    assert result.diagnostics is not None
+    near = [one for one in result.alternatives if one.score >= result.diagnostics.score - AS_WELL]
+    assert len(near) == int(count[0])
+
+
+def test_the_message_names_an_unobservable_direction() -> None:
+    assert message_of(whole_of(corridor())) in (
+        "The position along the direction (1.00, 0.00) is unknown, and the heading may be reversed.",
+        "The position along the direction (-1.00, 0.00) is unknown, and the heading may be reversed.",
+    )
+
+
+def test_messages_of_no_match_and_of_doubts() -> None:
+    nothing = answer_of(ROOM_INDEX, scan_of(np.zeros((0, 4))))
+    assert message_of(nothing) == "No pose on this map explains the scan."
+    result = answer_of(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]))
+    unsure = message_of(replace(result, usable=False, status=Status.AMBIGUOUS, reasons=(), probability=0.62))
+    assert "62.00 %" in unsure
+    assert "reasons" in unsure
+
+
+# --- The critical wall ------------------------------------------------------------------------------------------------
+
+
+def test_at_a_corridors_end_that_wall_is_critical() -> None:
+    """It was seen in two pieces, and is drawn in two; without it the place along the corridor is not fixed."""
+    walls = np.vstack([CORRIDOR, [[30.0, 0.0, 30.0, 1.0], [30.0, 1.0, 30.0, 2.0]]])
+    ends = [[-6.0, -0.8, 3.0, -0.8], [3.0, -0.8, 3.0, 0.1], [3.0, 1.2, -6.0, 1.2], [3.0, 0.3, 3.0, 1.2]]
+    diagnostics = answer_of(index_of(walls), scan_of(ends)).diagnostics
+    assert diagnostics is not None
+    wall = diagnostics.critical_wall
+    assert wall is not None
+    assert (wall.scan, wall.map) == ((1, 3), (2, 3))
+    assert np.abs(wall.direction) == pytest.approx([1.0, 0.0], abs=1e-3)
+    assert wall.displacement > 1.0
+
+
+def test_where_many_walls_hold_the_pose_none_is_critical() -> None:
+    for seed in range(5):
+        ends = seen(maze(1), pose(15.0, 14.0, 0.5), noise=0.01, seed=seed, radius=12.0)[0]
+        diagnostics = answer_of(index_of(maze(1)), scan_of(ends)).diagnostics
+        assert diagnostics is not None
+        assert diagnostics.critical_wall is None
+
+
+def test_an_alternative_with_an_unobservable_direction_has_no_covariance() -> None:
+    """The scan of a corridor's end, which the middle of another corridor explains in part."""
+    walls = np.vstack([CORRIDOR, [[30.0, 0.0, 30.0, 2.0]], CORRIDOR + np.tile([0.0, 20.0], 2)])
+    ends = [[-6.0, -0.8, 3.0, -0.8], [3.0, 1.2, -6.0, 1.2], [3.0, -0.8, 3.0, 1.2]]
+    result = answer_of(index_of(walls), scan_of(ends))
+    assert result.covariance is not None
+    other = next(one for one in result.alternatives if abs(one.pose.y - 20.8) < 0.1)
+    assert other.covariance is None
+
+
+def test_a_pose_that_fits_worse_is_less_probable() -> None:
+    """Of two rooms the second lacks two walls."""
+    result = answer_of(index_of(equal_rooms(2)[:-2]), scan_of(seen(ROOM, INSIDE, noise=0.02, seed=1)[0]))
+    (other,) = result.alternatives
+    assert other.probability is not None
+    assert 0.0 <= other.probability < 0.5 * probability_in(result)
+    assert other.score < (result.diagnostics.score if result.diagnostics else 0.0)
+
+
+def test_walls_that_are_matched_are_not_missing() -> None:
+    """Two screens stand before a wall that was seen; where one of them was seen, the other alone is missing."""
+    screens = np.array([[4.5, 0.5, 4.5, 2.2], [4.5, 2.4, 4.5, 3.6]])
+    index, ends = index_of(np.vstack([ROOM, screens])), seen(ROOM, INSIDE)[0]
+    assert answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0))).missing_map == (8, 9)
+    on_screen = np.vstack([ends, carried(screens[1:], INSIDE.inverse())])
+    assert answer_of(index, scan_of(on_screen, viewpoint=(0.0, 0.0))).missing_map == (8,)
+
+
+# --- Warnings ---------------------------------------------------------------------------------------------------------
+
+
+def codes(scan: Scan, index: MapIndex = ROOM_INDEX, **options: Any) -> list[str]:
+    return warning_codes(answer_of(index, scan, **options))
+
+
+def test_an_ordinary_scan_has_no_warning() -> None:
+    for k in range(5):
+        room, at = drawn_room(np.random.default_rng([14, k]))
+        assert codes(ranges(room, at, k), index_of(room)) == []
+    assert codes(scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))) == []
+
+
+def test_a_scan_of_nothing_has_a_warning() -> None:
+    assert codes(scan_of(np.zeros((0, 4)))) == ["no_segments"]
+
+
+def test_points_that_are_not_in_order_and_warnings_of_the_scan_are_passed_on() -> None:
+    scan = scan_of(seen(ROOM, INSIDE)[0])
+    assert "points_not_in_order" in codes(replace(scan, ordered=False))
+    known = AssociationWarning("nulls_for_no_return", "a message")
+    assert known in answer_of(ROOM_INDEX, replace(scan, warnings=(known,))).warnings
+    views = [View(replace(scan, warnings=(known,))), View(scan, pose(0.1))]
+    assert assemble(views).warnings == (known,)
+
+
+ANGLES = np.linspace(-math.pi, math.pi, 240, endpoint=False)
+
+
+def beams_with(stuck: int, value: float = 7.5, returns: int = 40) -> Beams:
+    """Return ranges of which so many have one value, and beams without return."""
+    found = np.full(240, math.inf)
+    found[:returns] = np.linspace(2.0, 6.0, returns)
+    found[:stuck] = value
+    return Beams(ANGLES, found, 30.0)
+
+
+@pytest.mark.parametrize(("stuck", "warned"), [(20, True), (19, False), (40, True)])
+def test_most_of_the_returns_at_one_value_have_a_warning(stuck: int, warned: bool) -> None:
+    scan = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0), beams=beams_with(stuck))
+    assert ("stuck_ranges" in codes(scan)) == warned
+
+
+def test_the_value_of_stuck_ranges_is_named_and_a_few_prove_nothing() -> None:
+    ends = seen(ROOM, INSIDE)[0]
+    scan = scan_of(ends, viewpoint=(0.0, 0.0), beams=beams_with(30, 0.05))
+    [warning] = [one for one in answer_of(ROOM_INDEX, scan).warnings if one.code == "stuck_ranges"]
+    assert warning.message.startswith("30 of 40 ranges are exactly 0.05 m")
+    for count, warned in ((9, False), (10, True)):
+        few = scan_of(ends, viewpoint=(0.0, 0.0), beams=beams_with(count, returns=count))
+        assert ("stuck_ranges" in codes(few)) == warned
+
+
+@pytest.mark.parametrize(("factor", "warned"), [(1.0, False), (1.08, False), (1.2, True), (3.28, True), (1e3, True)])
+def test_a_scan_larger_than_the_map_has_a_warning(factor: float, warned: bool) -> None:
+    """All of a room is seen, corner to corner."""
+    assert ("scan_exceeds_map" in codes(scan_of(factor * seen(ROOM, INSIDE)[0]))) == warned
+
+
+def test_a_segment_seen_through_a_window_does_not_make_a_scan_large() -> None:
+    ends = seen(ROOM, INSIDE)[0]
+    assert "scan_exceeds_map" not in codes(scan_of(np.vstack([ends, [[60.0, 0.0, 60.0, 1.5]]])))
+    assert "scan_exceeds_map" in codes(scan_of(np.vstack([ends, [[60.0, -20.0, 60.0, 20.0]]])))
+
+
+def facing(ends: Floats, viewpoint: tuple[float, float] | None = (0.0, 0.0), **options: Any) -> list[str]:
+    """Return the messages about segments of a scan of the square room that face away."""
+    result = answer_of(index_of(SQUARE), scan_of(ends, viewpoint=viewpoint), **options)
+    return [one.message for one in result.warnings if one.code == "faces_away"]
+
+
+def test_segments_that_face_away_have_a_warning() -> None:
+    ends = seen(SQUARE, pose(0.5, 0.3, 0.7))[0]
+    assert facing(ends) == []
+    ends[1] = ends[1][[2, 3, 0, 1]]
+    [message] = facing(ends)
+    assert message.startswith("1 of 4 segments")
+    assert facing(ends, oriented=False) == []
+    assert facing(ends, viewpoint=None) == []
+    # A wall that is seen along itself faces nowhere.
+    straight = seen(SQUARE, pose(1.0, 1.0))[0]
+    for aside, warned in ((0.04, False), (0.06, True)):
+        for shift in (0.0, -3.0):
+            along = np.vstack([straight, [2.0, aside, 4.0, aside]]) + shift
+            assert bool(facing(along, viewpoint=(shift, shift))) is warned
+
+
+def test_a_segment_of_a_view_faces_the_sensor_of_that_view() -> None:
+    """Segments without a viewpoint never face away."""
+    room, pillar = SQUARE, np.array([[2.2, 3.0, 2.2, 2.0], [2.0, 2.0, 2.0, 3.0]])  # its faces to the right and left
+    right, left = pose(4.0, 2.5), pose(1.0, 2.5)
+    ends = [seen(np.vstack([room, face]), at)[0] for face, at in zip(pillar[:, None], (right, left), strict=True)]
+    step = right.inverse().compose(left)
+
+    def warned(*viewpoints: tuple[float, float] | None) -> bool:
+        views = [View(scan_of(one, viewpoint=at)) for one, at in zip(ends, viewpoints, strict=True)]
+        return "faces_away" in codes(assemble([views[0], replace(views[1], pose=step)]), index_of(room))
+
+    assert not warned((0.0, 0.0), (0.0, 0.0))
+    assert not warned((0.0, 0.0), None)
+    ends[1] = ends[1][:, [2, 3, 0, 1]]
+    assert warned((0.0, 0.0), (0.0, 0.0))
+
+
+# --- Scans that are changed -------------------------------------------------------------------------------------------
+
+
+def test_a_scan_that_is_changed_and_changed_back_is_the_same() -> None:
+    scan = ranges(ROOM, INSIDE, 1)
+    for again in (mirrored(mirrored(scan)), scaled(scaled(scan, 3.0), 1.0 / 3.0)):
+        np.testing.assert_allclose(again.measured.segments.endpoints, scan.measured.segments.endpoints)
+        np.testing.assert_allclose(again.measured.sigma, scan.measured.sigma)
+        assert scan.beams is not None
+        assert again.beams is not None
+        np.testing.assert_allclose(again.beams.ranges, scan.beams.ranges)
+        np.testing.assert_allclose(again.beams.angles, scan.beams.angles)
+    twice = turned_round(turned_round(scan))
+    np.testing.assert_allclose(twice.measured.segments.endpoints, scan.measured.segments.endpoints)
+    assert (twice.viewpoint, twice.beams) == (None, None)
+
+
+def test_a_scan_in_another_unit_is_not_usable() -> None:
+    """Feet, and centimetres."""
+    for factor in (0.3048, 3.281, 100.0, 0.01):
+        for k in range(6):
+            room, at = drawn_room(np.random.default_rng([15, k]))
+            assert not answer_of(index_of(room), scaled(ranges(room, at, k), factor)).usable
+
+
+def test_a_scan_whose_segments_are_reversed_is_not_usable() -> None:
+    for k in range(10):
+        room, at = drawn_room(np.random.default_rng([16, k]))
+        assert not answer_of(index_of(room), turned_round(ranges(room, at, k))).usable
+
+
+# --- Explanations -----------------------------------------------------------------------------------------------------
+
+
+NO_MATCH = pytest.mark.xfail(strict=True, reason="of a scan that matches nothing the answer has probability 0")
+
+
+@pytest.mark.parametrize("seed", [*range(7), pytest.param(7, marks=NO_MATCH)])
+def test_an_explanation_is_that_of_the_answer(seed: int) -> None:
+    index, scan, prior = drawn_question(seed)
+    found, answer = explain_verdict(index, scan, prior), answer_of(index, scan, prior)
+    assert as_json(found.result) == as_json(answer)
+    for name in ("status", "usable", "probability", "reasons"):
+        assert getattr(found.verdict, name) == getattr(answer, name)
+
+
+def test_an_explanation_adds_up() -> None:
+    """The terms of the model give its log odds, these its probability; vetoes and probability give the verdict."""
+    evaluated = 0
+    for seed in range(20):
+        index, scan, prior = drawn_question(seed)
+        verdict = explain_verdict(index, scan, prior, AssociationOptions(usable_from=0.9)).verdict
+        applied = [veto.name for veto in verdict.vetoes if veto.applies]
+        if verdict.usable:
+            assert not applied
+            assert (verdict.probability or 0.0) >= 0.9
+        elif not applied and verdict.probability is not None:
+            assert verdict.probability < 0.9
+        if verdict.model is not None:
+            evaluated += 1
+            total = math.fsum(one.nats for one in verdict.model.contributions)
+            assert total == pytest.approx(verdict.model.log_odds, abs=1e-6)
+            assert 0.0 <= verdict.model.probability <= 1.0
+    assert evaluated >= 8
+
+
+def test_an_explanation_of_equal_rooms_weighs_the_alternative() -> None:
+    verdict = explain_verdict(index_of(equal_rooms(2)), scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0])).verdict
+    (other,) = verdict.alternatives
+    assert other.weight == pytest.approx(1.0, abs=0.05)
+    assert same_pose(other.pose, pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta)) or same_pose(other.pose, INSIDE)
+
+
+# --- Maps that cannot be searched -------------------------------------------------------------------------------------
+
+
+def test_maps_that_cannot_be_searched_are_rejected() -> None:
+    for walls, sigma, argument in [
+        (np.zeros((0, 4)), None, "map.segments"),
+        (ROOM, -0.1, "map.sigma"),
+        (ROOM, math.nan, "map.sigma"),
+        (ROOM, 10.1, "map.sigma"),
+        (np.array([[0.0, 0.0, 1.0, 0.0], [2e5, 0.0, 2e5, 1.0]]), None, "map.segments"),
+    ]:
+        with pytest.raises(InvalidMapError) as refused:
+            MapIndex.build(Segments.from_array(walls), sigma)
+        assert refused.value.argument == argument
