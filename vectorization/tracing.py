@@ -107,9 +107,13 @@ def noise_of_points(places: Floats) -> float:
     windows = len(places) - tuning.WINDOW + 1
     if windows < tuning.LEAST_TRIPLES:
         return max(tuning.UNKNOWN_SIGMA, tuning.LEAST_SIGMA)
-    inside = np.lib.stride_tricks.sliding_window_view(places, tuning.WINDOW, axis=0)
-    x, y = (inside - inside.mean(axis=2, keepdims=True)).transpose(1, 0, 2)
-    xx, xy, yy = (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
+    shifted = [places[k : k + windows].T for k in range(tuning.WINDOW)]
+    middle = np.sum(shifted, axis=0) / tuning.WINDOW
+    xx, xy, yy = np.zeros((3, windows))
+    for x, y in (place - middle for place in shifted):
+        xx += x * x
+        xy += x * y
+        yy += y * y
     squares = np.maximum(0.0, 0.5 * (xx + yy - np.hypot(xx - yy, 2.0 * xy))) / (tuning.WINDOW - 2)
     k = windows // 2
     select(squares, k)
