@@ -206,11 +206,8 @@ def registered_pose(result: AssociationResult, walls: Floats, scan: Scan) -> Rig
     return found
 
 
-UNREPORTED = pytest.mark.xfail(strict=True, reason="a strain or common offset was estimated that no field reports")
-
-
 @pytest.mark.parametrize("with_beams", [True, False])
-@pytest.mark.parametrize("sigma", [pytest.param(None, marks=UNREPORTED), 0.0, pytest.param(0.02, marks=UNREPORTED)])
+@pytest.mark.parametrize("sigma", [None, 0.0, 0.02])
 def test_the_pairs_of_an_answer_register_to_its_pose_unless_it_is_corrected(
     sigma: float | None, with_beams: bool
 ) -> None:
