@@ -1,4 +1,4 @@
-"""Search a scan, rank the poses, estimate the best one; once more where the scan shows a scale or a rotation."""
+"""Search a scan, rank the poses, estimate the best one; again where the scan suggests a scale or a rotation."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from .consensus.acceptance import Accepted, accept, register_accepted
 from .consensus.consensus_set import ConsensusSet
 from .consensus.estimator import Estimate, estimate
 from .consensus.ranking import rank
-from .consensus.tuning import SHOWN_DEVIATIONS
 from .context import SearchContext
 from .result import SearchReport
 from .scan.scan import corrected_scan
 from .scan.views import corrected
 from .search.search import Effort, search
-from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR
+from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, SUGGESTED
 
 
 @value(frozen=True, slots=True)
@@ -78,57 +77,60 @@ class Explanations:
 def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
     """Search a scan and estimate the best pose; return the explanations, and the context of the scan that was searched.
 
-    A scan that shows a scale other than the map's, or a rotation during the sweep, is corrected for it and searched
-    once more. The result counts if it explains more.
+    A scan that suggests a scale other than the map's, or a rotation during the sweep, is corrected for it and searched
+    again, as long as it explains more.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    first = _explain(context, Effort.of(context), 1.0, 0.0)
-    answer = first.answer
-    if answer is None or not answer.estimate.with_columns or context.deadline.passed:
-        return context, first
-    scale, turn = _scale_of(answer.estimate), _turn_of(answer.estimate)
-    if scale == 1.0 and turn == 0.0:
-        return context, first
-    again = context.with_scan(corrected_scan(context.scan, scale, turn, context.sensor))
-    second = _explain(again, Effort.of(again), scale, turn)
-    if second.answer is None or second.answer.best.posterior <= answer.best.posterior:
-        return context, first
-    return again, second
+    found = _explain(context, 1.0, 0.0)
+    for _ in range(MOST_SEARCHES - 1):
+        if found.answer is None or context.deadline.passed:
+            break
+        factor, turn = _scale_of(found.answer.estimate), _turn_of(found.answer.estimate)
+        if factor == 1.0 and turn == 0.0:
+            break
+        again = context.with_scan(corrected_scan(context.scan, factor, turn, context.sensor))
+        better = _explain(again, factor * found.scale, turn + found.turn)
+        if better.answer is None or better.answer.best.posterior <= found.answer.best.posterior:
+            break
+        context, found = again, better
+    return context, found
 
 
 def _scale_of(found: Estimate) -> float:
-    """Return the factor on the scan by which map and scan differ, 1 where it is small, or not shown."""
+    """Return the factor on the scan by which map and scan differ, 1 where it is small, or not suggested."""
     strain, deviations = found.strain
     common = 0.5 * float(strain[0] + strain[1])
-    shown = abs(common) > SHOWN_DEVIATIONS * 0.5 * math.hypot(deviations[0], deviations[1])
+    shown = abs(common) > SUGGESTED * 0.5 * math.hypot(deviations[0], deviations[1])
     return 1.0 + common if shown and LEAST_FACTOR <= abs(common) <= MOST_FACTOR else 1.0
 
 
 def _turn_of(found: Estimate) -> float:
-    """Return the angle by which the sensor turned during the scan, radians, 0 where it is small, or not shown."""
+    """Return the angle by which the sensor turned during the scan, radians, 0 where it is small, or not suggested."""
     turn, deviation = found.turn
-    return turn if abs(turn) > max(LEAST_TURN, SHOWN_DEVIATIONS * deviation) else 0.0
+    return turn if abs(turn) > max(LEAST_TURN, SUGGESTED * deviation) else 0.0
 
 
-def _explain(context: SearchContext, effort: Effort, scale: float, turn: float) -> Explanations:
-    candidates = search(context, effort)
+def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
+    candidates = search(context, Effort.of(context))
     ranked = tuple(rank(context, candidates.poses))
     best = next((one for one in ranked if one.inside), None)
     complete = context.can_look and not context.deadline.passed
     report = candidates.report if complete else candidates.report.cut_short()
-    return Explanations(ranked, None if best is None else _answer(context, best), report, scale, turn)
+    return Explanations(
+        ranked, None if best is None else answer_of(context, best, scaled=scale != 1.0), report, scale, turn
+    )
 
 
-def _answer(context: SearchContext, best: ConsensusSet) -> Answer | None:
+def answer_of(context: SearchContext, best: ConsensusSet, *, scaled: bool) -> Answer | None:
     """Estimate the pose of the best explanation; None without pairs.
 
     Where nothing but the pose was solved for, it is where the pairs register.
     """
-    found = estimate(context, best)
+    found = estimate(context, best, scaled=scaled)
     if found is None:
         return None
     accepted = accept(context, best, found.pose)

@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from registration import Ambiguity
+
 from .consensus.acceptance import accept, correspondences
 from .consensus.beams import cast, passed_walls
 from .consensus.consensus_set import ConsensusSet
-from .consensus.measures import paper_measures, score_at_one_step
+from .consensus.measures import score_at_one_step
 from .consensus.tuning import BLOCKING_RAYS
 from .context import SearchContext
-from .explanations import Answer, Explanations
+from .explanations import Answer, Explanations, answer_of
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -72,14 +74,11 @@ def report(context: SearchContext, explanations: Explanations, verdict: Verdict)
 
 def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
     """Return the consensus set, with the overlaps at the pose that is answered."""
-    accepted = answer.accepted
-    if answer.estimate.free and verdict.pose is not None:
-        # The pose was chosen along a direction that the walls leave open.
-        there = accept(context, answer.best, context.in_index(verdict.pose))
-        overlaps = dict(zip(there.scan_indices, there.overlaps.tolist(), strict=True))
-        own = np.array([overlaps.get(i, 0.0) for i in accepted.scan_indices])
-        accepted = replace(accepted, overlaps=own)
-    return correspondences(context.index, accepted, answer.registered)
+    assert verdict.pose is not None
+    there = accept(context, answer.best, context.in_index(verdict.pose))
+    overlaps = dict(zip(there.scan_indices, there.overlaps.tolist(), strict=True))
+    own = np.array([overlaps.get(i, 0.0) for i in answer.accepted.scan_indices])
+    return correspondences(context.index, replace(answer.accepted, overlaps=own), answer.registered)
 
 
 def _diagnostics(
@@ -166,11 +165,7 @@ def _alternatives(
         return ()
     shown = others[: context.options.max_alternatives]
     probabilities = probabilities_of_others(verdict, shown)
-    sigma = context.index.sigma if explanations.answer is None else explanations.answer.estimate.wall_sigma
-    return tuple(
-        _alternative(context, one, probability, sigma or 0.0)
-        for one, probability in zip(shown, probabilities, strict=True)
-    )
+    return tuple(_alternative(context, explanations, *of_it) for of_it in zip(shown, probabilities, strict=True))
 
 
 def probabilities_of_others(verdict: Verdict, others: Sequence[ConsensusSet]) -> list[float | None]:
@@ -187,17 +182,17 @@ def probabilities_of_others(verdict: Verdict, others: Sequence[ConsensusSet]) ->
 
 
 def _alternative(
-    context: SearchContext, other: ConsensusSet, probability: float | None, wall_sigma: float
+    context: SearchContext, explanations: Explanations, other: ConsensusSet, probability: float | None
 ) -> Alternative:
-    ambiguity, reliability = paper_measures(context, other, other.pose, wall_sigma)
-    _, _, _, xx, xy, xt, yy, yt, tt = other.estimate[0].item()
-    covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
+    """Return another explanation, estimated like the answer."""
+    answer = answer_of(context, other, scaled=explanations.scale != 1.0)
+    diagnostics = None if answer is None else answer.registered.diagnostics
     return Alternative(
-        pose=context.in_map(other.pose),
-        covariance=None if other.free else covariance,
+        pose=context.in_map(other.pose) if answer is None else answer.pose,
+        covariance=None if answer is None or answer.estimate.degenerate else answer.covariance,
         score=_score(context, other),
-        ambiguity=ambiguity,
-        reliability=reliability,
+        ambiguity=Ambiguity(0.0, 0.0) if diagnostics is None else diagnostics.ambiguity,
+        reliability=0.0 if diagnostics is None else diagnostics.reliability,
         inlier_fraction=other.fraction(context.lines.rows),
         probability=probability,
     )

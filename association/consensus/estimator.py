@@ -14,7 +14,6 @@ centre of all of it, so that the origin of the scan frame does not matter.
 from __future__ import annotations
 
 import math
-from copy import copy
 
 import numpy as np
 
@@ -37,7 +36,8 @@ from .tuning import (
     OFFSET_DEVIATION,
     ONE_OF_MANY,
     ROUGH_FRACTION,
-    SHOWN_DEVIATIONS,
+    SCALE_DEVIATION,
+    SHOWN_CHI_SQUARE,
     SPRING,
     STRAIN_DEVIATION,
     TURN_DEVIATION,
@@ -50,7 +50,19 @@ J = np.array([[0.0, -1.0], [1.0, 0.0]])
 OFFSET, STRAIN, TURN = 3, slice(4, 7), 7  # unknowns after the sensor's place and the heading
 COLUMNS = 8
 ROUNDING = 1e-13
-PRIORS = np.array([OFFSET_DEVIATION, STRAIN_DEVIATION, STRAIN_DEVIATION, STRAIN_DEVIATION, TURN_DEVIATION])
+
+
+def _prior(known: float | None) -> Floats:
+    """Return the information on the columns before anything is seen, (5, 5), by the known variance of walls.
+
+    The scale may differ more than the shape: that of the laser's ranges counts, too. A map of which the walls are known
+    better is strained less.
+    """
+    strain = STRAIN_DEVIATION * (1.0 if known is None else min(1.0, math.sqrt(known) / USUAL_WALL_ERROR))
+    out = np.diag(np.array([OFFSET_DEVIATION, strain, strain, strain, TURN_DEVIATION]) ** -2.0)
+    scale, shape = 0.25 * SCALE_DEVIATION**-2.0, 0.5 * strain**-2.0
+    out[1:3, 1:3] = [[scale + shape, scale - shape], [scale - shape, scale + shape]]
+    return out
 
 
 @value(frozen=True, slots=True)
@@ -97,7 +109,7 @@ class Estimate:
         True where a fit along that direction says less than the middle of the walls.
     leverages : Leverages
     with_columns : bool
-        True if the pose was estimated together with the following; else these are 0.
+        True if the pose was estimated together with the following; else they are not shown.
     offset, strain, turn : (value, deviation)
         Offset of the walls along the rays, metres, positive where walls are farther than measured; strain xx, yy, xy;
         angle by which the sensor turned during the scan, radians.
@@ -125,13 +137,13 @@ class Estimate:
         return self.weakest > MAX_DEVIATION
 
 
-def estimate(context: SearchContext, best: ConsensusSet) -> Estimate | None:
+def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool = False) -> Estimate | None:
     """Estimate the pose of a consensus set; None where it has no pairs.
 
-    1. Solve for the pose, the errors of walls and of views, by Gauss-Newton; the variance of walls' errors is what
-       their residuals show, unless it is known.
-    2. Solve once for all columns from there. Where one differs from 0 by more than `SHOWN_DEVIATIONS`, go on with
-       them: always on, they widen the deviations on exact maps by a third.
+    1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is
+       known.
+    2. Where the columns together do not differ from 0, and the scan was not put to scale, solve without them: always
+       on, they widen the deviations on exact maps by a third.
     3. Leave out each wall in turn.
     """
     seen = observations_of(context, best.matches)
@@ -139,35 +151,34 @@ def estimate(context: SearchContext, best: ConsensusSet) -> Estimate | None:
         return None
     declared = context.index.sigma
     known = None if declared is None else max(declared**2, LEAST_KNOWN_VARIANCE)
-    model = _Model(seen, known, best.pose)
-    model.solve(ESTIMATION_ROUNDS)
-    columns, shown = _columns(context, seen), False
+    columns = _columns(context, seen)
     if len(columns):
-        full = model.with_columns(columns)
-        full.solve(1)
-        shown = bool((np.abs(full.x[columns]) > SHOWN_DEVIATIONS * full.deviations[columns]).any())
-        if shown:
-            full.solve(ESTIMATION_ROUNDS)
-            model = full
-    return model.estimate(shown=shown)
+        model = _Model(seen, known, best.pose, columns)
+        model.solve()
+        if scaled or model.shows_columns():
+            return model.estimate(model, shown=True)
+    plain = _Model(seen, known, best.pose, columns[:0])
+    plain.solve()
+    return plain.estimate(model if len(columns) else plain, shown=False)
 
 
 def _columns(context: SearchContext, seen: Observations) -> Indices:
     """Return the columns beyond the pose that a scan may show."""
-    if seen.views is not None or context.options.estimator != "joint" or context.scan.viewpoint is None:
+    if seen.views is not None or context.options.estimator != "joint":
         return np.zeros(0, np.intp)
-    return np.arange(3, COLUMNS if seen.timed else TURN)
+    first = OFFSET if context.scan.viewpoint is not None else STRAIN.start  # no rays, no offset along them
+    return np.arange(first, COLUMNS if seen.timed else TURN)
 
 
 class _Model:
     """The normal equations of some unknowns, and their solution."""
 
-    def __init__(self, seen: Observations, known: float | None, start: RigidTransform) -> None:
-        self.seen, self.known, self.start = seen, known, start
+    def __init__(self, seen: Observations, known: float | None, start: RigidTransform, columns: Indices) -> None:
+        self.seen, self.known, self.start, self.prior = seen, known, start, _prior(known)
         self.root = np.zeros((0, 0)) if seen.views is None else seen.views.root
         self.started = np.zeros(0) if seen.views is None else seen.views.found
         self.size = COLUMNS + self.root.shape[1]
-        self.active = np.concatenate([np.arange(3), np.arange(COLUMNS, self.size)]).astype(np.intp)
+        self.active = np.concatenate([np.arange(3), columns, np.arange(COLUMNS, self.size)]).astype(np.intp)
         at = start.apply(seen.sensor[None])[0]
         self.begin = np.concatenate([at, [start.theta], np.zeros(COLUMNS - 3), self.started])
         self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if known is None else known
@@ -175,13 +186,6 @@ class _Model:
         self.walls, self.own = self._wall_prior(), _own(seen.ties)
         self.of_wall = np.zeros((len(seen.walls), len(seen)))
         self.of_wall[seen.wall, np.arange(len(seen))] = 1.0
-
-    def with_columns(self, columns: Indices) -> _Model:
-        """Return the same with further unknowns, at the same solution."""
-        full = copy(self)
-        full.active = np.concatenate([np.arange(3), columns, np.arange(COLUMNS, self.size)]).astype(np.intp)
-        full.x = self.x.copy()
-        return full
 
     @property
     def deviations(self) -> Floats:
@@ -206,9 +210,9 @@ class _Model:
         out[at, at + 1] = out[at + 1, at] = -r[1:] * free
         return out
 
-    def solve(self, rounds: int) -> None:
-        """Take some steps of Gauss-Newton."""
-        for _ in range(rounds):
+    def solve(self) -> None:
+        """Take the steps of Gauss-Newton."""
+        for _ in range(ESTIMATION_ROUNDS):
             normal, gradient, by_wall = self._normal(self.variance)
             self.covariance = _inverse(normal)
             step = -self.covariance @ gradient
@@ -219,6 +223,21 @@ class _Model:
         if away or abs(wrap_angle(self.x[2] - self.begin[2])) > MAX_TURN or not np.isfinite(self.x).all():
             self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if self.known is None else self.known
             self.covariance = _inverse(self._normal(self.variance)[0])
+
+    def shows_columns(self) -> bool:
+        """Return whether the columns differ from 0 together, by a chi-square test, as the residuals scatter."""
+        own = np.flatnonzero((self.active >= 3) & (self.active < COLUMNS))
+        x = self.x[self.active[own]]
+        differs = float(x @ np.linalg.solve(self.covariance[np.ix_(own, own)], x))
+        return differs > SHOWN_CHI_SQUARE[len(own)] * max(1.0, self._scatter())
+
+    def _scatter(self) -> float:
+        """Return how much more the residuals scatter than their variances say: chi-square per degree of freedom."""
+        (residuals, slopes, _, _), weights, angular = self._weighted(self.variance)
+        left = self.of_wall @ (weights * residuals)
+        information = self.walls / self.variance + np.diag(self.of_wall @ weights)
+        chi_square = weights @ residuals**2 + angular @ slopes**2 - left @ np.linalg.solve(information, left)
+        return max(0.0, float(chi_square)) / max(1, 2 * len(residuals) - len(self.active))
 
     def _rows(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the residuals of centroids and directions, (n,), and their derivatives, (n, active)."""
@@ -290,14 +309,11 @@ class _Model:
         return normal, gradient, by_wall
 
     def _add_priors(self, normal: Floats, gradient: Floats) -> None:
-        of_columns = (self.active >= 3) & (self.active < COLUMNS)
-        information = np.zeros(len(self.active))
-        information[of_columns] = PRIORS[self.active[of_columns] - 3] ** -2.0
-        information[self.active >= COLUMNS] = 1.0
-        information[:3] = SPRING
-        at = np.arange(len(self.active))
-        normal[at, at] += information
-        gradient[3:] += information[3:] * self.x[self.active[3:]]
+        own = np.flatnonzero((self.active >= 3) & (self.active < COLUMNS))
+        information = np.diag(np.where(self.active < 3, SPRING, 1.0))
+        information[np.ix_(own, own)] = self.prior[np.ix_(self.active[own] - 3, self.active[own] - 3)]
+        normal += information
+        gradient[3:] += information[3:, 3:] @ self.x[self.active[3:]]
 
     def _shown_variance(self, by_wall: Floats, step: Floats) -> float:
         """Return the variance of the walls' own errors that their residuals show, shrunk where walls are few.
@@ -314,12 +330,13 @@ class _Model:
         count = USUAL_WALLS + float(self.own @ free)
         return UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0)) * max(found / count, LEAST_WALL_ERROR**2)
 
-    def estimate(self, *, shown: bool) -> Estimate:
-        """Return the solution in the frame of the scan's origin."""
+    def estimate(self, full: _Model, *, shown: bool) -> Estimate:
+        """Return the solution in the frame of the scan's origin, with the columns of the full one."""
         self.covariance = _inverse(self._normal(self.variance)[0])
-        x, seen, deviations = self.x, self.seen, self.deviations
+        x, seen = self.x, self.seen
         c, s = math.cos(x[2]), math.sin(x[2])
         ox, oy = c * seen.sensor[0] - s * seen.sensor[1], s * seen.sensor[0] + c * seen.sensor[1]
+        ox, oy = (1.0 + x[4]) * ox + x[6] * oy, x[6] * ox + (1.0 + x[5]) * oy
         lever = np.eye(3)
         lever[:2, 2] = oy, -ox
         covariance = lever @ self.covariance[:3, :3] @ lever.T
@@ -336,9 +353,9 @@ class _Model:
             free=spread > ONE_OF_MANY,
             leverages=self._leverages(weakest),
             with_columns=shown,
-            offset=(float(x[OFFSET]), float(deviations[OFFSET])),
-            strain=(x[STRAIN].copy(), deviations[STRAIN]),
-            turn=(float(x[TURN]), float(deviations[TURN])),
+            offset=(float(full.x[OFFSET]), float(full.deviations[OFFSET])),
+            strain=(full.x[STRAIN].copy(), full.deviations[STRAIN]),
+            turn=(float(full.x[TURN]), float(full.deviations[TURN])),
             found=x[COLUMNS:].copy(),
             spread=self.covariance[views, views].copy(),
         )

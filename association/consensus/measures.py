@@ -1,4 +1,4 @@
-"""The paper's measures of consensus sets: ambiguity and reliability; the score at the paper's estimate."""
+"""The score of consensus sets at the paper's estimate."""
 
 from __future__ import annotations
 
@@ -6,40 +6,7 @@ import math
 
 import numpy as np
 
-from registration import Ambiguity, RigidTransform
-
-from ..context import SearchContext
 from .consensus_set import ConsensusSet
-from .observations import observations_of
-
-
-def paper_measures(
-    context: SearchContext, one: ConsensusSet, pose: RigidTransform, wall_sigma: float
-) -> tuple[Ambiguity, float]:
-    """Return the ambiguity, Eqs. (16) and (22), of a consensus set at a pose of the index frame, and its reliability.
-
-    With the weights that the set registers with; the rotation by Wahba's or Mitsuta's cost, as the options have it.
-    """
-    seen = observations_of(context, one.matches)
-    if seen is None:
-        return Ambiguity(0.0, 0.0), 0.0
-    same = seen.wall[:, None] == seen.wall
-    ties = seen.ties[seen.wall]
-    tied = (ties[:, None] >= 0.0) & (ties >= 0.0)
-    one_wall = np.where(tied, np.exp(-np.abs(ties[:, None] - ties)), same)
-    weights = 1.0 / (seen.variances * (1.0 + wall_sigma**2 * (one_wall @ (1.0 / seen.variances))))
-    c, s = math.cos(pose.theta), math.sin(pose.theta)
-    nx, ny = seen.normals.T
-    dx, dy = seen.directions.T
-    x, y = context.lines.rows["x"][seen.row], context.lines.rows["y"][seen.row]
-    ex, ey = c * dx - s * dy, s * dx + c * dy
-    angles = np.arctan2(ex * -nx - ey * ny, ex * ny - ey * nx)
-    gaps = seen.offsets - nx * pose.x - ny * pose.y - (dx * y - dy * x)
-    wahba = context.options.rotation == "wahba"
-    rotation = 4.0 * np.sin(0.5 * angles) ** 2 if wahba else angles**2
-    xx, yy, xy = float(weights @ ny**2), float(weights @ nx**2), float(-(weights * nx) @ ny)
-    reliability = 2.0 * math.sqrt(max(0.0, xx * yy - xy * xy)) / float(weights.sum())
-    return Ambiguity(float(weights @ gaps**2), float(weights @ rotation)), min(1.0, reliability)
 
 
 def score_at_one_step(one: ConsensusSet) -> float:

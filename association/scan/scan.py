@@ -179,7 +179,7 @@ def scaled(scan: Scan, factor: float) -> Scan:
 
 
 def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, float]) -> Scan:
-    """Return a scan with its lengths from the sensor times a factor, and turned back by how its sensor turned.
+    """Return a scan with its lengths times a factor, and turned back by how its sensor turned.
 
     Parameters
     ----------
@@ -189,25 +189,13 @@ def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, 
     turn : float
         Radians from the first beam to the last; the heading is that in the middle of the sweep.
     sensor : (float, float)
-        The sensor's place in the scan frame, metres; it stays.
+        The sensor's place in the frame of this scan, metres.
     """
-    if factor != 1.0:
-        at = scan.viewpoint and (
-            sensor[0] + factor * (scan.viewpoint[0] - sensor[0]), sensor[1] + factor * (scan.viewpoint[1] - sensor[1])
-        )  # fmt: skip
-        larger, (x, y) = scaled(scan, factor), ((1.0 - factor) * sensor[0], (1.0 - factor) * sensor[1])
-        seen, beams = larger.measured, larger.beams
-        ends = Segments.derived(seen.segments.endpoints + np.array([x, y, x, y]))
-        if beams is not None and beams.origins is not None:
-            beams = replace(beams, origins=beams.origins + np.array([x, y]))
-        scan = replace(
-            larger, measured=replace(seen, segments=ends, centroids=seen.centroids + np.array([x, y])), beams=beams
-        )
-        scan = replace(scan, viewpoint=at)
+    scan = scaled(scan, factor)
     if turn == 0.0 or scan.beams is None:
         return scan
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
-    centre, way, sweep = np.array(sensor), math.copysign(1.0, last - first), abs(last - first)
+    centre, way, sweep = factor * np.array(sensor), math.copysign(1.0, last - first), abs(last - first)
 
     def turned(points: Floats) -> Floats:
         """Turn points by when they were seen."""
