@@ -1,74 +1,29 @@
-"""Thickness of walls, estimated from scans, and the conclusion from all sample scans."""
+"""Thickness of walls, estimated from sample scans."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
-from association.context import SearchContext
-from association.rank_and_estimate import search_and_rank
+from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, associate, mirrored
 from registration import Segments
 
-from .judging import judge_samples
-from .result import Finding, SampleReport
-from .samples import Sample
+from .result import Finding
+from .samples import Trial
 from .tuning import (
     BETTER_THICKNESS,
+    CONFIDENCE,
     LEAST_THICKER,
-    MOST_FOR_THICKNESS,
-    MOST_LINES_FOR_THICKNESS,
+    MOST_LINES,
+    MOST_SCANS,
     THICKER,
     THICKER_STEP,
     THICKNESS_SIGMA,
 )
 
-HIDES_THICKNESS = {"reversed", "scale"}  # codes of findings; the walls of such a map have no thickness to be found
 Scores = dict[float, float]
 """Of the scans together, nats, by how much thicker the walls were taken to be, metres."""
-
-
-def conclude(
-    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample | None], deadline: Deadline, *, oriented: bool
-) -> SampleReport:
-    """Conclude from all samples together what would be better about their map, and how thick its walls are.
-
-    Parameters
-    ----------
-    index : MapIndex
-        Built with its directions, whatever they mean.
-    scans : sequence of Scan
-    samples : sequence of Sample or None
-        Of each scan, as of `try_sample`; None where there was no time for it.
-    deadline : Deadline
-    oriented : bool
-        True when the map states that directions mean something.
-
-    Raises
-    ------
-    CancelledError
-        When the deadline was cancelled.
-    """
-    tried = [one for one in samples if one is not None]
-    report = judge_samples(tried, sigma=index.sigma, oriented=oriented)
-    codes = {one.code for one in report.findings}
-    if codes & HIDES_THICKNESS or deadline.passed:
-        return report
-    directed, some = (
-        report.advice.oriented is not False,
-        [scan for scan, one in zip(scans, samples, strict=True) if one is not None],
-    )
-    found = find_thickness(index, some, deadline, oriented=directed)
-    if found is None:
-        return report
-    findings = report.findings
-    # A scan that fits badly for the thickness of walls may fit a little better mirrored.
-    if "mirrored" in codes and directed and not fit_better_mirrored(index, some, deadline):
-        findings = tuple(one for one in findings if one.code != "mirrored")
-    findings = (thickness_finding(found, oriented=directed), *findings)
-    return replace(report, findings=findings, wall_thickness=found)
 
 
 def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> float | None:
@@ -102,9 +57,9 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
 
 def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> Scores:
     """Return scores of possible thicknesses and of those next to the best; empty without scans to try, or time."""
-    if not scans or index.directed > MOST_LINES_FOR_THICKNESS:
+    if not scans or index.directed > MOST_LINES:
         return {}
-    some, faces = scans[:: -(-len(scans) // MOST_FOR_THICKNESS)], _faces(index, oriented=oriented)
+    some, faces = scans[:: -(-len(scans) // MOST_SCANS)], _faces(index, oriented=oriented)
     scores: Scores = {}
 
     def tried(changes: Sequence[float]) -> bool:
@@ -152,10 +107,8 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
 
 def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
     index = MapIndex.build(faces, THICKNESS_SIGMA, deadline=deadline)
-    options = AssociationOptions()
-    # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
-    found = (search_and_rank(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
-    return sum(max(0.0, one.best.score) for one in found if one is not None)
+    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE)
+    return sum(Trial.of(associate(index, scan, None, options, deadline)).score for scan in scans)
 
 
 def _best(scores: Scores) -> float:

@@ -1,0 +1,229 @@
+"""The factor between the lengths of a map and of its sample scans: a unit that was taken for another, or a wrong scale.
+
+Where most scans are usable, their correspondences show the factor. Otherwise the map is divided by each factor of a
+ladder, and some scans are searched in it. The factor with the highest sum of scores is refined in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    IndexingEndedError,
+    InvalidMapError,
+    MapIndex,
+    Scan,
+    associate,
+    scaled,
+)
+from registration import Segments
+from registration.layout import Floats
+from registration.limits import MIN_LENGTH
+
+from ..scale import Matched, scale_of
+from .samples import Sample, Trial
+from .tuning import (
+    BETTER_SCALED,
+    CONFIDENCE,
+    DEVIATIONS,
+    EXCEEDING,
+    GREATEST_EXTENT,
+    LADDER,
+    LEAST_EXTENT,
+    LEAST_SCALE,
+    LITTLE,
+    MANY,
+    MOST_LINES,
+    MOST_ON_LADDER,
+    SAME_FACTOR,
+    USUAL_PART,
+)
+
+# Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
+TAKEN_FOR: Mapping[float, tuple[str, str]] = {
+    10.0: ("decimetres", "metres"),
+    100.0: ("centimetres", "metres"),
+    1000.0: ("millimetres", "metres"),
+    1.0 / 0.0254: ("inches", "metres"),
+    1.0 / 0.3048: ("feet", "metres"),
+    25.4: ("millimetres", "inches"),
+    304.8: ("millimetres", "feet"),
+    2.54: ("centimetres", "inches"),
+    30.48: ("centimetres", "feet"),
+    12.0: ("inches", "feet"),
+}
+SAME_UNIT = 0.003  # of a factor; nearer to one of units it is that
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """The factor by which the lengths of a map are greater than those of its scans.
+
+    Attributes
+    ----------
+    factor, deviation : float
+        The factor and its standard deviation.
+    agreeing : int
+        Number of scans that have this factor, each by itself.
+    usable : int
+        Number of scans that are usable when map and scans are to scale.
+    """
+
+    factor: float
+    deviation: float
+    agreeing: int
+    usable: int
+
+    @property
+    def is_one(self) -> bool:
+        """Return whether map and scans may be of one scale."""
+        return abs(self.factor - 1.0) < max(LEAST_SCALE, DEVIATIONS * self.deviation)
+
+
+@dataclass(frozen=True, slots=True)
+class _Scaled:
+    """A map and scans that are searched in it, to scale by a factor.
+
+    Attributes
+    ----------
+    index : MapIndex
+    scans : sequence of Scan
+    factor : float
+        By which the map was divided; or, where the scans are of an unusual size, the scans were multiplied.
+    oriented : bool
+    deadline : Deadline
+    """
+
+    index: MapIndex
+    scans: Sequence[Scan]
+    factor: float
+    oriented: bool
+    deadline: Deadline
+
+    def by(self, factor: float) -> _Scaled | None:
+        """Return them with another factor, these having none; None where the map cannot be indexed, or not in time."""
+        if not LEAST_EXTENT <= self.extent <= GREATEST_EXTENT:
+            return replace(self, scans=[scaled(scan, factor) for scan in self.scans], factor=factor)
+        segments = Segments.derived(self.lines.endpoints / factor)
+        points, sigma = self.index.points, self.index.sigma
+        points = replace(points, positions=points.positions / factor)
+        with suppress(InvalidMapError, IndexingEndedError):
+            index = MapIndex.build(segments, sigma, oriented=self.oriented, points=points, deadline=self.deadline)
+            return replace(self, index=index, factor=factor)
+        return None
+
+    def search(self) -> list[AssociationResult]:
+        """Search each scan."""
+        options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=self.oriented)
+        return [associate(self.index, scan, None, options, self.deadline) for scan in self.scans]
+
+    def fit(self, results: Sequence[AssociationResult]) -> Scale:
+        """Estimate the factor from the correspondences of usable scans."""
+        sigma = LITTLE if self.index.sigma is None else self.index.sigma
+        found = [
+            Matched.of(self.index.segments, scan, one)
+            for scan, one in zip(self.scans, results, strict=True)
+            if one.usable
+        ]
+        matched = [one for one in found if one is not None]
+        off, deviation = scale_of(matched, sigma)
+        each = [scale_of([one], sigma) for one in matched]
+        agreeing = sum(abs(own - off) <= max(SAME_FACTOR, DEVIATIONS * own_deviation) for own, own_deviation in each)
+        return Scale(self.factor * (1.0 - off), self.factor * deviation, agreeing, len(matched))
+
+    @property
+    def lines(self) -> Segments:
+        """The map as sent."""
+        return self.index.segments.take(np.arange(self.index.directed))
+
+    @property
+    def extent(self) -> float:
+        """The usual extent of the scans, metres."""
+        return float(np.median([np.hypot(*np.ptp(scan.measured.segments.midpoints, axis=0)) for scan in self.scans]))
+
+    def rungs(self) -> Iterator[float]:
+        """Yield the factors that are tried: a ladder, and those between units where lines are about as long then."""
+        lines, seen = self.lines.lengths, np.concatenate([scan.measured.segments.lengths for scan in self.scans])
+        usual, greatest = _usual(lines) / _usual(seen), EXCEEDING * self.index.diagonal / self.extent
+        units = (*TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR))
+        for factor in (*LADDER, *units):
+            is_likely = USUAL_PART[0] <= usual / factor <= USUAL_PART[1]
+            if factor <= greatest and (factor in LADDER or is_likely) and lines.min() / factor >= MIN_LENGTH:
+                yield factor
+
+
+def find_scale(
+    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample], deadline: Deadline, *, oriented: bool
+) -> Scale | None:
+    """Estimate the factor between a map and sample scans.
+
+    Parameters
+    ----------
+    index : MapIndex
+    scans, samples : sequence of Scan and of Sample
+        Each scan, and its search in the map as it is.
+    deadline : Deadline
+        When it passes, no factor is found.
+    oriented : bool
+        True when the map states that directions mean something.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    results = [one.result for one in samples]
+    sent = place = _Scaled(index, scans, 1.0, oriented, deadline)
+    if sum(one.usable for one in results) <= MANY * len(scans):
+        rung = _best_rung(sent, samples)
+        if rung is None:
+            return None
+        place, results = rung, rung.search()
+    first = place.fit(results)
+    if first.is_one or deadline.passed:
+        return None
+    place_again = sent.by(first.factor)
+    return None if place_again is None else place_again.fit(place_again.search())
+
+
+def _best_rung(sent: _Scaled, samples: Sequence[Sample]) -> _Scaled | None:
+    """Return map and scans by the factor of the ladder at which the scans fit best; None where they fit no better."""
+    chosen = sorted(range(len(samples)), key=lambda k: -len(sent.scans[k].measured))[:MOST_ON_LADDER]
+    few = replace(sent, scans=[sent.scans[k] for k in chosen])
+    trials = [samples[k].trials for k in chosen]
+    known = max(sum(one[way].score for one in trials if way in one) for way in trials[0])
+    if sent.index.directed > MOST_LINES or few.extent <= 0.0:
+        return None
+    best, most = None, BETTER_SCALED * known
+    for factor in few.rungs():
+        place = few.by(factor)
+        if sent.deadline.passed:
+            return None
+        tried = [] if place is None else [Trial.of(one) for one in place.search()]
+        score = sum(one.score for one in tried)
+        if score > most and sum(one.usable for one in tried) > MANY * len(chosen):
+            best, most = factor, score
+    return None if best is None else sent.by(best)
+
+
+def _usual(lengths: Floats) -> float:
+    """Return the length such that half of all length is in longer lines, metres."""
+    ordered = np.sort(lengths)
+    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
+
+
+def unit_mistake(factor: float) -> str | None:
+    """Return which unit of a map that is too large by a factor was taken for which other, or None."""
+    for known, (unit, other) in TAKEN_FOR.items():
+        if abs(factor / known - 1.0) < SAME_UNIT:
+            return f"{unit} taken for {other}"
+        if abs(factor * known - 1.0) < SAME_UNIT:
+            return f"{other} taken for {unit}"
+    return None
