@@ -26,23 +26,15 @@ from .tuning import (
     MOST_SCANS,
     MOVED_METRES,
     MOVED_RADIANS,
-    MUCH_BETTER_SCORE,
     WIDEST,
 )
 
-MISTAKES: Mapping[Mistake, tuple[float, str]] = {
-    "mirrored": (
-        BETTER_SCORE,
-        "fit better with left and right exchanged. The y axis of the map may point down, or the laser may be mounted "
-        "upside down. Negate every y of map or scans, and exchange begin and end.",
-    ),
-    "reversed": (
-        MUCH_BETTER_SCORE,
-        "fit much better with begin and end of every segment exchanged. Free space must lie on the left of the "
-        "segments of scan and map. Exchange begin and end in one of them.",
-    ),
+MISTAKES: Mapping[Mistake, str] = {
+    "mirrored": "fit better with left and right exchanged. The y axis of the map may point down, or the laser may be "
+    "mounted upside down. Negate every y of map or scans, and exchange begin and end.",
+    "reversed": "fit much better with begin and end of every segment exchanged. Free space must lie on the left of the "
+    "segments of scan and map. Exchange begin and end in one of them.",
 }
-"""How many times the score has to be without each mistake, and what the finding reports."""
 
 
 def conclude(
@@ -111,15 +103,26 @@ class _Fits:
     def mistakes(self) -> list[Finding]:
         """Return what all scans were sent with and fit better without."""
         found = []
-        for mistake, (ratio, message) in MISTAKES.items():
-            both = self.both(self.present, replace(self.present, mistake=mistake))
-            score, usable = sum(sent.score for sent, _ in both), sum(sent.usable for sent, _ in both)
+        for mistake, message in MISTAKES.items():
+            undone = replace(self.present, mistake=mistake)
+            both, usable = self.both(self.present, undone), self.usable(undone)
             # Scans of another building fit better one way or the other by chance: none of them is usable.
-            better = sum(one.score for _, one in both) > ratio * score
-            if better and sum(one.usable for _, one in both) >= max(1, usable):
-                count = sum(one.score > sent.score for sent, one in both)
+            better = sum(one.score for _, one in both) > BETTER_SCORE * sum(sent.score for sent, _ in both)
+            if self._more(usable, self.usable(self.present)) or (
+                better and usable >= max(1, self.usable(self.present))
+            ):
+                count = sum(one.score > sent.score or one.usable > sent.usable for sent, one in both)
                 found.append(Finding(mistake, f"{count} of {len(self.samples)} scans {message}"))
         return found
+
+    def _more(self, usable: int, others: int) -> bool:
+        """Return whether clearly more scans are usable than others; of a single one, one."""
+        return usable > others + min(len(self.samples) - 1, self.clearly)
+
+    @property
+    def clearly(self) -> float:
+        """The number of scans that may be usable by chance."""
+        return max(1.0, BETTER_USABLE * len(self.samples))
 
     def best_directions(self) -> bool:
         """Return whether directions should mean something: as now, unless the scans fit clearly better otherwise."""
@@ -129,10 +132,9 @@ class _Fits:
         usable, usable_otherwise = (
             max((self.usable(way) for way in self.ways(directed)), default=0) for directed in (now, not now)
         )
-        clearly = max(1.0, BETTER_USABLE * len(self.samples))
         # A score without directions may well come from chance: then clearly fewer scans are usable, or none.
-        better = usable_otherwise > usable + clearly or (
-            score_otherwise > BETTER_SCORE * score and usable_otherwise >= max(1.0, usable - clearly)
+        better = usable_otherwise > usable + self.clearly or (
+            score_otherwise > BETTER_SCORE * score and usable_otherwise >= max(1.0, usable - self.clearly)
         )
         return now is not better
 

@@ -6,6 +6,7 @@ ladder, and some scans are searched in it. The factor with the highest sum of sc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -30,14 +31,15 @@ from registration.limits import MIN_LENGTH
 from ..scale import Matched, scale_of
 from .samples import Sample, Trial
 from .tuning import (
-    BETTER_SCALED,
     CONFIDENCE,
     DEVIATIONS,
     EXCEEDING,
     GREATEST_EXTENT,
     LADDER,
+    LAX_TOLERANCE,
     LEAST_EXTENT,
     LEAST_SCALE,
+    LEAST_SHARE,
     LITTLE,
     MANY,
     MOST_LINES,
@@ -119,24 +121,33 @@ class _Scaled:
             return replace(self, index=index, factor=factor)
         return None
 
-    def search(self) -> list[AssociationResult]:
-        """Search each scan."""
-        options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=self.oriented)
-        return [associate(self.index, scan, None, options, self.deadline) for scan in self.scans]
+    def search(self, *, lax: bool = False) -> list[AssociationResult]:
+        """Search each scan; `lax` finds walls that are off by decimetres, by segments alone, in half of the time."""
+        options = AssociationOptions(
+            max_alternatives=0,
+            confidence=CONFIDENCE,
+            oriented=self.oriented,
+            offset_tolerance=LAX_TOLERANCE if lax else None,
+        )
+        scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
+        return [associate(self.index, scan, None, options, self.deadline) for scan in scans]
 
-    def fit(self, results: Sequence[AssociationResult]) -> Scale:
-        """Estimate the factor from the correspondences of usable scans."""
+    def fit(self, results: Sequence[AssociationResult], *, lax: bool = False) -> Scale:
+        """Estimate the factor from the correspondences of usable scans; `lax`: of all scans that fit."""
         sigma = LITTLE if self.index.sigma is None else self.index.sigma
         found = [
             Matched.of(self.index.segments, scan, one)
             for scan, one in zip(self.scans, results, strict=True)
-            if one.usable
+            if one.usable or (lax and one.diagnostics is not None and one.diagnostics.inlier_fraction >= LEAST_SHARE)
         ]
         matched = [one for one in found if one is not None]
-        off, deviation = scale_of(matched, sigma)
-        each = [scale_of([one], sigma) for one in matched]
-        agreeing = sum(abs(own - off) <= max(SAME_FACTOR, DEVIATIONS * own_deviation) for own, own_deviation in each)
-        return Scale(self.factor * (1.0 - off), self.factor * deviation, agreeing, len(matched))
+        if not matched:
+            return Scale(self.factor, math.inf, 0, 0)
+        own = np.array([scale_of([one], sigma) for one in matched])
+        near = np.abs(own[:, 0] - np.median(own[:, 0])) <= np.maximum(SAME_FACTOR, DEVIATIONS * own[:, 1])
+        off, deviation = scale_of([one for one, is_near in zip(matched, near, strict=True) if is_near], sigma)
+        usable = sum(one.usable for one in results)
+        return Scale(self.factor * (1.0 - off), self.factor * deviation, int(near.sum()), usable)
 
     @property
     def lines(self) -> Segments:
@@ -180,35 +191,30 @@ def find_scale(
         When the deadline was cancelled.
     """
     results = [one.result for one in samples]
-    sent = place = _Scaled(index, scans, 1.0, oriented, deadline)
-    if sum(one.usable for one in results) <= MANY * len(scans):
-        rung = _best_rung(sent, samples)
+    sent = _Scaled(index, scans, 1.0, oriented, deadline)
+    if sum(one.usable for one in results) > MANY * len(scans):
+        first = sent.fit(results)
+    else:
+        rung = _best_rung(sent)
         if rung is None:
             return None
-        place, results = rung, rung.search()
-    first = place.fit(results)
-    if first.is_one or deadline.passed:
-        return None
-    place_again = sent.by(first.factor)
-    return None if place_again is None else place_again.fit(place_again.search())
+        first = rung.fit(rung.search(lax=True), lax=True)
+    place = None if first.is_one or deadline.passed else sent.by(first.factor)
+    return None if place is None else place.fit(place.search())
 
 
-def _best_rung(sent: _Scaled, samples: Sequence[Sample]) -> _Scaled | None:
-    """Return map and scans by the factor of the ladder at which the scans fit best; None where they fit no better."""
-    chosen = sorted(range(len(samples)), key=lambda k: -len(sent.scans[k].measured))[:MOST_ON_LADDER]
-    few = replace(sent, scans=[sent.scans[k] for k in chosen])
-    trials = [samples[k].trials for k in chosen]
-    known = max(sum(one[way].score for one in trials if way in one) for way in trials[0])
+def _best_rung(sent: _Scaled) -> _Scaled | None:
+    """Return map and scans by the factor of the ladder at which some scans fit best; None where none fits."""
+    few = replace(sent, scans=sorted(sent.scans, key=lambda scan: -len(scan.measured))[:MOST_ON_LADDER])
     if sent.index.directed > MOST_LINES or few.extent <= 0.0:
         return None
-    best, most = None, BETTER_SCALED * known
+    best, most = None, 0.0
     for factor in few.rungs():
-        place = few.by(factor)
         if sent.deadline.passed:
             return None
-        tried = [] if place is None else [Trial.of(one) for one in place.search()]
-        score = sum(one.score for one in tried)
-        if score > most and sum(one.usable for one in tried) > MANY * len(chosen):
+        place = few.by(factor)
+        score = 0.0 if place is None else sum(Trial.of(one).score for one in place.search(lax=True))
+        if score > most:
             best, most = factor, score
     return None if best is None else sent.by(best)
 

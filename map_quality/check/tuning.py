@@ -60,7 +60,7 @@ SIGMAS = (0.05, 0.1, 0.2)  # m, tables; tried in addition to the map's own: half
 WIDEST = max(SIGMAS)
 CONFIDENCE = 0.99  # tables; of a search under a hypothesis
 LITTLE = 0.01  # m, tables; the estimate where walls are right
-BETTER_SCORE, MUCH_BETTER_SCORE = 1.15, 1.5  # times, tables
+BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
 MANY = 0.5  # of the scans that give evidence
 MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
@@ -70,9 +70,9 @@ MOST_SCANS, MOST_LINES = 10, 20_000  # scans, and segments, whose scale and thic
 
 # --- Scale ------------------------------------------------------------------------------------------------------------
 
-LADDER = tuple(1.04**k for k in range(-41, 42))  # 0.2 to 5, tables; factors by which scans are tried to be off
+LADDER = tuple(1.1**k for k in range(-17, 18))  # 0.2 to 5, tables; factors by which the map is tried to be off
+LAX_TOLERANCE = 0.4  # m, tables; of offsets, so that scans off by half a rung find the walls near them
 MOST_ON_LADDER = 4  # scans; time
-BETTER_SCALED = 1.05  # times, tables
 LEAST_SCALE = 0.004  # tables; a factor that is reported differs from one by this,
 DEVIATIONS = 3.0  # and by so many of its deviations
 SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
