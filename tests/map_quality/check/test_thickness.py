@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from association import Deadline, Scan
-from map_quality import find_thickness, fit_better_mirrored, thickness_finding
+from map_quality import find_thickness
+from map_quality.check.thickness import fit_better_mirrored, thickness_finding
 from registration import MeasuredSegments, Segments
 from registration.layout import Floats
 
