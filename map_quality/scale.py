@@ -10,8 +10,10 @@ import numpy as np
 
 from association import AssociationResult, Scan
 from registration import Correspondences, RigidTransform, Segments
+from registration.layout import Floats
 
-SCALE_PRIOR, RANGE_PRIOR = 0.1, 0.05  # of the fraction, and of an error of all ranges in m: usual values
+SCALE_PRIOR, RANGE_PRIOR, WALL_PRIOR = 0.1, 0.05, 0.2  # usual values of a fraction, and m of ranges and of walls
+AGREEING = 3.0  # deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,41 +33,55 @@ class Matched:
         return cls(scan, result.pose, Correspondences.of(segments, scan.measured, pairs))
 
 
-def scale_of(found: Iterable[Matched], sigma: float) -> tuple[float, float]:
-    """Estimate the fraction by which the lengths of scans are off from those of the map.
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """What the correspondences of scans show of the scale and of an error that all walls or ranges share.
+
+    Attributes
+    ----------
+    scale, scale_deviation : float
+        Fraction by which the lengths of the scans are off from those of the map, above 0 where ranges are too long.
+    offset, offset_deviation : float
+        Metres by which all ranges are too long or, `of_walls`, all walls are nearer to the sensor than drawn.
+    """
+
+    scale: float
+    scale_deviation: float
+    offset: float
+    offset_deviation: float
+
+
+def errors_of(found: Iterable[Matched], sigma: float, *, of_walls: bool = False) -> Errors:
+    """Estimate the errors that scans share, their poses being marginal.
 
     The offset of a scan line from its wall is ``q s + k b + g . d`` with its lever arm ``q`` along the wall's normal,
     the fraction ``s``, the cosine ``k`` between ray and normal, an error ``b`` of all ranges, and the error ``d`` of
-    the pose. Poses are marginal: only walls of one direction at several distances show the scale.
+    the pose. Only walls of one direction at several distances show the scale.
 
     Parameters
     ----------
     found : iterable of Matched
     sigma : float
         Standard deviation of the map's lines, metres.
-
-    Returns
-    -------
-    float
-        The fraction, above 0 where ranges are too long.
-    float
-        Its standard deviation.
+    of_walls : bool
+        True if all walls are off along their normal, and not the ranges: ``k`` is then -1 or 1.
     """
     # Without the prior of the range error, that and the scale cannot be separated in square rooms.
-    information, right = np.diag([1.0 / SCALE_PRIOR**2, 1.0 / RANGE_PRIOR**2]), np.zeros(2)
-    square, count = 0.0, 0
+    information = np.diag([SCALE_PRIOR**-2, (WALL_PRIOR if of_walls else RANGE_PRIOR) ** -2])
+    right, square, count = np.zeros(2), 0.0, 0
     for one in found:
         pairs, c, s = one.pairs, math.cos(one.pose.theta), math.sin(one.pose.theta)
         turn, normals = np.array([[c, s], [-s, c]]), pairs.map_normals
         viewed, turned = (pairs.midpoints - np.asarray(one.scan.viewpoint or (0.0, 0.0))) @ turn, pairs.midpoints @ turn
         offsets = np.einsum("ij,ij->i", normals, turned + np.array([one.pose.x, one.pose.y])) - pairs.map_offsets
         arms = np.einsum("ij,ij->i", normals, viewed)
-        scale = np.column_stack([arms, arms / np.maximum(np.hypot(*viewed.T), 1e-6)])
+        shared = -np.sign(arms) if of_walls else arms / np.maximum(np.hypot(*viewed.T), 1e-6)
+        errors = np.column_stack([arms, shared])
         pose = np.column_stack([normals, normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]])
         weight = 1.0 / (pairs.variances + sigma**2)
         own = (pose * weight[:, None]).T @ pose + 1e-3 * np.eye(3)
-        gain = np.linalg.solve(own, (pose * weight[:, None]).T @ np.column_stack([scale, offsets]))
-        both = (scale * weight[:, None]).T @ np.column_stack([scale, offsets, pose])
+        gain = np.linalg.solve(own, (pose * weight[:, None]).T @ np.column_stack([errors, offsets]))
+        both = (errors * weight[:, None]).T @ np.column_stack([errors, offsets, pose])
         information += both[:, :2] - both[:, 3:] @ gain[:, :2]
         right += both[:, 2] - both[:, 3:] @ gain[:, 2]
         square += float(weight @ offsets**2 - ((weight * offsets) @ pose) @ gain[:, 2])
@@ -73,4 +89,20 @@ def scale_of(found: Iterable[Matched], sigma: float) -> tuple[float, float]:
     covariance = np.linalg.inv(information)
     solution = covariance @ right
     inflation = max(1.0, (square - float(right @ solution)) / max(1, count))
-    return float(solution[0]), math.sqrt(covariance[0, 0] * inflation)
+    (scale, offset), (scale_deviation, offset_deviation) = solution, np.sqrt(np.diag(covariance) * inflation)
+    return Errors(float(scale), float(scale_deviation), float(offset), float(offset_deviation))
+
+
+def agreed(values: Floats, deviations: Floats, same: float) -> tuple[float, float, int]:
+    """Return the mean of the values that agree with their median, its deviation, and the number of these.
+
+    Parameters
+    ----------
+    values, deviations : (n,)
+        Values and their standard deviations.
+    same : float
+        Difference up to which values agree whatever their deviations are.
+    """
+    near = np.abs(values - np.median(values)) <= np.maximum(same, AGREEING * deviations)
+    weights = near / deviations**2
+    return float(weights @ values / weights.sum()), float(weights.sum() ** -0.5), int(near.sum())

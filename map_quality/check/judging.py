@@ -14,12 +14,11 @@ from registration import wrap_angle
 from .result import Advice, Finding, SampleReport
 from .samples import Hypothesis, Mistake, Sample, Trial
 from .scaling import Scale, find_scale, unit_mistake
-from .thickness import find_thickness, fit_better_mirrored, thickness_finding
+from .thickness import find_thickness, thickness_finding
 from .tuning import (
     BETTER_SCORE,
     BETTER_USABLE,
     GREATEST_SIGMA,
-    HIDDEN_SCALE,
     LEAST_SIGMA,
     LITTLE,
     MANY,
@@ -65,20 +64,15 @@ def conclude(
     some_scans, some_samples = [scan for scan, _ in some], [one for _, one in some]
     fits = _Fits([one for _, one in tried], Hypothesis(oriented, index.sigma))
     directed = fits.best_directions()
-    mistakes = fits.mistakes()
+    mistakes, thicker = fits.mistakes(), None
     if not mistakes and not deadline.passed:
         scale = find_scale(index, some_scans, some_samples, deadline, oriented=oriented)
-        mistakes = [*_scaled(scale, len(some), fits.usable(fits.present), directed=directed)]
-    thicker = None
-    if not {"reversed", "scale"} & {one.code for one in mistakes} and not deadline.passed:
+        mistakes = [*_scaled(scale, len(some), fits.usable(fits.present))]
+    if not mistakes and not deadline.passed:
         thicker = find_thickness(index, some_scans, deadline, oriented=directed)
-    if thicker is not None and mistakes:
-        # A scan that fits badly for the thickness of walls may fit a little better mirrored, and the reverse.
-        mirrored = not directed or fit_better_mirrored(index, some_scans, deadline)
-        mistakes, thicker = (mistakes, None) if mirrored else ([], thicker)
     advice, usable, would_be = fits.advice(directed, mistakes)
     findings = [*mistakes, *_moved(fits.samples)]
-    if directed is not oriented and not {"reversed", "scale"} & {one.code for one in mistakes}:
+    if directed is not oriented and not mistakes:
         findings.insert(0, _undirected(len(tried), usable, would_be))
     if thicker is not None:
         findings.insert(0, thickness_finding(thicker, oriented=directed))
@@ -104,13 +98,13 @@ class _Fits:
         """Return what all scans were sent with and fit better without."""
         found = []
         for mistake, message in MISTAKES.items():
-            undone = replace(self.present, mistake=mistake)
-            both, usable = self.both(self.present, undone), self.usable(undone)
+            undone, widest = replace(self.present, mistake=mistake), replace(self.present, sigma=WIDEST)
+            both, usable = self.both(widest, replace(widest, mistake=mistake)), self.usable(undone)
             # Scans of another building fit better one way or the other by chance: none of them is usable.
             better = sum(one.score for _, one in both) > BETTER_SCORE * sum(sent.score for sent, _ in both)
-            if self._more(usable, self.usable(self.present)) or (
-                better and usable >= max(1, self.usable(self.present))
-            ):
+            known = self.usable(self.present)
+            if self._more(usable, known) or (better and usable >= max(1, known)):
+                both = self.both(self.present, undone)
                 count = sum(one.score > sent.score or one.usable > sent.usable for sent, one in both)
                 found.append(Finding(mistake, f"{count} of {len(self.samples)} scans {message}"))
         return found
@@ -178,19 +172,21 @@ def _undirected(count: int, usable: int, would_be: int) -> Finding:
     )
 
 
-def _scaled(scale: Scale | None, count: int, usable: int, *, directed: bool) -> Iterator[Finding]:
+def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
     """Return a finding if most scans fit better by one factor."""
-    least = 0.0 if directed else HIDDEN_SCALE
-    if scale is None or scale.is_one or abs(scale.factor - 1.0) < least:
+    if (
+        scale is None
+        or scale.is_one
+        or scale.agreeing < min(2, count)
+        or scale.agreeing <= MANY * scale.usable
+        or scale.usable < usable
+    ):
         return
-    if scale.agreeing < min(2, count) or scale.agreeing <= MANY * scale.usable or scale.usable < usable:
-        return
-    unit = unit_mistake(scale.factor)
-    said = f" The map seems to be in {unit}." if unit is not None else ""
+    factor, unit = unit_mistake(scale.factor)
     yield Finding(
         "scale",
-        f"{scale.agreeing} of {count} scans fit better at another scale: divide the map by {scale.factor:.4g}, or "
-        f"multiply the scans by this factor.{said}",
+        f"{scale.agreeing} of {count} scans fit better at another scale: divide the map by {factor:.4g}, or "
+        f"multiply the scans by this factor.{unit}",
     )
 
 

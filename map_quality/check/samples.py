@@ -20,7 +20,7 @@ from association import (
 )
 from registration import RigidTransform
 
-from .tuning import CONFIDENCE, LEAST_SHARE, SIGMAS
+from .tuning import CONFIDENCE, LEAST_SHARE, SIGMAS, WIDEST
 
 Mistake = Literal["mirrored", "reversed"]
 UNDONE: Mapping[Mistake | None, Callable[[Scan], Scan]] = {
@@ -139,9 +139,10 @@ def hypotheses(oriented: bool, sigma: float | None) -> Iterator[Hypothesis]:
         for other in (sigma, *SIGMAS):
             if (directed, other) != (oriented, sigma):
                 yield Hypothesis(directed, other)
-    yield Hypothesis(oriented, sigma, "mirrored")
-    if oriented:
-        yield Hypothesis(oriented, sigma, "reversed")
+    mistakes: tuple[Mistake, ...] = ("mirrored", "reversed") if oriented else ("mirrored",)
+    for mistake in mistakes:
+        for other in dict.fromkeys((sigma, WIDEST)):
+            yield Hypothesis(oriented, other, mistake)
 
 
 def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> Trial:

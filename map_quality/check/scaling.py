@@ -28,7 +28,7 @@ from registration import Segments
 from registration.layout import Floats
 from registration.limits import MIN_LENGTH
 
-from ..scale import Matched, scale_of
+from ..scale import Matched, agreed, errors_of
 from .samples import Sample, Trial
 from .tuning import (
     CONFIDENCE,
@@ -143,11 +143,12 @@ class _Scaled:
         matched = [one for one in found if one is not None]
         if not matched:
             return Scale(self.factor, math.inf, 0, 0)
-        own = np.array([scale_of([one], sigma) for one in matched])
-        near = np.abs(own[:, 0] - np.median(own[:, 0])) <= np.maximum(SAME_FACTOR, DEVIATIONS * own[:, 1])
-        off, deviation = scale_of([one for one, is_near in zip(matched, near, strict=True) if is_near], sigma)
+        own = [errors_of([one], sigma, of_walls=True) for one in matched]
+        off, deviation, agreeing = agreed(
+            np.array([one.scale for one in own]), np.array([one.scale_deviation for one in own]), SAME_FACTOR
+        )
         usable = sum(one.usable for one in results)
-        return Scale(self.factor * (1.0 - off), self.factor * deviation, int(near.sum()), usable)
+        return Scale(self.factor * (1.0 - off), self.factor * deviation, agreeing, usable)
 
     @property
     def lines(self) -> Segments:
@@ -225,11 +226,10 @@ def _usual(lengths: Floats) -> float:
     return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
 
 
-def unit_mistake(factor: float) -> str | None:
-    """Return which unit of a map that is too large by a factor was taken for which other, or None."""
+def unit_mistake(factor: float) -> tuple[float, str]:
+    """Return the factor between two units that is near to one, and which was taken for which; or the same and ""."""
     for known, (unit, other) in TAKEN_FOR.items():
-        if abs(factor / known - 1.0) < SAME_UNIT:
-            return f"{unit} taken for {other}"
-        if abs(factor * known - 1.0) < SAME_UNIT:
-            return f"{other} taken for {unit}"
-    return None
+        for exact, told in ((known, f"{unit} taken for {other}"), (1.0 / known, f"{other} taken for {unit}")):
+            if abs(factor / exact - 1.0) < SAME_UNIT:
+                return exact, f" The map seems to be in {told}."
+    return factor, ""

@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, associate, mirrored
-from registration import Segments
+from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, associate
 
+from ..scale import Matched, agreed, errors_of
 from .result import Finding
-from .samples import Trial
 from .tuning import (
-    BETTER_THICKNESS,
     CONFIDENCE,
+    DEVIATIONS,
+    LEAST_SHARE,
     LEAST_THICKER,
-    MOST_LINES,
+    LITTLE,
+    MANY,
     MOST_SCANS,
-    THICKER,
-    THICKER_STEP,
+    SAME_THICKNESS,
     THICKNESS_SIGMA,
 )
-
-Scores = dict[float, float]
-"""Of the scans together, nats, by how much thicker the walls were taken to be, metres."""
 
 
 def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> float | None:
     """Return by how much the walls of a map are thicker than drawn, metres.
 
-    Lines without directions are walls of no thickness. Some changes are tried with both faces of each wall, then those
-    beside the best; between these the scores lie on a parabola.
+    Lines without directions are walls of no thickness. Scans are searched with a wide sigma of the walls. In each the
+    distance by which all walls are nearer than drawn is half of the thickness that is missing.
 
     Parameters
     ----------
@@ -45,47 +43,29 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
     Returns
     -------
     float or None
-        None where nothing clearly fits better than the walls as they are, or no time was left to see.
+        None where most scans agree on none, or no time was left to see.
     """
-    scores = _scores(index, scans, deadline, oriented=oriented)
-    if not scores:
+    some = scans[:: -(-len(scans) // MOST_SCANS)] if scans else []
+    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=oriented)
+    try:
+        place = replace(index if oriented else index.undirected_by(deadline), sigma=THICKNESS_SIGMA)
+    except IndexingEndedError:
         return None
-    found = _top(scores)
-    better = scores[_best(scores)] > BETTER_THICKNESS * scores[0.0]
-    return round(found, 3) if better and abs(found) >= LEAST_THICKER else None
-
-
-def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> Scores:
-    """Return scores of possible thicknesses and of those next to the best; empty without scans to try, or time."""
-    if not scans or index.directed > MOST_LINES:
-        return {}
-    some, faces = scans[:: -(-len(scans) // MOST_SCANS)], _faces(index, oriented=oriented)
-    scores: Scores = {}
-
-    def tried(changes: Sequence[float]) -> bool:
-        for change in changes:
-            if deadline.passed:
-                return False
-            try:
-                scores[change] = _score(faces.moved_left(0.5 * change), some, deadline)
-            except IndexingEndedError:
-                return False
-        return not deadline.passed
-
-    first = [one for one in THICKER if oriented or one >= 0.0]
-    return scores if tried(first) and tried(_beside(_best(scores))) else {}
-
-
-def fit_better_mirrored(index: MapIndex, scans: Sequence[Scan], deadline: Deadline) -> bool:
-    """Return whether scans fit a directed map better mirrored, each with the thickness of walls that fits best."""
-    either = [_scores(index, some, deadline, oriented=True) for some in (scans, [mirrored(scan) for scan in scans])]
-    as_they_are, other = (max(one.values(), default=0.0) for one in either)
-    return other > as_they_are
-
-
-def _faces(index: MapIndex, *, oriented: bool) -> Segments:
-    lines = index.segments.take(np.arange(index.directed))
-    return lines if oriented else Segments.derived(np.vstack([lines.endpoints, lines.reversed().endpoints]))
+    own = []
+    for scan in some:
+        result = associate(place, scan, None, options, deadline)
+        fits = result.diagnostics is not None and result.diagnostics.inlier_fraction >= LEAST_SHARE
+        matched = Matched.of(index.segments, scan, result) if fits else None
+        if matched is not None:
+            own.append(errors_of([matched], LITTLE, of_walls=True))
+    if deadline.passed or len(own) <= MANY * len(some):
+        return None
+    offset, deviation, agreeing = agreed(
+        np.array([one.offset for one in own]), np.array([one.offset_deviation for one in own]), 0.5 * SAME_THICKNESS
+    )
+    thicker = 2.0 * offset if oriented else max(0.0, 2.0 * offset)
+    clear = abs(thicker) >= max(LEAST_THICKER, 2.0 * DEVIATIONS * deviation)
+    return round(thicker, 3) if clear and agreeing > MANY * len(some) else None
 
 
 def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
@@ -103,29 +83,3 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
         f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For any other map, "
         "for example a grid, state this uncertainty as `sigma`.",
     )
-
-
-def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
-    index = MapIndex.build(faces, THICKNESS_SIGMA, deadline=deadline)
-    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE)
-    return sum(Trial.of(associate(index, scan, None, options, deadline)).score for scan in scans)
-
-
-def _best(scores: Scores) -> float:
-    return max(scores, key=lambda one: scores[one])
-
-
-def _beside(change: float) -> tuple[float, float]:
-    """Return the changes that are one step smaller and larger; rounded, as keys."""
-    return round(change - THICKER_STEP, 3), round(change + THICKER_STEP, 3)
-
-
-def _top(scores: Scores) -> float:
-    """Return the vertex of the parabola through the best score and those a step next to it."""
-    best = _best(scores)
-    low, high = _beside(best)
-    if low not in scores or high not in scores:
-        return best
-    below, above = scores[low], scores[high]
-    bend = below - 2.0 * scores[best] + above
-    return best if bend >= 0.0 else best + THICKER_STEP * 0.5 * (below - above) / bend

@@ -76,7 +76,6 @@ MOST_ON_LADDER = 4  # scans; time
 LEAST_SCALE = 0.004  # tables; a factor that is reported differs from one by this,
 DEVIATIONS = 3.0  # and by so many of its deviations
 SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
-HIDDEN_SCALE = 0.08  # tables; as much the thickness of walls may feign where lines run along their middle
 LEAST_EXTENT = 1.5  # m, geometry; the part seen of any room
 GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
@@ -84,7 +83,6 @@ USUAL_PART = (0.2, 5.0)  # times, tables; usual length of map segments over that
 
 # --- Thickness --------------------------------------------------------------------------------------------------------
 
-THICKER = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4)  # m; how much thicker walls may be than drawn
-THICKER_STEP = 0.05  # m, tables; the score is a parabola about as wide where walls are off by `THICKNESS_SIGMA`
-THICKNESS_SIGMA = 0.05  # m
-BETTER_THICKNESS, LEAST_THICKER = 1.02, 0.03  # times, and m, tables
+THICKNESS_SIGMA = 0.05  # m, tables; of walls where these are searched for
+LEAST_THICKER = 0.03  # m, tables
+SAME_THICKNESS = 0.03  # m, tables; of scans that agree

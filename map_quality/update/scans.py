@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
 from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
 
-from ..scale import Matched, scale_of
+from ..scale import Matched, errors_of
 from .result import RefusedVisit
 from .tuning import (
     AGREEING,
@@ -251,15 +251,15 @@ def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float)
             "and that the map shows the places where they were taken."
         )
     matched = [Matched(one.scan, one.pose, one.pairs) for one in precise]
-    factor, sigma_of_factor = scale_of(matched, sigma)
-    if sigma_of_factor > SURE_OF_SCALE:
+    errors = errors_of(matched, sigma)
+    if errors.scale_deviation > SURE_OF_SCALE:
         return (
-            f"The scale of the scans is known to {100.0 * sigma_of_factor:.1f} % only, expected "
+            f"The scale of the scans is known to {100.0 * errors.scale_deviation:.1f} % only, expected "
             f"{100.0 * SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
         )
-    if abs(factor) > OFF_SCALE:
+    if abs(errors.scale) > OFF_SCALE:
         return (
-            f"Lengths of the scans are off by {100.0 * factor:.1f} % from those of the map, expected at most "
+            f"Lengths of the scans are off by {100.0 * errors.scale:.1f} % from those of the map, expected at most "
             f"{100.0 * OFF_SCALE:g} %. Check the scale of the map and of the ranges."
         )
     return None
