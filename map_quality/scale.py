@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from association import AssociationResult, Scan
 from registration import Correspondences, RigidTransform, Segments
-from registration.layout import Floats
 
 SCALE_PRIOR, RANGE_PRIOR, WALL_PRIOR = 0.1, 0.05, 0.2  # usual values of a fraction, and m of ranges and of walls
 AGREEING = 3.0  # deviations
+LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +27,9 @@ class Matched:
 
     @classmethod
     def of(cls, segments: Segments, scan: Scan, result: AssociationResult) -> Matched | None:
-        """Return a scan with its answer on the map of these segments; None where nothing was matched."""
-        if result.pose is None or not result.correspondences:
+        """Return a scan with its answer on the map of these segments; None where too little of the scan fits."""
+        fits = result.diagnostics is not None and result.diagnostics.inlier_fraction >= LEAST_SHARE
+        if result.pose is None or not (result.usable or fits):
             return None
         pairs = [(one.scan, one.map) for one in result.correspondences]
         return cls(scan, result.pose, Correspondences.of(segments, scan.measured, pairs))
@@ -93,16 +95,32 @@ def errors_of(found: Iterable[Matched], sigma: float, *, of_walls: bool = False)
     return Errors(float(scale), float(scale_deviation), float(offset), float(offset_deviation))
 
 
-def agreed(values: Floats, deviations: Floats, same: float) -> tuple[float, float, int]:
-    """Return the mean of the values that agree with their median, its deviation, and the number of these.
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """An error that scans agree about, its standard deviation, and the number of these scans."""
+
+    value: float = 0.0
+    deviation: float = math.inf
+    count: int = 0
+
+
+def agreed(found: Sequence[Matched], sigma: float, error: Literal["scale", "offset"], same: float) -> Agreed:
+    """Estimate an error of walls from each scan, and return the mean of those that agree with the median.
 
     Parameters
     ----------
-    values, deviations : (n,)
-        Values and their standard deviations.
+    found : sequence of Matched
+    sigma : float
+        Standard deviation of the map's lines, metres.
+    error : "scale" or "offset"
+        Of `Errors`.
     same : float
-        Difference up to which values agree whatever their deviations are.
+        Difference up to which two scans agree whatever their deviations are.
     """
+    if not found:
+        return Agreed()
+    own = [errors_of([one], sigma, of_walls=True) for one in found]
+    values, deviations = np.array([[getattr(one, error), getattr(one, f"{error}_deviation")] for one in own]).T
     near = np.abs(values - np.median(values)) <= np.maximum(same, AGREEING * deviations)
     weights = near / deviations**2
-    return float(weights @ values / weights.sum()), float(weights.sum() ** -0.5), int(near.sum())
+    return Agreed(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5), int(near.sum()))

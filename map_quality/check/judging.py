@@ -60,12 +60,12 @@ def conclude(
     tried = [(scan, one) for scan, one in zip(scans, samples, strict=True) if one is not None]
     if not tried:
         return SampleReport((), Advice(), 0, 0)
-    some = tried[:: -(-len(tried) // MOST_SCANS)]
+    some = [(scan, one) for scan, one in tried if len(scan.measured)][:: -(-len(tried) // MOST_SCANS)]
     some_scans, some_samples = [scan for scan, _ in some], [one for _, one in some]
     fits = _Fits([one for _, one in tried], Hypothesis(oriented, index.sigma))
     directed = fits.best_directions()
     mistakes, thicker = fits.mistakes(), None
-    if not mistakes and not deadline.passed:
+    if some and not mistakes and not deadline.passed:
         scale = find_scale(index, some_scans, some_samples, deadline, oriented=oriented)
         mistakes = [*_scaled(scale, len(some), fits.usable(fits.present))]
     if not mistakes and not deadline.passed:
@@ -94,43 +94,33 @@ class _Fits:
         """Return the trials of the samples that were tried under both of two hypotheses."""
         return [(s.trials[one], s.trials[other]) for s in self.samples if {one, other} <= s.trials.keys()]
 
+    def is_better(self, sent: Hypothesis, other: Hypothesis, known: int, usable: int) -> bool:
+        """Return whether scans fit clearly better under another hypothesis, by scores or by how many are usable."""
+        both = self.both(sent, other)
+        clearly = max(1.0, BETTER_USABLE * len(self.samples))
+        if usable > known + min(clearly, len(self.samples) - 1):
+            return True
+        # Scores of scans of another building are better by chance: none of these is usable, or clearly fewer.
+        better = sum(one.score for _, one in both) > BETTER_SCORE * sum(one.score for one, _ in both)
+        return better and usable >= max(1.0, known - clearly)
+
     def mistakes(self) -> list[Finding]:
         """Return what all scans were sent with and fit better without."""
         found = []
         for mistake, message in MISTAKES.items():
             undone, widest = replace(self.present, mistake=mistake), replace(self.present, sigma=WIDEST)
-            both, usable = self.both(widest, replace(widest, mistake=mistake)), self.usable(undone)
-            # Scans of another building fit better one way or the other by chance: none of them is usable.
-            better = sum(one.score for _, one in both) > BETTER_SCORE * sum(sent.score for sent, _ in both)
-            known = self.usable(self.present)
-            if self._more(usable, known) or (better and usable >= max(1, known)):
+            usable = self.usable(self.present), self.usable(undone)
+            if self.is_better(widest, replace(widest, mistake=mistake), *usable):
                 both = self.both(self.present, undone)
                 count = sum(one.score > sent.score or one.usable > sent.usable for sent, one in both)
                 found.append(Finding(mistake, f"{count} of {len(self.samples)} scans {message}"))
         return found
 
-    def _more(self, usable: int, others: int) -> bool:
-        """Return whether clearly more scans are usable than others; of a single one, one."""
-        return usable > others + min(len(self.samples) - 1, self.clearly)
-
-    @property
-    def clearly(self) -> float:
-        """The number of scans that may be usable by chance."""
-        return max(1.0, BETTER_USABLE * len(self.samples))
-
     def best_directions(self) -> bool:
         """Return whether directions should mean something: as now, unless the scans fit clearly better otherwise."""
         now = self.present.oriented
-        both = self.both(Hypothesis(now, WIDEST), Hypothesis(not now, WIDEST))
-        score, score_otherwise = sum(one.score for one, _ in both), sum(other.score for _, other in both)
-        usable, usable_otherwise = (
-            max((self.usable(way) for way in self.ways(directed)), default=0) for directed in (now, not now)
-        )
-        # A score without directions may well come from chance: then clearly fewer scans are usable, or none.
-        better = usable_otherwise > usable + self.clearly or (
-            score_otherwise > BETTER_SCORE * score and usable_otherwise >= max(1.0, usable - self.clearly)
-        )
-        return now is not better
+        usable = (max((self.usable(way) for way in self.ways(one)), default=0) for one in (now, not now))
+        return now is not self.is_better(Hypothesis(now, WIDEST), Hypothesis(not now, WIDEST), *usable)
 
     def ways(self, directed: bool) -> list[Hypothesis]:
         """Return the hypotheses about directions and sigma alone that any scan was tried with."""

@@ -20,7 +20,8 @@ from association import (
 )
 from registration import RigidTransform
 
-from .tuning import CONFIDENCE, LEAST_SHARE, SIGMAS, WIDEST
+from ..scale import LEAST_SHARE
+from .tuning import CONFIDENCE, SIGMAS, WIDEST
 
 Mistake = Literal["mirrored", "reversed"]
 UNDONE: Mapping[Mistake | None, Callable[[Scan], Scan]] = {

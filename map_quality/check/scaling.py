@@ -6,7 +6,6 @@ ladder, and some scans are searched in it. The factor with the highest sum of sc
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -25,10 +24,8 @@ from association import (
     scaled,
 )
 from registration import Segments
-from registration.layout import Floats
-from registration.limits import MIN_LENGTH
 
-from ..scale import Matched, agreed, errors_of
+from ..scale import Matched, agreed
 from .samples import Sample, Trial
 from .tuning import (
     CONFIDENCE,
@@ -36,16 +33,16 @@ from .tuning import (
     EXCEEDING,
     GREATEST_EXTENT,
     LADDER,
+    LARGEST,
     LAX_TOLERANCE,
     LEAST_EXTENT,
     LEAST_SCALE,
-    LEAST_SHARE,
     LITTLE,
     MANY,
     MOST_LINES,
     MOST_ON_LADDER,
     SAME_FACTOR,
-    USUAL_PART,
+    SMALLEST,
 )
 
 # Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
@@ -113,7 +110,7 @@ class _Scaled:
         """Return them with another factor, these having none; None where the map cannot be indexed, or not in time."""
         if not LEAST_EXTENT <= self.extent <= GREATEST_EXTENT:
             return replace(self, scans=[scaled(scan, factor) for scan in self.scans], factor=factor)
-        segments = Segments.derived(self.lines.endpoints / factor)
+        segments = Segments.derived(self.index.segments.endpoints[: self.index.directed] / factor)
         points, sigma = self.index.points, self.index.sigma
         points = replace(points, positions=points.positions / factor)
         with suppress(InvalidMapError, IndexingEndedError):
@@ -132,28 +129,13 @@ class _Scaled:
         scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
         return [associate(self.index, scan, None, options, self.deadline) for scan in scans]
 
-    def fit(self, results: Sequence[AssociationResult], *, lax: bool = False) -> Scale:
-        """Estimate the factor from the correspondences of usable scans; `lax`: of all scans that fit."""
-        sigma = LITTLE if self.index.sigma is None else self.index.sigma
-        found = [
-            Matched.of(self.index.segments, scan, one)
-            for scan, one in zip(self.scans, results, strict=True)
-            if one.usable or (lax and one.diagnostics is not None and one.diagnostics.inlier_fraction >= LEAST_SHARE)
-        ]
-        matched = [one for one in found if one is not None]
-        if not matched:
-            return Scale(self.factor, math.inf, 0, 0)
-        own = [errors_of([one], sigma, of_walls=True) for one in matched]
-        off, deviation, agreeing = agreed(
-            np.array([one.scale for one in own]), np.array([one.scale_deviation for one in own]), SAME_FACTOR
-        )
+    def fit(self, results: Sequence[AssociationResult]) -> Scale:
+        """Estimate the factor from the correspondences."""
+        found = [Matched.of(self.index.segments, scan, one) for scan, one in zip(self.scans, results, strict=True)]
+        matched, sigma = [one for one in found if one is not None], self.index.sigma
+        off = agreed(matched, LITTLE if sigma is None else sigma, "scale", SAME_FACTOR)
         usable = sum(one.usable for one in results)
-        return Scale(self.factor * (1.0 - off), self.factor * deviation, agreeing, usable)
-
-    @property
-    def lines(self) -> Segments:
-        """The map as sent."""
-        return self.index.segments.take(np.arange(self.index.directed))
+        return Scale(self.factor * (1.0 - off.value), self.factor * off.deviation, off.count, usable)
 
     @property
     def extent(self) -> float:
@@ -161,13 +143,9 @@ class _Scaled:
         return float(np.median([np.hypot(*np.ptp(scan.measured.segments.midpoints, axis=0)) for scan in self.scans]))
 
     def rungs(self) -> Iterator[float]:
-        """Yield the factors that are tried: a ladder, and those between units where lines are about as long then."""
-        lines, seen = self.lines.lengths, np.concatenate([scan.measured.segments.lengths for scan in self.scans])
-        usual, greatest = _usual(lines) / _usual(seen), EXCEEDING * self.index.diagonal / self.extent
-        units = (*TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR))
-        for factor in (*LADDER, *units):
-            is_likely = USUAL_PART[0] <= usual / factor <= USUAL_PART[1]
-            if factor <= greatest and (factor in LADDER or is_likely) and lines.min() / factor >= MIN_LENGTH:
+        """Yield the factors that are tried: those after which the scans fit into the map, and robots drive about it."""
+        for factor in (*LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
+            if max(SMALLEST, self.extent / EXCEEDING) <= self.index.diagonal / factor <= LARGEST:
                 yield factor
 
 
@@ -199,7 +177,7 @@ def find_scale(
         rung = _best_rung(sent)
         if rung is None:
             return None
-        first = rung.fit(rung.search(lax=True), lax=True)
+        first = rung.fit(rung.search(lax=True))
     place = None if first.is_one or deadline.passed else sent.by(first.factor)
     return None if place is None else place.fit(place.search())
 
@@ -218,12 +196,6 @@ def _best_rung(sent: _Scaled) -> _Scaled | None:
         if score > most:
             best, most = factor, score
     return None if best is None else sent.by(best)
-
-
-def _usual(lengths: Floats) -> float:
-    """Return the length such that half of all length is in longer lines, metres."""
-    ordered = np.sort(lengths)
-    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
 
 
 def unit_mistake(factor: float) -> tuple[float, str]:

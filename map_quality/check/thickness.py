@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, associate
 
-from ..scale import Matched, agreed, errors_of
+from ..scale import Matched, agreed
 from .result import Finding
 from .tuning import (
     CONFIDENCE,
     DEVIATIONS,
-    LEAST_SHARE,
     LEAST_THICKER,
     LITTLE,
     MANY,
@@ -51,21 +48,13 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
         place = replace(index if oriented else index.undirected_by(deadline), sigma=THICKNESS_SIGMA)
     except IndexingEndedError:
         return None
-    own = []
-    for scan in some:
-        result = associate(place, scan, None, options, deadline)
-        fits = result.diagnostics is not None and result.diagnostics.inlier_fraction >= LEAST_SHARE
-        matched = Matched.of(index.segments, scan, result) if fits else None
-        if matched is not None:
-            own.append(errors_of([matched], LITTLE, of_walls=True))
-    if deadline.passed or len(own) <= MANY * len(some):
+    results = ((scan, associate(place, scan, None, options, deadline)) for scan in some)
+    found = [Matched.of(index.segments, scan, result) for scan, result in results]
+    offset = agreed([one for one in found if one is not None], LITTLE, "offset", 0.5 * SAME_THICKNESS)
+    thicker = 2.0 * offset.value if oriented else max(0.0, 2.0 * offset.value)
+    if deadline.passed or offset.count <= MANY * len(some):
         return None
-    offset, deviation, agreeing = agreed(
-        np.array([one.offset for one in own]), np.array([one.offset_deviation for one in own]), 0.5 * SAME_THICKNESS
-    )
-    thicker = 2.0 * offset if oriented else max(0.0, 2.0 * offset)
-    clear = abs(thicker) >= max(LEAST_THICKER, 2.0 * DEVIATIONS * deviation)
-    return round(thicker, 3) if clear and agreeing > MANY * len(some) else None
+    return round(thicker, 3) if abs(thicker) >= max(LEAST_THICKER, 2.0 * DEVIATIONS * offset.deviation) else None
 
 
 def thickness_finding(thicker: float, *, oriented: bool) -> Finding:

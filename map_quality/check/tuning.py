@@ -64,7 +64,6 @@ BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
 MANY = 0.5  # of the scans that give evidence
 MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
-LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 LEAST_SIGMA, GREATEST_SIGMA = 0.005, 1.0  # m
 MOST_SCANS, MOST_LINES = 10, 20_000  # scans, and segments, whose scale and thickness are searched for; time
 
@@ -79,7 +78,6 @@ SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those o
 LEAST_EXTENT = 1.5  # m, geometry; the part seen of any room
 GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
-USUAL_PART = (0.2, 5.0)  # times, tables; usual length of map segments over that of scan segments, once of one unit
 
 # --- Thickness --------------------------------------------------------------------------------------------------------
 

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
-DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_ranges", "scan_exceeds_map"))
+DOUBTFUL = frozenset(("map_scale", "stuck_ranges", "scan_exceeds_map"))
 
 
 # Reasons that changes of a building alone may give.
