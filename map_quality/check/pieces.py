@@ -170,12 +170,13 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     if least >= GREATEST_GAP:
         return
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
+    _, first, counts = np.unique(ends, axis=0, return_index=True, return_counts=True)
     # A segment whose end is as near as this to its own begin is too short for the test.
-    alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
-    if not alone.any() or deadline.passed:
+    alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > GREATEST_GAP)])
+    if not len(alone) or deadline.passed:
         return
     found = set()
-    for end, gap in _loose_ends(ends, np.flatnonzero(alone), least, deadline):
+    for end, gap in _loose_ends(ends, alone, least, deadline):
         if deadline.passed:
             break
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
@@ -188,15 +189,6 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
             "rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
-
-
-def _alone(ends: Floats) -> Flags:
-    """Return for each end, (n, 2) metres, whether no other is at the same place."""
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    same = (np.diff(ends[order], axis=0) == 0.0).all(axis=1)
-    alone = np.empty(len(ends), dtype=bool)
-    alone[order] = ~(np.append(same, False) | np.append(False, same))
-    return alone
 
 
 def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline) -> Iterator[tuple[int, float]]:
