@@ -108,7 +108,7 @@ class _Scaled:
 
     def by(self, factor: float) -> _Scaled | None:
         """Return them with another factor, these having none; None where the map cannot be indexed, or not in time."""
-        if not LEAST_EXTENT <= self.extent <= GREATEST_EXTENT:
+        if not self.is_usual:
             return replace(self, scans=[scaled(scan, factor) for scan in self.scans], factor=factor)
         segments = Segments.derived(self.index.segments.endpoints[: self.index.directed] / factor)
         points, sigma = self.index.points, self.index.sigma
@@ -142,10 +142,17 @@ class _Scaled:
         """The usual extent of the scans, metres."""
         return float(np.median([np.hypot(*np.ptp(scan.measured.segments.midpoints, axis=0)) for scan in self.scans]))
 
+    @property
+    def is_usual(self) -> bool:
+        """Return whether the scans are as large as scans are: then the map is put to scale, else they are."""
+        return LEAST_EXTENT <= self.extent <= GREATEST_EXTENT
+
     def rungs(self) -> Iterator[float]:
         """Yield the factors that are tried: those after which the scans fit into the map, and robots drive about it."""
         for factor in (*LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
-            if max(SMALLEST, self.extent / EXCEEDING) <= self.index.diagonal / factor <= LARGEST:
+            of_map, of_scans = (1.0 / factor, 1.0) if self.is_usual else (1.0, factor)
+            extent, diagonal = of_scans * self.extent, of_map * self.index.diagonal
+            if LEAST_EXTENT <= extent <= EXCEEDING * diagonal and SMALLEST <= diagonal <= LARGEST:
                 yield factor
 
 

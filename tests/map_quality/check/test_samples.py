@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from association import AssociationOptions, CancelledError, Deadline, MapIndex, associate
+from association import AssociationOptions, CancelledError, Deadline, MapIndex, Scan, associate, scaled
 from map_quality import Sample, SampleReport, conclude, try_sample
-from registration import RigidTransform
+from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
 
 from ...association.scenes import maze
@@ -119,6 +119,29 @@ def test_a_map_of_another_unit(factor: float, said: str) -> None:
     assert codes(report) == ["scale"]
     assert f"divide the map by {factor:.4g}," in report.findings[0].message
     assert said in report.findings[0].message
+
+
+def test_scans_of_another_unit() -> None:
+    """Scans in millimetres; the map is in metres."""
+    index, scans = index_of(faces()), [scaled(scan, 1000.0) for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
+    report = conclude(index, scans, samples, Deadline(), oriented=True)
+    assert codes(report) == ["scale"]
+    assert "divide the map by 0.001, or multiply the scans by this factor" in report.findings[0].message
+
+
+@pytest.mark.parametrize(
+    ("walls", "code"), [(reversed_ends(faces()), "reversed"), (reversed_ends(faces() * MIRROR), "mirrored")]
+)
+def test_a_single_sample_shows_a_mistake(walls: Floats, code: str) -> None:
+    index, (_, scan) = index_of(walls), sampled()[0]
+    assert code in codes(concluded(index, [try_sample(index, scan, Deadline(), oriented=True)]))
+
+
+def test_scans_that_see_nothing_show_nothing() -> None:
+    index, blind = index_of(faces()), Scan(MeasuredSegments.from_segments(Segments.from_array([])))
+    samples = [try_sample(index, blind, Deadline(), oriented=True)]
+    assert codes(conclude(index, [blind], samples, Deadline(), oriented=True)) == []
 
 
 @pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
