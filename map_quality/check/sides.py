@@ -7,17 +7,13 @@ nothing, or the back of the wall's other face.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from association import Deadline, MapIndex
-from registration import RigidTransform
 from registration.layout import Floats
-from simulation import Scanner, scan
 
 from .pieces import Flags, Indices, longest_pieces, segments_of
 from .result import Finding
@@ -28,15 +24,12 @@ from .tuning import (
     MEANINGLESS,
     MOST,
     MOST_LOOKED_FROM,
+    NEAR_FOLLOWED,
     OFF_THE_WALL,
     PLACES_ON_A_WALL,
     SHORTEST_LOOKED_FROM,
     TOO_NEAR,
     TURNS,
-)
-
-RAYS = Scanner(
-    len(TURNS), TURNS[0], (TURNS[-1] - TURNS[0]) / (len(TURNS) - 1), range_min=TOO_NEAR, range_max=FOLLOWED, sigma=0.0
 )
 
 
@@ -98,6 +91,38 @@ class Sides:
         return float(self.lengths[which].sum() / self.lengths.sum()) if len(self.lengths) else 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class _Hits:
+    """The first segments that rays meet: distances (r,), inf where there is none, indices, and if on their left."""
+
+    reach: Floats
+    segments: Indices
+    fronts: Flags
+
+    @classmethod
+    def of(cls, ends: Floats, low: Floats, high: Floats, origins: Floats, rays: Floats) -> _Hits:
+        """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`."""
+        found = cls(np.full(len(rays), np.inf), np.zeros(len(rays), dtype=np.intp), np.zeros(len(rays), dtype=bool))
+        for limit in (*NEAR_FOLLOWED, FOLLOWED):
+            left = np.flatnonzero(np.isinf(found.reach))
+            near = (high >= origins.min(axis=0) - limit) & (low <= origins.max(axis=0) + limit)
+            around = np.flatnonzero(near.all(axis=1))
+            if not len(left) or not len(around):
+                continue
+            bx, by = (ends[around, k] - origins[left, k, None] for k in (0, 1))
+            dx, dy = (ends[around, k + 2] - ends[around, k] for k in (0, 1))
+            rx, ry = rays[left, 0, None], rays[left, 1, None]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slant = rx * dy - ry * dx
+                reach, along = (bx * dy - by * dx) / slant, (bx * ry - by * rx) / slant
+                reach = np.where((reach > 0.0) & (reach <= limit) & (along >= 0.0) & (along <= 1.0), reach, np.inf)
+            first = reach.argmin(axis=1)
+            row = np.arange(len(left))
+            found.reach[left], found.segments[left] = reach[row, first], around[first]
+            found.fronts[left] = slant[row, first] > 0.0
+        return found
+
+
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
     """Follow rays from both sides of the longest walls of a directed map, as many as the deadline allows.
 
@@ -107,25 +132,25 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     lengths, segments = index.walls.longest, index.segments.shifted(-index.origin)
     longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]
     chosen = longest[(lengths[longest] >= SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
-    ends = segments.endpoints.reshape(-1, 2, 2)
-    low, high = ends.min(axis=1), ends.max(axis=1)
+    ends, left_and_right = segments.endpoints, np.array([1.0, -1.0])[:, None, None, None]
+    low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+    lowest, highest = low.min(axis=0), high.max(axis=0)
+    along_normal, along_wall, places = np.cos(TURNS)[:, None], np.sin(TURNS)[:, None], np.array(PLACES_ON_A_WALL)
     counts, room, lost = np.zeros((len(chosen), 2, 2)), np.full((len(chosen), 2), np.inf), np.zeros(len(chosen), bool)
     done = 0
     for k, piece in enumerate(longest_pieces(index)[chosen].tolist()):
         if deadline.passed:
             break
-        near = np.flatnonzero(((high >= low[piece] - FOLLOWED) & (low <= high[piece] + FOLLOWED)).all(axis=1))
-        around, evidence = segments.take(near), ~both_ways[index.wall_of_piece[near]]
-        for place, (side, sign) in product(PLACES_ON_A_WALL, enumerate((1.0, -1.0))):
-            normal = sign * segments.normals[piece]
-            x, y = ends[piece, 0] + place * (ends[piece, 1] - ends[piece, 0]) + OFF_THE_WALL * normal
-            seen = scan(around, RigidTransform(x, y, math.atan2(normal[1], normal[0])), RAYS)
-            told = (seen.hits >= 0) & evidence[seen.hits]
-            counts[k, side] += [np.sum(told & seen.facing), np.sum(told & ~seen.facing)]
-            room[k, side] = min(room[k, side], seen.ranges[told].min(initial=np.inf))
-            angles = seen.angles[np.isinf(seen.ranges)] + seen.pose.theta
-            stops = np.array([x, y]) + FOLLOWED * np.column_stack([np.cos(angles), np.sin(angles)])
-            lost[k] |= side == 0 and ((stops >= low.min(axis=0)) & (stops <= high.max(axis=0))).all(axis=1).any()
+        normal, direction = segments.normals[piece], segments.directions[piece]
+        starts = ends[piece, :2] + places[:, None] * segments.lengths[piece] * direction
+        origins = np.zeros((2, len(places), len(TURNS), 2)) + starts[:, None] + OFF_THE_WALL * left_and_right * normal
+        rays = np.zeros_like(origins) + left_and_right * (along_normal * normal + along_wall * direction)
+        hits = _Hits.of(ends, low, high, origins.reshape(-1, 2), rays.reshape(-1, 2))
+        told = (hits.reach > TOO_NEAR) & np.isfinite(hits.reach) & ~both_ways[index.wall_of_piece[hits.segments]]
+        counts[k] = np.stack([told & hits.fronts, told & ~hits.fronts], axis=1).reshape(2, -1, 2).sum(axis=1)
+        room[k] = np.where(told, hits.reach, np.inf).reshape(2, -1).min(axis=1)
+        stops = (origins + FOLLOWED * rays)[0].reshape(-1, 2)[np.isinf(hits.reach[: len(places) * len(TURNS)])]
+        lost[k] = ((stops >= lowest) & (stops <= highest)).all(axis=1).any()
         done = k + 1
     return Sides(chosen[:done], lengths[chosen[:done]], counts[:done, 0], counts[:done, 1], room[:done], lost[:done])
 

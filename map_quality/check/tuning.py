@@ -34,6 +34,7 @@ PLACES_ON_A_WALL = (0.25, 0.5, 0.75)  # of its length
 TURNS = tuple(math.radians(a) for a in (-60.0, -20.0, 20.0, 60.0))  # of the rays, from the wall's normal
 OFF_THE_WALL = 1e-3  # m, geometry
 FOLLOWED = 40.0  # m, tables
+NEAR_FOLLOWED = (3.0, 10.0)  # m; time: rays that end within these are not followed through more of the map
 TOO_NEAR = 0.05  # m, geometry; a hit that is nearer is the same wall again
 CONTRADICTED = 0.5  # of a wall's rays on one side
 # Of hits of rays. Measured: up to 0.07 in drawings of plans, 0.30 in campus plans, 0.39 in maps that robots made; from
