@@ -27,9 +27,11 @@ from .tuning import (
     NEAR_FOLLOWED,
     OFF_THE_WALL,
     PLACES_ON_A_WALL,
+    RAYS_TIMES_SEGMENTS,
     SHORTEST_LOOKED_FROM,
     TOO_NEAR,
     TURNS,
+    WALLS_TIMES_SEGMENTS,
 )
 
 
@@ -101,13 +103,16 @@ class _Hits:
 
     @classmethod
     def of(cls, ends: Floats, low: Floats, high: Floats, origins: Floats, rays: Floats) -> _Hits:
-        """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`."""
+        """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`.
+
+        Where too many segments are near, rays meet none.
+        """
         found = cls(np.full(len(rays), np.inf), np.zeros(len(rays), dtype=np.intp), np.zeros(len(rays), dtype=bool))
         for limit in (*NEAR_FOLLOWED, FOLLOWED):
             left = np.flatnonzero(np.isinf(found.reach))
             near = (high >= origins.min(axis=0) - limit) & (low <= origins.max(axis=0) + limit)
             around = np.flatnonzero(near.all(axis=1))
-            if not len(left) or not len(around):
+            if not 0 < len(left) * len(around) <= RAYS_TIMES_SEGMENTS:
                 continue
             bx, by = (ends[around, k] - origins[left, k, None] for k in (0, 1))
             dx, dy = (ends[around, k + 2] - ends[around, k] for k in (0, 1))
@@ -130,7 +135,7 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     one is no evidence.
     """
     lengths, segments = index.walls.longest, index.segments.shifted(-index.origin)
-    longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]
+    longest = np.argsort(-lengths, kind="stable")[: min(MOST_LOOKED_FROM, WALLS_TIMES_SEGMENTS // len(segments))]
     chosen = longest[(lengths[longest] >= SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
     ends, left_and_right = segments.endpoints, np.array([1.0, -1.0])[:, None, None, None]
     low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])

@@ -28,7 +28,8 @@ STEPS = (0.5, 0.25, 0.2, 0.1, 0.05, 0.04, 0.025, 0.02)  # m; rasters that are lo
 
 # --- Sides ------------------------------------------------------------------------------------------------------------
 
-MOST_LOOKED_FROM = 2000  # walls, the longest; some 0.1 ms each
+MOST_LOOKED_FROM, WALLS_TIMES_SEGMENTS = 2000, 40_000_000  # walls, the longest; time, some 0.2 to 2 ms each
+RAYS_TIMES_SEGMENTS = 200_000  # compared together; memory, 16 MB, and time
 SHORTEST_LOOKED_FROM = 0.3  # m, tables
 PLACES_ON_A_WALL = (0.25, 0.5, 0.75)  # of its length
 TURNS = tuple(math.radians(a) for a in (-60.0, -20.0, 20.0, 60.0))  # of the rays, from the wall's normal
