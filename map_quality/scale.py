@@ -105,7 +105,7 @@ class Agreed:
 
 
 def agreed(found: Sequence[Matched], sigma: float, error: Literal["scale", "offset"], same: float) -> Agreed:
-    """Estimate an error of walls from each scan, and return the mean of those that agree with the median.
+    """Estimate an error of walls from each scan, and return the mean of those that agree with their weighted median.
 
     Parameters
     ----------
@@ -121,6 +121,8 @@ def agreed(found: Sequence[Matched], sigma: float, error: Literal["scale", "offs
         return Agreed()
     own = [errors_of([one], sigma, of_walls=True) for one in found]
     values, deviations = np.array([[getattr(one, error), getattr(one, f"{error}_deviation")] for one in own]).T
-    near = np.abs(values - np.median(values)) <= np.maximum(same, AGREEING * deviations)
-    weights = near / deviations**2
+    order, weights = np.argsort(values), deviations**-2.0
+    middle = values[order][np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())]
+    near = np.abs(values - middle) <= np.maximum(same, AGREEING * deviations)
+    weights *= near
     return Agreed(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5), int(near.sum()))

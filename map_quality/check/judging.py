@@ -100,9 +100,9 @@ class _Fits:
         clearly = max(1.0, BETTER_USABLE * len(self.samples))
         if usable > known + min(clearly, len(self.samples) - 1):
             return True
-        # Scores of scans of another building are better by chance: none of these is usable, or clearly fewer.
+        # Scores of scans of another building are better by chance: hardly any of these is usable, or clearly fewer.
         better = sum(one.score for _, one in both) > BETTER_SCORE * sum(one.score for one, _ in both)
-        return better and usable >= max(1.0, known - clearly)
+        return better and usable >= max(min(2, len(self.samples)), known - clearly)
 
     def mistakes(self) -> list[Finding]:
         """Return what all scans were sent with and fit better without."""
