@@ -7,18 +7,15 @@ nothing, or the back of the wall's other face.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from association import Deadline, MapIndex
-from association.consensus.kernels.sight import first_hit
-from association.layout import RAY, Flags
-from registration.layout import Floats, Records
+from registration.layout import Floats
 
-from .pieces import segments_of
+from .pieces import Flags, Indices, longest_pieces, segments_of
 from .result import Finding
 from .tuning import (
     CONTRADICTED,
@@ -27,42 +24,15 @@ from .tuning import (
     MEANINGLESS,
     MOST,
     MOST_LOOKED_FROM,
+    NEAR_FOLLOWED,
     OFF_THE_WALL,
     PLACES_ON_A_WALL,
+    RAYS_TIMES_SEGMENTS,
     SHORTEST_LOOKED_FROM,
     TOO_NEAR,
     TURNS,
+    WALLS_TIMES_SEGMENTS,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Looker:
-    """Follows single rays from places in the index frame, by the grid of the search: some 5 microseconds each.
-
-    `simulation.scan` takes time for every segment of the map, whatever a ray meets; this needs 24 rays from each wall.
-    """
-
-    index: MapIndex
-    _ray: Records = field(default_factory=lambda: np.zeros(1, RAY), repr=False)
-
-    def first(self, x: float, y: float, angle: float, limit: float) -> tuple[float, int]:
-        """Return how far away the first wall is along an angle, metres, and which; ``(limit, -1)`` where none is."""
-        ray, place = self._ray[0], self.index.tables.place
-        ray["x"], ray["y"], ray["limit"] = x, y, limit
-        ray["dx"], ray["dy"] = math.cos(angle), math.sin(angle)
-        reach, wall = first_hit(ray, place.walls, place.grid.starts, place.grid.items, place.grid.shape[0])
-        return float(reach), int(wall)
-
-    def is_within(self, x: float, y: float) -> bool:
-        """Return whether a place lies in the box around the walls, as far as cells list them."""
-        shape = self.index.tables.place.grid.shape[0]
-        right, top = shape["columns"] * shape["cell"], shape["rows"] * shape["cell"]
-        return bool(0.0 <= x - shape["x0"] <= right and 0.0 <= y - shape["y0"] <= top)
-
-    def is_front(self, wall: int, angle: float) -> bool:
-        """Return whether a ray along an angle meets a wall on its left, where free space is."""
-        row = self.index.walls.rows[wall]
-        return bool(row["dx"] * math.sin(angle) < row["dy"] * math.cos(angle))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +48,7 @@ class Sides:
     lost : (k,) True where a ray on the left ended within the map without a hit: its hit is not known
     """
 
-    walls: np.ndarray[tuple[int], np.dtype[np.intp]]
+    walls: Indices
     lengths: Floats
     left: Floats
     right: Floats
@@ -107,20 +77,55 @@ class Sides:
         return self.share((self.against_left & self.against_right) | outside | within) >= MOST
 
     @property
-    def against_left(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def against_left(self) -> Flags:
         """The walls for which most rays from the side that should be free meet backs, (k,) flags."""
-        found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.left[:, 1] > CONTRADICTED * self.left.sum(axis=1)
+        found: Flags = self.left[:, 1] > CONTRADICTED * self.left.sum(axis=1)
         return found
 
     @property
-    def against_right(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def against_right(self) -> Flags:
         """The walls for which most rays from the side that should not be free meet fronts, (k,) flags."""
-        found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.right[:, 0] > CONTRADICTED * self.right.sum(axis=1)
+        found: Flags = self.right[:, 0] > CONTRADICTED * self.right.sum(axis=1)
         return found
 
-    def share(self, which: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+    def share(self, which: Flags) -> float:
         """Return how much of the length some of the walls have, 0 to 1."""
         return float(self.lengths[which].sum() / self.lengths.sum()) if len(self.lengths) else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Hits:
+    """The first segments that rays meet: distances (r,), inf where there is none, indices, and if on their left."""
+
+    reach: Floats
+    segments: Indices
+    fronts: Flags
+
+    @classmethod
+    def of(cls, ends: Floats, low: Floats, high: Floats, origins: Floats, rays: Floats) -> _Hits:
+        """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`.
+
+        Where too many segments are near, rays meet none.
+        """
+        found = cls(np.full(len(rays), np.inf), np.zeros(len(rays), dtype=np.intp), np.zeros(len(rays), dtype=bool))
+        for limit in (*NEAR_FOLLOWED, FOLLOWED):
+            left = np.flatnonzero(np.isinf(found.reach))
+            near = (high >= origins.min(axis=0) - limit) & (low <= origins.max(axis=0) + limit)
+            around = np.flatnonzero(near.all(axis=1))
+            if not 0 < len(left) * len(around) <= RAYS_TIMES_SEGMENTS:
+                continue
+            bx, by = (ends[around, k] - origins[left, k, None] for k in (0, 1))
+            dx, dy = (ends[around, k + 2] - ends[around, k] for k in (0, 1))
+            rx, ry = rays[left, 0, None], rays[left, 1, None]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slant = rx * dy - ry * dx
+                reach, along = (bx * dy - by * dx) / slant, (bx * ry - by * rx) / slant
+                reach = np.where((reach > 0.0) & (reach <= limit) & (along >= 0.0) & (along <= 1.0), reach, np.inf)
+            first = reach.argmin(axis=1)
+            row = np.arange(len(left))
+            found.reach[left], found.segments[left] = reach[row, first], around[first]
+            found.fronts[left] = slant[row, first] > 0.0
+        return found
 
 
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
@@ -129,44 +134,30 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong. No rays start from them, and a hit on
     one is no evidence.
     """
-    lengths = index.walls.longest
-    longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]
+    lengths, segments = index.walls.longest, index.segments.shifted(-index.origin)
+    longest = np.argsort(-lengths, kind="stable")[: min(MOST_LOOKED_FROM, WALLS_TIMES_SEGMENTS // len(segments))]
     chosen = longest[(lengths[longest] >= SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
-    left, right, room = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2)), np.full((len(chosen), 2), np.inf)
-    lost = np.zeros(len(chosen), bool)
-    looker, done = Looker(index), 0
-    for k, wall in enumerate(chosen):
+    ends, left_and_right = segments.endpoints, np.array([1.0, -1.0])[:, None, None, None]
+    low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+    lowest, highest = low.min(axis=0), high.max(axis=0)
+    along_normal, along_wall, places = np.cos(TURNS)[:, None], np.sin(TURNS)[:, None], np.array(PLACES_ON_A_WALL)
+    counts, room, lost = np.zeros((len(chosen), 2, 2)), np.full((len(chosen), 2), np.inf), np.zeros(len(chosen), bool)
+    done = 0
+    for k, piece in enumerate(longest_pieces(index)[chosen].tolist()):
         if deadline.passed:
             break
-        lost[k] = _look(looker, int(wall), both_ways, (left[k], right[k]), room[k])
+        normal, direction = segments.normals[piece], segments.directions[piece]
+        starts = ends[piece, :2] + places[:, None] * segments.lengths[piece] * direction
+        origins = np.zeros((2, len(places), len(TURNS), 2)) + starts[:, None] + OFF_THE_WALL * left_and_right * normal
+        rays = np.zeros_like(origins) + left_and_right * (along_normal * normal + along_wall * direction)
+        hits = _Hits.of(ends, low, high, origins.reshape(-1, 2), rays.reshape(-1, 2))
+        told = (hits.reach > TOO_NEAR) & np.isfinite(hits.reach) & ~both_ways[index.wall_of_piece[hits.segments]]
+        counts[k] = np.stack([told & hits.fronts, told & ~hits.fronts], axis=1).reshape(2, -1, 2).sum(axis=1)
+        room[k] = np.where(told, hits.reach, np.inf).reshape(2, -1).min(axis=1)
+        stops = (origins + FOLLOWED * rays)[0].reshape(-1, 2)[np.isinf(hits.reach[: len(places) * len(TURNS)])]
+        lost[k] = ((stops >= lowest) & (stops <= highest)).all(axis=1).any()
         done = k + 1
-    return Sides(chosen[:done], lengths[chosen[:done]], left[:done], right[:done], room[:done], lost[:done])
-
-
-def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Floats], room: Floats) -> bool:
-    """Count fronts and backs that rays from a wall meet on its left and on its right, and note how near they are.
-
-    Returns whether a ray on the left met nothing as far as it was followed, and was still within the map.
-    """
-    lost = False
-    row = looker.index.walls.rows[wall]
-    normal = float(row["angle"]) + 0.5 * math.pi
-    nx, ny = -float(row["dy"]), float(row["dx"])
-    for share in PLACES_ON_A_WALL:
-        along = float(row["begin"]) + share * float(row["end"] - row["begin"])
-        x = float(row["dx"]) * along - float(row["dy"]) * float(row["offset"])
-        y = float(row["dy"]) * along + float(row["dx"]) * float(row["offset"])
-        for side, sign in enumerate((1.0, -1.0)):
-            px, py = x + sign * OFF_THE_WALL * nx, y + sign * OFF_THE_WALL * ny
-            for turn in TURNS:
-                angle = normal + turn + (0.0 if sign > 0.0 else math.pi)
-                reach, met = looker.first(px, py, angle, FOLLOWED)
-                if met >= 0 and reach > TOO_NEAR and not both_ways[met]:
-                    counts[side][0 if looker.is_front(met, angle) else 1] += 1.0
-                    room[side] = min(room[side], reach)
-                elif met < 0 and sign > 0.0:
-                    lost = lost or looker.is_within(px + reach * math.cos(angle), py + reach * math.sin(angle))
-    return lost
+    return Sides(chosen[:done], lengths[chosen[:done]], counts[:done, 0], counts[:done, 1], room[:done], lost[:done])
 
 
 def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:

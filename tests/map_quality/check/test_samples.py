@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 import pytest
 
-from association import AssociationOptions, CancelledError, Deadline, associate
-from map_quality import Sample, SampleReport, judge_samples, try_sample
-from registration import RigidTransform
+from association import AssociationOptions, CancelledError, Deadline, MapIndex, Scan, associate, scaled
+from map_quality import Sample, SampleReport, conclude, try_sample
+from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
 
 from ...association.scenes import maze
@@ -22,7 +23,7 @@ MOVE = RigidTransform(-1.0, 2.0, 0.3)
 
 
 def told(walls: Floats, *, oriented: bool = True, moved: RigidTransform | None = None) -> SampleReport:
-    """Judge the samples in a map; `moved` is applied to their stated poses."""
+    """Conclude from the samples in a map; `moved` is applied to their stated poses."""
     index = index_of(walls)
     samples = [
         try_sample(
@@ -34,7 +35,11 @@ def told(walls: Floats, *, oriented: bool = True, moved: RigidTransform | None =
         )
         for truth, scan in sampled()
     ]
-    return judge_samples(samples, sigma=None, oriented=oriented)
+    return concluded(index, samples, oriented=oriented)
+
+
+def concluded(index: MapIndex, samples: Sequence[Sample], *, oriented: bool = True) -> SampleReport:
+    return conclude(index, [scan for _, scan in sampled()][: len(samples)], samples, Deadline(), oriented=oriented)
 
 
 @cache
@@ -58,7 +63,8 @@ def test_nothing_is_told_of_a_map_that_is_right() -> None:
 def test_lines_along_the_middle_of_walls() -> None:
     """Nearly none was usable without a recipe; the advice is one, and half of a wall's thickness is in it."""
     report = in_centre_lines()
-    assert codes(report) == ["undirected"]
+    assert codes(report) == ["centre_lines", "undirected"]
+    assert report.wall_thickness == pytest.approx(THICK, abs=0.02)
     assert report.advice.oriented is False
     assert report.advice.sigma == pytest.approx(0.5 * THICK, rel=0.35)
     assert report.usable_as_advised > report.usable + 1
@@ -79,7 +85,7 @@ def test_the_advice_is_worth_taking() -> None:
 
 
 def test_a_map_that_says_so_is_not_told_again() -> None:
-    assert codes(told(centre_lines(), oriented=False)) == []
+    assert codes(told(centre_lines(), oriented=False)) == ["centre_lines"]
 
 
 def test_a_map_with_y_pointing_down() -> None:
@@ -115,6 +121,29 @@ def test_a_map_of_another_unit(factor: float, said: str) -> None:
     assert said in report.findings[0].message
 
 
+def test_scans_of_another_unit() -> None:
+    """Scans in millimetres; the map is in metres."""
+    index, scans = index_of(faces()), [scaled(scan, 1000.0) for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
+    report = conclude(index, scans, samples, Deadline(), oriented=True)
+    assert codes(report) == ["scale"]
+    assert "divide the map by 0.001, or multiply the scans by this factor" in report.findings[0].message
+
+
+@pytest.mark.parametrize(
+    ("walls", "code"), [(reversed_ends(faces()), "reversed"), (reversed_ends(faces() * MIRROR), "mirrored")]
+)
+def test_a_single_sample_shows_a_mistake(walls: Floats, code: str) -> None:
+    index, (_, scan) = index_of(walls), sampled()[0]
+    assert code in codes(concluded(index, [try_sample(index, scan, Deadline(), oriented=True)]))
+
+
+def test_scans_that_see_nothing_show_nothing() -> None:
+    index, blind = index_of(faces()), Scan(MeasuredSegments.from_segments(Segments.from_array([])))
+    samples = [try_sample(index, blind, Deadline(), oriented=True)]
+    assert codes(conclude(index, [blind], samples, Deadline(), oriented=True)) == []
+
+
 @pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
 def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
     """A room between them is too large or too small by as much, whatever its size."""
@@ -128,9 +157,10 @@ def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None
     asked = [associate(index, scan).usable for _, scan in sampled()]
     samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]
     assert [one.result.usable for one in samples] == asked
-    assert [one.trials[True, None].usable for one in samples] == asked
     assert sum(asked) > len(asked) / 2
-    assert codes(judge_samples(samples, sigma=None, oriented=True)) == ([] if factor == 1.0 else ["scale"])
+    report = concluded(index, samples)
+    assert codes(report) == ([] if factor == 1.0 else ["scale"])
+    assert report.usable == sum(asked)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -149,18 +179,20 @@ def test_poses_in_another_frame() -> None:
     assert [float(number) for number in said.split(", ")] == pytest.approx([-1.0, 2.0], abs=0.011)
 
 
-def test_nothing_to_judge_by() -> None:
-    empty = judge_samples([], sigma=None, oriented=True)
-    assert (empty.findings, empty.usable, empty.advice.oriented) == ((), 0, None)
+def test_nothing_to_conclude_from() -> None:
+    index = index_of(faces())
+    for samples in ([], [None]):
+        empty = conclude(index, [sampled()[0][1]] * len(samples), samples, Deadline(), oriented=True)
+        assert (empty.findings, empty.usable, empty.advice.oriented) == ((), 0, None)
 
 
 def test_a_deadline_leaves_out_what_it_has_no_time_for() -> None:
     index, (_, scan) = index_of(faces()), sampled()[0]
-    late = try_sample(index, scan, Deadline(time.monotonic()), oriented=True)
+    passed = Deadline(time.monotonic())
+    late = try_sample(index, scan, passed, oriented=True)
     assert isinstance(late, Sample)
-    assert list(late.trials) == [(True, None)]
-    assert late.mirrored is None
-    assert judge_samples([late], sigma=None, oriented=True).findings == ()
+    assert len(late.trials) == 1
+    assert conclude(index, [scan], [late], passed, oriented=True).findings == ()
     gone = Deadline()
     gone.cancel()
     with pytest.raises(CancelledError):

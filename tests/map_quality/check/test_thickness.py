@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from association import Deadline, Scan
-from map_quality import find_thickness, fit_better_mirrored, thickness_finding
+from map_quality import conclude, find_thickness, try_sample
+from map_quality.check.thickness import thickness_finding
 from registration import MeasuredSegments, Segments
 from registration.layout import Floats
 
@@ -36,11 +37,15 @@ def test_nothing_where_walls_are_right() -> None:
     assert found(two_faces(THICK)) is None
 
 
-def test_which_of_the_two_it_is() -> None:
-    """What is mirrored is so however thick its walls are made; what is too thick fits badly, either way."""
-    scans = [scan for _, scan in sampled()]
-    assert fit_better_mirrored(index_of(reversed_ends(faces() * MIRROR)), scans, Deadline())
-    assert not fit_better_mirrored(index_of(two_faces(0.4)), scans, Deadline())
+@pytest.mark.parametrize(
+    ("walls", "code"), [(reversed_ends(faces() * MIRROR), "mirrored"), (two_faces(0.4), "thickness")]
+)
+def test_which_of_the_two_it_is(walls: Floats, code: str) -> None:
+    """What is mirrored fits badly whatever its walls are; what is too thick fits badly mirrored, too."""
+    index, scans = index_of(walls), [scan for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
+    report = conclude(index, scans, samples, Deadline(), oriented=True)
+    assert [one.code for one in report.findings] == [code]
 
 
 def test_nothing_by_scans_that_see_nothing() -> None:

@@ -13,8 +13,9 @@ import pytest
 import map_quality
 from association import CancelledError, Deadline, MapIndex
 from map_quality import UpdateError, VisitScan
+from map_quality.scale import Matched, errors_of
 from map_quality.update.hanging import hanging_lines, on_lines
-from map_quality.update.scans import Localized, held_back, scale_of, search
+from map_quality.update.scans import Localized, held_back, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner
 
@@ -140,15 +141,16 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.98, 0.995, 1.0, 1.015])
-def test_the_scale_of_scans_is_estimated_beside_their_poses_and_an_error_of_all_ranges(factor: float) -> None:
+def test_the_scale_of_scans_is_estimated_with_their_poses_and_an_error_of_all_ranges(factor: float) -> None:
     known, found = index(), []
-    for number, one in enumerate(days(HALL, change=lambda ranges: ranges * factor + 0.01)):
+    for one in days(HALL, change=lambda ranges: ranges * factor + 0.01):
         result = search(known, one, Deadline())
         # Most scans that are off scale are not usable, because they fit the map too badly; their poses are right.
         is_placed = {reason.code for reason in result.reasons} <= {"map_mismatch", "insufficient_evidence"}
-        if is_placed and not any(warning.code == "map_scale" for warning in result.warnings):
-            found.append(Localized(number, 0, one.scan, result, HALL, False))
+        matched = Matched.of(HALL, one.scan, result)
+        if is_placed and matched and not any(warning.code == "map_scale" for warning in result.warnings):
+            found.append(matched)
     assert len(found) > 3
-    estimated, sigma = scale_of(found, 0.005)
-    assert sigma < 0.003
-    assert estimated == pytest.approx(factor - 1.0, abs=3.0 * sigma + 5e-4)
+    errors = errors_of(found, 0.005)
+    assert errors.scale_deviation < 0.003
+    assert errors.scale == pytest.approx(factor - 1.0, abs=3.0 * errors.scale_deviation + 5e-4)
