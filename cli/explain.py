@@ -5,7 +5,7 @@ from __future__ import annotations
 from .contract import Json
 from .errors import WrongUseError
 from .locate import NearOptions, SearchChoice, request_body
-from .options import AsJson, MapArgument, ScanArgument, grouped
+from .options import AsJson, MapArgument, ScanArgument, UsableOptions, grouped
 from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
@@ -13,16 +13,20 @@ MOST_ALTERNATIVES = 10  # that people read; --json has all
 
 @grouped
 def explain(
-    on: MapArgument, scan: ScanArgument, window: NearOptions, search: SearchChoice, as_json: AsJson = False
+    on: MapArgument,
+    scan: ScanArgument,
+    window: NearOptions,
+    search: SearchChoice,
+    usable: UsableOptions,
+    as_json: AsJson = False,
 ) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
-    The answer is that of linefix locate. It is usable if the cautious probability reaches its threshold and no veto
-    applies.
+    The answer is that of linefix locate. It is usable if its probability reaches --usable-from and no veto applies.
     """
     from . import here
 
-    body = request_body([on], scan, window, search)
+    body = request_body([on], scan, window, search, usable)
     if "maps" in body:
         raise WrongUseError(f"{on}: found a folder with {len(body['maps'])} maps, expected one map")
     found = here.explain(body)
@@ -57,10 +61,7 @@ def _print_model(model: Json) -> None:
     rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in model["contributions"]]
     rows.append(("sum", None, model["log_odds"], sum(term["usual"] for term in model["contributions"])))
     print_table(("feature", "value", "contribution", "usual"), rows)
-    print(
-        f"probability by the model: {model['probability']:.4f}; if the robot is known to be on this map, with "
-        f"{model['on_map']:.3f} nats more: {model['probability_on_map']:.4f}"
-    )
+    print(f"probability by the model and --on-map: {model['probability']:.4f}")
 
 
 def _print_taken(taken: Json) -> None:
@@ -91,7 +92,7 @@ def _print_null(null: Json | None) -> None:
         print("\nNull score: not searched, because the answer is not usable without it")
         return
     if not null["score"]:
-        print(f"\nNull score: none above {null['searched_above']:.2f} of the answer's score")
+        print("\nNull score: the mirrored scan fits nowhere")
         return
     print(
         f"\nNull score: {null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score; "
@@ -103,9 +104,11 @@ def _print_probabilities(one: Json) -> None:
     """Print the probabilities that decide next to their thresholds, and what follows."""
     if one["thresholds"] is not None:
         print("\nProbabilities")
+        least = {"of the pose": one["thresholds"]["usable_from"], "explained": one["thresholds"]["explained"]}
+        values = {"of the pose": one["probability_of_pose"], "explained": one["explained"]}
         rows = [
-            (name, one[name], threshold, "reached" if one[name] >= threshold else "not reached")
-            for name, threshold in one["thresholds"].items()
+            (name, value, least[name], "reached" if value >= least[name] else "not reached")
+            for name, value in values.items()
         ]
         print_table(("probability", "value", "threshold", "result"), rows)
     print(f"\nstatus {one['status']}, {'usable' if one['usable'] else 'not usable'}")
