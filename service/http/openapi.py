@@ -17,7 +17,7 @@ from ..thread_pool import Threads
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
-lists why.
+has the causes.
 
 * Metres, radians, counter-clockwise. `pose` is the scan frame's pose in the map frame:
   `p_map = R(theta) p_scan + [x, y]`.
