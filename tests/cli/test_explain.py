@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-
 from .running import Linefix, refused
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "explanation" / "verdict.md"
