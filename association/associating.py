@@ -6,15 +6,12 @@ from registration.values import value
 
 from .context import SearchContext
 from .deadline import Deadline
-from .explanations import Explanations
+from .explanations import Explanations, explain_scan
 from .index.map_index import MapIndex
 from .options import AssociationOptions, Prior
-from .rank_and_estimate import rank_and_estimate
 from .report import report
 from .result import AssociationResult
 from .scan.scan import Scan
-from .search.candidates import find_candidates
-from .to_scale import ScaledSearch, put_to_scale
 from .verdict.verdict import Verdict, judge
 
 DEFAULT_OPTIONS = AssociationOptions()
@@ -22,31 +19,12 @@ DEFAULT_OPTIONS = AssociationOptions()
 
 @value(frozen=True, slots=True)
 class Stages:
-    """The stages of an answer.
+    """The stages of an answer: the scan that was searched, its explanations, the verdict, and the answer."""
 
-    Attributes
-    ----------
-    found : ScaledSearch
-        The search, and its explanations.
-    verdict : Verdict
-        On them.
-    result : AssociationResult
-        The answer.
-    """
-
-    found: ScaledSearch
+    context: SearchContext
+    explanations: Explanations
     verdict: Verdict
     result: AssociationResult
-
-    @property
-    def context(self) -> SearchContext:
-        """The inputs of the search, with the scan to scale."""
-        return self.found.context
-
-    @property
-    def explanations(self) -> Explanations:
-        """The explanations that the answer was put together from."""
-        return self.found.explanations
 
 
 def associate(
@@ -94,6 +72,6 @@ def run_stages(context: SearchContext) -> Stages:
     CancelledError
         When the deadline was cancelled.
     """
-    found = put_to_scale(context, rank_and_estimate(context, find_candidates(context)))
-    verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
-    return Stages(found, verdict, report(found, verdict))
+    context, explanations = explain_scan(context)
+    verdict = judge(context, explanations)
+    return Stages(context, explanations, verdict, report(context, explanations, verdict))

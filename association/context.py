@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from registration import RigidTransform
-from registration.layout import POSE, Records
+from registration.layout import POSE, Floats, Records
 from registration.observability import most_parallel_up_to
 from registration.values import value
 
@@ -21,10 +21,7 @@ from .layout import (
     HARD_PRIOR,
     MODEL,
     NO_PRIOR,
-    POINT,
     PRIOR,
-    RULES,
-    SIGHTING,
     SOFT_PRIOR,
     TERMS,
     Integers,
@@ -33,19 +30,13 @@ from .layout import (
 )
 from .options import AssociationOptions, HardPrior, MapsPrior, Prior, SoftPrior
 from .scan.alignment import aligned
+from .scan.beams import BeamSet, beams_of_ranges, rays_to_lines, rays_to_nothing, together
 from .scan.scan import Scan
 from .scan.scan_lines import ScanLines, gates
-from .tables import KnownWalls, Question, Sights, Workspace
-from .tuning import COMPARED_BEAMS, EMPTY_CELL, FAR, FARTHER, LATE_CROWD, MAX_RAYS, MOST_LOOKED_AT, RAY_SPACING, RAYS
+from .tables import Question, ScoreWork
+from .tuning import EMPTY_CELL, LATE_CROWD, MOST_LOOKED_AT, MOST_RAYS
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
-NOTHING_KEPT = record(RULES)
-ONE_VIEW = np.ones(1)
-
-
-@lru_cache
-def _place(x: float, y: float) -> Records:
-    return record(POINT, x=x, y=y)
 
 
 @lru_cache
@@ -102,6 +93,15 @@ class SearchContext:
         lines = ScanLines.of(scan, place.sigma, options)
         return cls(place, scan, prior, options, deadline, lines, gates(options))
 
+    def with_scan(self, scan: Scan, lines: ScanLines | None = None) -> SearchContext:
+        """Return the same search for another scan."""
+        lines = lines or ScanLines.of(scan, self.index.sigma, self.options)
+        return SearchContext(self.index, scan, self.prior, self.options, self.deadline, lines, self.gates)
+
+    def anywhere(self) -> SearchContext:
+        """Return the same search without its prior."""
+        return SearchContext(self.index, self.scan, None, self.options, self.deadline, self.lines, self.gates)
+
     @property
     def with_beams(self) -> bool:
         """Return whether single beams are evidence."""
@@ -120,66 +120,47 @@ class SearchContext:
 
     @cached_property
     def ends(self) -> Records:
-        """The ends of the scan's segments, (n,) of `ENDS`.
-
-        Read-only, as those that were sent are: a kernel is not compiled again for those of views that were moved.
-        """
+        """The ends of the scan's segments, (n,) of `ENDS`, read-only."""
         ends = as_records(ENDS, self.scan.measured.segments.endpoints).view()
         ends.flags.writeable = False
         return ends
 
     @cached_property
-    def sights(self) -> Sights:
-        """The lines seen from each place, as far as lines of sight are evidence."""
-        seen, views = self.lines.sightings, self.scan.views
-        if views is None:
-            seen = seen if self.scan.viewpoint is not None else seen[:0]
-            place = _place(*(self.scan.viewpoint or (0.0, 0.0)))
-            return Sights(place, np.array([0, len(seen)]), seen, np.arange(len(seen)), ONE_VIEW)
-        sighted = ~np.isnan(views.viewpoints[:, 0])
-        seen = seen[sighted[seen["sensor"]]]
-        places = as_records(POINT, np.where(sighted[:, None], views.viewpoints, 0.0))
-        starts = np.searchsorted(seen["sensor"], np.arange(len(views) + 1))
-        return Sights(places, starts, seen, np.lexsort((seen["sensor"], seen["row"])), views.weights)
+    def viewpoints(self) -> Floats:
+        """Where the sensors stood, (v, 2) metres in the scan frame; nan where a view is not from one place."""
+        if self.scan.views is not None:
+            return self.scan.views.viewpoints
+        return np.array([self.scan.viewpoint or (np.nan, np.nan)])
+
+    @cached_property
+    def _view_weights(self) -> Floats:
+        return np.ones(1) if self.scan.views is None else self.scan.views.weights
+
+    @cached_property
+    def rays_to_lines(self) -> BeamSet:
+        """The rays to points of the scan's lines."""
+        return rays_to_lines(self.lines.sightings, self.viewpoints, self._view_weights)
+
+    @cached_property
+    def beams(self) -> BeamSet:
+        """The beams that are evidence: those of the ranges, or the rays to lines and to where none is."""
+        ranges, views = self.scan.beams, self.scan.views
+        if ranges is not None:
+            place = self.scan.viewpoint or (0.0, 0.0)
+            return beams_of_ranges(ranges, place, None if views is None else views.of_beam, self._view_weights)
+        to_lines = self.rays_to_lines
+        empty = rays_to_nothing(self.lines.sightings, self.viewpoints, self._view_weights, to_lines.reach)
+        return together(to_lines, empty)
 
     @property
-    def lines_of_sight(self) -> Sights:
-        """The same where it scores poses: segments have no lines of sight where single beams are better evidence."""
-        return self.nothing_seen if self.with_beams else self.sights
-
-    @cached_property
-    def nothing_seen(self) -> Sights:
-        """The same, without lines of sight."""
-        nothing = np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING), np.zeros(0, np.intp)
-        return Sights(self.sights.places, *nothing, self.sights.weights)
-
-    @cached_property
-    def looks(self) -> float:
-        """Bound the number of walls, in cells that they pass, that are looked at for the rays from one pose.
-
-        Of the lines of sight of the scan, of those in all directions, and of the beams that are compared.
-        """
-        grid, views, scan = self.index.grid.shape[0], self.sights.places, self.scan
-        across = self.index.across
-        rays = RAYS * len(views) + MAX_RAYS * len(self.sights.seen) + (COMPARED_BEAMS if self.with_beams else 0)
-        in_a_cell = self.index.most_near + EMPTY_CELL
-        if rays * across * in_a_cell <= MOST_LOOKED_AT:
-            return rays * across * in_a_cell
-        seen, per_cell = self.sights.seen, 2.0 / float(grid["cell"])
-        from_view = views[seen["sensor"]]
-        away = np.hypot(seen["x"] - from_view["x"], seen["y"] - from_view["y"]) + 0.5 * seen["length"]
-        reach = max(FAR, FARTHER * float(away.max(initial=0.0)))
-        to_each = np.minimum(MAX_RAYS, np.ceil(seen["length"] / RAY_SPACING))
-        cells = float(to_each @ np.minimum(across, 1.0 + per_cell * away))
-        cells += RAYS * len(views) * min(across, 1.0 + per_cell * reach)
-        if scan.beams is not None:
-            cells += COMPARED_BEAMS * min(across, 1.0 + per_cell * scan.beams.range_max)
-        return cells * in_a_cell
+    def sensor(self) -> tuple[float, float]:
+        """The sensor's place, metres in the scan frame: the centre of what does not depend on the frame."""
+        return self.scan.viewpoint or self.middle
 
     @property
     def can_look(self) -> bool:
         """Return whether rays can be followed: the map has few enough walls along them."""
-        return self.looks <= MOST_LOOKED_AT
+        return MOST_RAYS * self.index.across * (self.index.most_near + EMPTY_CELL) <= MOST_LOOKED_AT
 
     @property
     def too_late_to_look(self) -> bool:
@@ -187,49 +168,20 @@ class SearchContext:
         return not self.can_look or (self.index.crowd > LATE_CROWD and self.deadline.passed)
 
     @cached_property
-    def workspace(self) -> Workspace:
-        """The arrays that the kernels write to while they look at poses."""
-        count = len(self.lines.rows)
-        return Workspace.of(count, len(self.index.walls.rows), most_parallel_up_to(count))
+    def work(self) -> ScoreWork:
+        """The arrays that kernels write to while they score poses."""
+        return ScoreWork.of(len(self.lines.rows), len(self.index.walls.rows))
 
     @cached_property
-    def known_walls(self) -> KnownWalls:
-        """The walls, and the uncertainty of their positions."""
-        known = self.index.sigma
-        return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2)
-
-    def question(self, rules: Records) -> Question:
-        """Return the input of the kernels' search; `rules` (1,) define which poses are stored."""
-        return Question(self.lines.rows, self._terms, rules)
+    def parallel(self) -> Floats:
+        """The chi-square of their angles up to which so many lines are parallel, (k,)."""
+        return most_parallel_up_to(len(self.lines.rows))
 
     @cached_property
-    def question_of_a_pose(self) -> Question:
-        """The same for kernels that store no poses."""
-        return Question(self.lines.rows, self._terms, NOTHING_KEPT)
-
-    @cached_property
-    def _terms(self) -> Records:
+    def question(self) -> Question:
+        """The input of the kernels."""
         terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes())
-        return np.frombuffer(bytearray(terms), TERMS)
-
-    def anywhere(self) -> SearchContext:
-        """Return the same search without its prior."""
-        return self._searching(self.scan, self.lines)
-
-    def instead(self, scan: Scan, lines: ScanLines) -> SearchContext:
-        """Return the search, without a prior, for a scan that differs from this one, on the same map.
-
-        If it has as many lines, both write to the same workspace: only one of them may search at a time.
-        """
-        other = self._searching(scan, lines)
-        if lines.model is self.lines.model and self.prior is None:
-            other.__dict__["_terms"] = self._terms
-        if len(lines.rows) == len(self.lines.rows):
-            other.__dict__["workspace"] = self.workspace
-        return other
-
-    def _searching(self, scan: Scan, lines: ScanLines) -> SearchContext:
-        return SearchContext(self.index, scan, None, self.options, self.deadline, lines, self.gates)
+        return Question(self.lines.rows, np.frombuffer(bytearray(terms), TERMS))
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -238,7 +190,10 @@ class SearchContext:
         return (float(rows["x"].mean()), float(rows["y"].mean())) if len(rows) else (0.0, 0.0)
 
     def maps_at(self, poses: Records) -> Integers:
-        """Return the map of each pose (k,), (k,): that nearest to the middle of the scan; 0 where there is one."""
+        """Return the map of each pose (k,), (k,): that nearest to the middle of the scan; 0 where there is one.
+
+        Not to the origin of the scan frame, which may lie anywhere.
+        """
         if not isinstance(self.index, JointIndex) or not len(poses):
             return np.zeros(len(poses), np.intp)
         x, y = self.middle

@@ -1,46 +1,50 @@
-"""The explanations of a scan: ranked consensus sets, the best of them estimated. The verdict judges them."""
+"""Search a scan, rank the poses, estimate the best one; once more where the scan shows a scale or a rotation."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from registration import RegistrationResult, wrap_angle
+from registration import RegistrationResult, RigidTransform
+from registration.layout import Floats
 from registration.values import value
 
-from .consensus.acceptance import Accepted
+from .consensus.acceptance import Accepted, accept, register_accepted
 from .consensus.consensus_set import ConsensusSet
-from .consensus.estimation import EstimatedPose
-from .consensus.sight import BeamFractions
+from .consensus.estimator import Estimate, estimate
+from .consensus.ranking import rank
+from .consensus.tuning import SHOWN_DEVIATIONS
+from .context import SearchContext
 from .result import SearchReport
-from .tuning import DISTINCT_ANGLE, SAME_PLACE
+from .scan.scan import corrected_scan
+from .scan.views import corrected
+from .search.search import Effort, search
+from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR
 
 
 @value(frozen=True, slots=True)
 class Answer:
-    """The best explanation, with all that the verdict needs of it.
+    """The best explanation, estimated.
 
     Attributes
     ----------
     best : ConsensusSet
     accepted : Accepted
         Its consensus set in the map's own segments.
-    estimated : EstimatedPose
-        Its pose, and the leverage of each wall on it.
+    estimate : Estimate
     registered : RegistrationResult
-        That pose on the map's own segments.
-    agreement : float
-        Fraction of directions in which the scan shows what the map does, 0 to 1.
-    beams : BeamFractions
-        Fractions of the beams that do not read what the map shows.
+        The pairs at the pose.
+    pose : RigidTransform
+        Map frame from scan frame.
+    covariance : (3, 3) float64
     """
 
     best: ConsensusSet
     accepted: Accepted
-    estimated: EstimatedPose
+    estimate: Estimate
     registered: RegistrationResult
-    agreement: float
-    beams: BeamFractions
+    pose: RigidTransform
+    covariance: Floats
 
 
 @value(frozen=True, slots=True)
@@ -54,16 +58,15 @@ class Explanations:
     answer : Answer or None
         The first within the window; None where there is none.
     search : SearchReport
+    scale, turn : float
+        Factor on the scan that was searched, and the angle by which its sensor turned from the first beam to the last.
     """
 
     ranked: tuple[ConsensusSet, ...]
     answer: Answer | None
     search: SearchReport
-
-    @property
-    def alternatives(self) -> Iterator[ConsensusSet]:
-        """The other explanations within the window, best first."""
-        return (one for one in self.others if one.inside)
+    scale: float = 1.0
+    turn: float = 0.0
 
     @property
     def others(self) -> Iterator[ConsensusSet]:
@@ -72,7 +75,74 @@ class Explanations:
         return (one for one in self.ranked if one is not best)
 
 
-def _same_place(one: ConsensusSet, other: ConsensusSet) -> bool:
-    """Return whether two poses are of one place, at whatever scales."""
-    a, b = one.pose, other.pose
-    return math.hypot(a.x - b.x, a.y - b.y) <= SAME_PLACE and abs(wrap_angle(a.theta - b.theta)) <= DISTINCT_ANGLE
+def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
+    """Search a scan and estimate the best pose; return the explanations, and the context of the scan that was searched.
+
+    A scan that shows a scale other than the map's, or a rotation during the sweep, is corrected for it and searched
+    once more. The result counts if it explains more.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    first = _explain(context, Effort.of(context), 1.0, 0.0)
+    answer = first.answer
+    if answer is None or not answer.estimate.with_columns or context.deadline.passed:
+        return context, first
+    scale, turn = _scale_of(answer.estimate), _turn_of(answer.estimate)
+    if scale == 1.0 and turn == 0.0:
+        return context, first
+    again = context.with_scan(corrected_scan(context.scan, scale, turn, context.sensor))
+    second = _explain(again, Effort.of(again), scale, turn)
+    if second.answer is None or second.answer.best.posterior <= answer.best.posterior:
+        return context, first
+    return again, second
+
+
+def _scale_of(found: Estimate) -> float:
+    """Return the factor on the scan by which map and scan differ, 1 where it is small, or not shown."""
+    strain, deviations = found.strain
+    common = 0.5 * float(strain[0] + strain[1])
+    shown = abs(common) > SHOWN_DEVIATIONS * 0.5 * math.hypot(deviations[0], deviations[1])
+    return 1.0 + common if shown and LEAST_FACTOR <= abs(common) <= MOST_FACTOR else 1.0
+
+
+def _turn_of(found: Estimate) -> float:
+    """Return the angle by which the sensor turned during the scan, radians, 0 where it is small, or not shown."""
+    turn, deviation = found.turn
+    return turn if abs(turn) > max(LEAST_TURN, SHOWN_DEVIATIONS * deviation) else 0.0
+
+
+def _explain(context: SearchContext, effort: Effort, scale: float, turn: float) -> Explanations:
+    candidates = search(context, effort)
+    ranked = tuple(rank(context, candidates.poses))
+    best = next((one for one in ranked if one.inside), None)
+    complete = context.can_look and not context.deadline.passed
+    report = candidates.report if complete else candidates.report.cut_short()
+    return Explanations(ranked, None if best is None else _answer(context, best), report, scale, turn)
+
+
+def _answer(context: SearchContext, best: ConsensusSet) -> Answer | None:
+    """Estimate the pose of the best explanation; None without pairs.
+
+    Where nothing but the pose was solved for, it is where the pairs register.
+    """
+    found = estimate(context, best)
+    if found is None:
+        return None
+    accepted = accept(context, best, found.pose)
+    if not len(accepted.pairs):
+        return None
+    if len(found.found):
+        context = context.with_scan(corrected(context.scan, found.found, found.spread), context.lines)
+    alone = not found.with_columns and not len(found.found) and not found.free and not found.degenerate
+    pose, covariance = context.in_map(found.pose), found.covariance
+    registered = register_accepted(context, best, accepted, found.wall_sigma, None if alone else pose)
+    if registered.pose is not None and alone and registered.covariance is not None:
+        pose, covariance = registered.pose, registered.covariance
+    elif alone and context.options.estimator != "one_step":
+        registered = register_accepted(context, best, accepted, found.wall_sigma, pose)
+    elif registered.pose is not None:
+        pose = registered.pose
+    return Answer(best, accepted, found, registered, pose, covariance)

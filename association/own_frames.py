@@ -12,11 +12,8 @@ from registration.layout import POSE
 
 from .associating import Stages
 from .consensus.consensus_set import ConsensusSet
-from .consensus.estimation import estimate_poses
-from .consensus.ranking import with_lines_of_sight
 from .context import SearchContext
 from .index.joint import JointIndex
-from .messages import AS_WELL
 from .options import MapsPrior
 from .report import probabilities_of_others
 from .result import (
@@ -30,6 +27,7 @@ from .result import (
 )
 
 FIRST_NAMES = 5  # of maps, in a message
+AS_LIKELY = 0.02  # of the probability of the answer, tables; a pose with less is no similar place
 
 
 def in_own_frames(found: Stages, ids: Sequence[str]) -> AssociationResult:
@@ -121,49 +119,56 @@ def _map_verdicts(
 ) -> tuple[MapVerdict, ...]:
     """Return the best pose of each map, the best first; maps without one in their order.
 
-    `best` and `pose` are those of the answer.
+    A map whose best pose explains the scan about as well as the answer is ambiguous, unless the answer is usable. The
+    probabilities of all maps sum to at most 1.
     """
-    context, result, answer = found.context, found.result, found.explanations.answer
+    context, result = found.context, found.result
     weights = context.prior.of_maps if isinstance(context.prior, MapsPrior) else np.zeros(len(ids))
-    firsts = _best_on_each(context, found)
-    sets = [one for m, one in firsts.items() if m != best]
-    probabilities = probabilities_of_others(answer, found.verdict, sets)
-    likely = dict(zip((m for m in firsts if m != best), probabilities, strict=True))
-    poses = _poses_of(context, sets)
-    least = -np.inf if answer is None else answer.best.posterior - AS_WELL
+    firsts: dict[int, ConsensusSet] = {}
+    for one in found.explanations.ranked:
+        firsts.setdefault(_map_at(context, context.in_map(one.pose)), one)
+    others = [m for m in firsts if m != best]
+    likely = _probabilities(found, {m: firsts[m] for m in others})
     verdicts: list[MapVerdict] = []
     if best is not None and result.diagnostics is not None:
         score = result.diagnostics.score + float(weights[best])
         verdicts.append(MapVerdict(ids[best], result.status, score, result.probability, pose))
-    for m, at in zip(likely, poses, strict=True):
-        one, there = firsts[m], None if best is None else _back(index, at, m)
-        as_well = best is not None and not result.usable and one.posterior >= least
-        status = Status.AMBIGUOUS if as_well else Status.NO_MATCH
-        score = one.score_by(context.options.estimator) + float(weights[m])
+    similar = similar_maps(found)
+    for m in others:
+        one = firsts[m]
+        status = Status.AMBIGUOUS if m in similar else Status.NO_MATCH
+        score = one.score + float(weights[m])
+        there = None if best is None else _back(index, context.in_map(one.pose), m)
         verdicts.append(MapVerdict(ids[m], status, score, likely[m], there))
     none = 0.0 if result.probability is not None else None
     listed = {verdict.map_id for verdict in verdicts}
     return (*verdicts, *(MapVerdict(name, Status.NO_MATCH, None, none, None) for name in ids if name not in listed))
 
 
-def _best_on_each(context: SearchContext, found: Stages) -> dict[int, ConsensusSet]:
-    """Return the best explanation on each map that has one, the best map first."""
-    explanations = found.explanations
-    others = with_lines_of_sight(context, explanations.ranked, explanations.others)
-    sets = [*([] if explanations.answer is None else [explanations.answer.best]), *others]
-    firsts: dict[int, ConsensusSet] = {}
-    for one in sets:
-        firsts.setdefault(_map_at(context, context.in_map(one.pose)), one)
-    return firsts
+def similar_maps(found: Stages) -> set[int]:
+    """Return the maps with a pose that explains a scan about as well as the answer, which is not usable."""
+    context, comparison = found.context, found.verdict.comparison
+    if comparison is None or found.result.usable or found.result.status is Status.NO_MATCH:
+        return set()
+    near = [
+        one for one, weight in zip(comparison.others, comparison.weights.tolist(), strict=True) if weight >= AS_LIKELY
+    ]
+    return {_map_at(context, context.in_map(one.pose)) for one in near}
 
 
-def _poses_of(context: SearchContext, sets: Sequence[ConsensusSet]) -> list[RigidTransform]:
-    """Return the poses of consensus sets in the joint frame; those that the deadline leaves out as they were found."""
-    if not sets:
-        return []
-    poses = [one.pose for one in sets]
-    estimated = [one.pose for one in estimate_poses(context, sets)]
-    return [context.in_map(pose) for pose in (*estimated, *poses[len(estimated) :])]
+def _probabilities(found: Stages, firsts: dict[int, ConsensusSet]) -> dict[int, float | None]:
+    """Return the probability that the pose is on each of the other maps: the sum over its poses."""
+    comparison = found.verdict.comparison
+    others = () if comparison is None else comparison.others
+    each = probabilities_of_others(found.verdict, others)
+    if found.result.probability is None or comparison is None:
+        return dict.fromkeys(firsts)
+    total = dict.fromkeys(firsts, 0.0)
+    for one, probability in zip(others, each, strict=True):
+        m = _map_at(found.context, found.context.in_map(one.pose))
+        if m in total:
+            total[m] += probability or 0.0
+    return dict(total)
 
 
 def _named(reason: Reason, result: AssociationResult) -> Reason:

@@ -2,83 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
-from itertools import islice
 
 import numpy as np
 
-from registration import Ambiguity
-
-from .consensus.acceptance import correspondences, overlaps_at
-from .consensus.consensus_set import ConsensusSet, matches_of
-from .consensus.estimation import EstimatedPose, estimate_poses, slices_between_looks
-from .consensus.kernels.measures import paper_measures
-from .consensus.ranking import with_lines_of_sight
-from .consensus.sight import missing_segments
+from .consensus.acceptance import accept, correspondences
+from .consensus.beams import cast, passed_walls
+from .consensus.consensus_set import ConsensusSet
+from .consensus.measures import paper_measures, score_at_one_step
+from .consensus.tuning import BLOCKING_RAYS
 from .context import SearchContext
 from .explanations import Answer, Explanations
-from .layout import POSE_AMONG_WALLS
-from .result import Alternative, AssociationDiagnostics, AssociationResult, Correspondence, CriticalWall, Status
-from .to_scale import ScaledSearch
-from .tuning import CRITICAL_DISPLACEMENT
-from .verdict.alternatives import compare_alternatives
+from .result import (
+    Alternative,
+    AssociationDiagnostics,
+    AssociationResult,
+    Corrections,
+    Correspondence,
+    CriticalWall,
+    Status,
+)
+from .tuning import CRITICAL_DISPLACEMENT, SHOWN_TURN
 from .verdict.verdict import Verdict
 from .warnings import warnings_of, warnings_of_map
 
 
-def report(found: ScaledSearch, verdict: Verdict) -> AssociationResult:
-    """Put an answer together of a search and the verdict on it.
-
-    If the deadline passes before it is put together, the answer is not complete, and so not usable.
-    """
-    context, explanations = found.context, found.explanations
+def report(context: SearchContext, explanations: Explanations, verdict: Verdict) -> AssociationResult:
+    """Put an answer together of a search and the verdict on it."""
     answer = None if verdict.status is Status.NO_MATCH else explanations.answer
-    others = explanations.ranked if answer is None else explanations.others
+    others = explanations.ranked if answer is None else tuple(explanations.others)
     alternatives = _alternatives(context, explanations, others, verdict)
     missing = () if answer is None else _missing_map(context, answer)
     if context.deadline.passed:
         verdict = verdict.cut_short()
-    if not verdict.complete:
-        explanations = replace(explanations, search=explanations.search.cut_short())
-    if answer is None:
-        return _no_match(context, explanations, verdict, alternatives)
-    degenerate, parts = verdict.status is Status.DEGENERATE, context.options.parts
-    matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
-    return AssociationResult(
+    search = explanations.search if verdict.complete else explanations.search.cut_short()
+    found = AssociationResult(
         status=verdict.status,
         usable=verdict.usable,
-        probability=verdict.probability,
-        pose=verdict.pose,
-        covariance=None if degenerate or context.options.estimator == "one_step" else answer.estimated.covariance,
-        unobservable=answer.estimated.direction if degenerate else None,
-        correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
-        unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
-        missing_map=tuple(i for i in missing if i not in on_map),
-        diagnostics=_diagnostics(context, answer, verdict),
-        reasons=verdict.reasons,
-        alternatives=alternatives,
-        search=explanations.search,
-        warnings=(*warnings_of(context, explanations.search, verdict), *warnings_of_map(found)),
-    )
-
-
-def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
-    """Return the consensus set, with the overlaps at the pose that is answered."""
-    accepted, overlaps = answer.accepted, answer.accepted.overlaps
-    if verdict.pose is not None:
-        overlaps = overlaps_at(context, answer.best, accepted, verdict.pose)
-    return correspondences(context.index, accepted, overlaps, answer.registered)
-
-
-def _no_match(
-    context: SearchContext, explanations: Explanations, verdict: Verdict, alternatives: tuple[Alternative, ...]
-) -> AssociationResult:
-    return AssociationResult(
-        status=Status.NO_MATCH,
-        usable=False,
-        probability=0.0,
+        probability=verdict.probability if answer is not None else 0.0,
         pose=None,
         covariance=None,
         unobservable=None,
@@ -88,99 +50,154 @@ def _no_match(
         diagnostics=None,
         reasons=verdict.reasons,
         alternatives=alternatives,
-        search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict),
+        search=search,
+        warnings=warnings_of(context, search, verdict),
+    )
+    if answer is None:
+        return found
+    degenerate, parts = verdict.status is Status.DEGENERATE, context.options.parts
+    matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
+    return replace(
+        found,
+        pose=verdict.pose,
+        covariance=None if degenerate or context.options.estimator == "one_step" else answer.covariance,
+        unobservable=answer.estimate.direction if degenerate else None,
+        correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
+        unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
+        missing_map=tuple(i for i in missing if i not in on_map),
+        diagnostics=_diagnostics(context, explanations, answer, verdict),
+        warnings=(*found.warnings, *warnings_of_map(context, explanations, answer)),
     )
 
 
-def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> AssociationDiagnostics:
+def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
+    """Return the consensus set, with the overlaps at the pose that is answered."""
+    accepted = answer.accepted
+    if answer.estimate.free and verdict.pose is not None:
+        # The pose was chosen along a direction that the walls leave open.
+        there = accept(context, answer.best, context.in_index(verdict.pose))
+        overlaps = dict(zip(there.scan_indices, there.overlaps.tolist(), strict=True))
+        own = np.array([overlaps.get(i, 0.0) for i in accepted.scan_indices])
+        accepted = replace(accepted, overlaps=own)
+    return correspondences(context.index, accepted, answer.registered)
+
+
+def _diagnostics(
+    context: SearchContext, explanations: Explanations, answer: Answer, verdict: Verdict
+) -> AssociationDiagnostics:
+    best, nearest = answer.best, next((one for one in explanations.others if one.inside), None)
+    margin = runner_up = None
+    if nearest is not None:
+        margin = max(0.0, best.posterior - nearest.posterior)
+        runner_up = max(0.0, nearest.posterior / best.posterior) if best.posterior > 0.0 else None
     return AssociationDiagnostics(
         registration=answer.registered.diagnostics,
-        inlier_fraction=answer.best.fraction,
-        score=answer.best.score_by(context.options.estimator),
-        runner_up=verdict.runner_up,
-        margin=verdict.margin,
+        inlier_fraction=best.fraction(context.lines.rows),
+        score=_score(context, best),
+        runner_up=runner_up,
+        margin=margin,
         critical_wall=_critical_wall(context, answer),
+        corrections=corrections_of(explanations, answer),
+        turn_rate=turn_rate_of(context, explanations, answer),
     )
+
+
+def corrections_of(explanations: Explanations, answer: Answer) -> Corrections | None:
+    """Return what the pose was estimated together with; None where that is the pose alone."""
+    found = answer.estimate
+    if not found.with_columns and explanations.scale == 1.0:
+        return None
+    xx, yy, xy = found.strain[0].tolist()
+    return Corrections(explanations.scale, found.offset[0], (xx, yy, xy))
+
+
+def turn_of(explanations: Explanations, answer: Answer) -> float:
+    """Return by how much the sensor turned during the scan, as the walls show it, radians; 0 where they do not."""
+    turn = explanations.turn + (answer.estimate.turn[0] if answer.estimate.with_columns else 0.0)
+    return turn if abs(turn) > SHOWN_TURN else 0.0
+
+
+def turn_rate_of(context: SearchContext, explanations: Explanations, answer: Answer) -> float | None:
+    """Return the rate of that rotation, rad/s; None where it is not shown, or the duration of the scan not known."""
+    turn, seconds = turn_of(explanations, answer), context.scan.sweep_s
+    return turn / seconds if turn and seconds else None
+
+
+def _score(context: SearchContext, one: ConsensusSet) -> float:
+    return one.score if context.options.estimator == "joint" else score_at_one_step(one)
 
 
 def _critical_wall(context: SearchContext, answer: Answer) -> CriticalWall | None:
     """Return the wall without which the pose would move most or be free; None where it would hardly move."""
-    moves, wall, direction = 0.0, -1, (0.0, 0.0)
-    for w, moved, deviation, dx, dy, _ in answer.estimated.leverages.tolist():
-        if max(moved, deviation) > moves:
-            moves, wall, direction = max(moved, deviation), w, (dx, dy)
-    if moves < CRITICAL_DISPLACEMENT:
+    found = answer.estimate.leverages
+    moves = np.maximum(found.displacements, found.deviations)
+    worst = int(moves.argmax())
+    if moves[worst] < CRITICAL_DISPLACEMENT:
         return None
     walls = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]]
-    on_it = context.index.is_one_wall(walls, wall)
-    scan = answer.accepted.pairs[on_it, 0].tolist()
+    on_it = context.index.is_one_wall(walls, int(found.walls[worst]))
+    scan = tuple(map(int, answer.accepted.pairs[on_it, 0]))
     on_map = sorted({i for i, there in zip(answer.accepted.map_indices(context.index), on_it, strict=True) if there})
-    return CriticalWall(tuple(scan), tuple(on_map), direction, moves)
+    dx, dy = found.directions[worst].tolist()
+    return CriticalWall(scan, tuple(on_map), (dx, dy), float(moves[worst]))
 
 
 def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
-    return missing_segments(context, answer.best) if "missing_map" in context.options.parts else ()
+    """List the map segments of walls that rays to the consensus set pass through, and that hold none of it."""
+    if "missing_map" not in context.options.parts or context.too_late_to_look:
+        return ()
+    index, matched = context.index, answer.best.matched
+    rays = context.rays_to_lines
+    table = cast(context, rays, answer.best.estimate)
+    _, walls, to_matched, _ = passed_walls(rays, table, matched[None])
+    own = set(answer.best.matches["wall"][matched].tolist())
+    missing: set[int] = set()
+    for wall in walls[2.0 * to_matched >= BLOCKING_RAYS].tolist():
+        if wall not in own and wall < len(index.walls.rows):
+            pieces = index.pieces.items[index.pieces.starts[wall] : index.pieces.starts[wall + 1]]
+            missing.update((pieces % index.directed).tolist())
+    return tuple(sorted(missing))
 
 
 def _alternatives(
-    context: SearchContext, explanations: Explanations, others: Iterable[ConsensusSet], verdict: Verdict
+    context: SearchContext, explanations: Explanations, others: Sequence[ConsensusSet], verdict: Verdict
 ) -> tuple[Alternative, ...]:
     if verdict.usable and "alternatives" not in context.options.parts:
         return ()
-    shown = tuple(islice(with_lines_of_sight(context, explanations.ranked, others), context.options.max_alternatives))
-    if not shown:
-        return ()
-    estimated = estimate_poses(context, shown)
-    probabilities = probabilities_of_others(explanations.answer, verdict, shown)
-    found: list[Alternative] = []
-    for some in slices_between_looks(context, len(estimated)):
-        measures = _measures(context, shown[some], estimated[some])
-        found += map(partial(_alternative, context), shown[some], estimated[some], measures, probabilities[some])
-    return tuple(found)
+    shown = others[: context.options.max_alternatives]
+    probabilities = probabilities_of_others(verdict, shown)
+    sigma = context.index.sigma if explanations.answer is None else explanations.answer.estimate.wall_sigma
+    return tuple(
+        _alternative(context, one, probability, sigma or 0.0)
+        for one, probability in zip(shown, probabilities, strict=True)
+    )
 
 
-def _measures(
-    context: SearchContext, shown: Sequence[ConsensusSet], estimated: Sequence[EstimatedPose]
-) -> list[list[float]]:
-    """Return the paper's measures of consensus sets at their estimated poses, of which there may be fewer."""
-    poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in estimated], POSE_AMONG_WALLS)
-    measures: list[list[float]] = paper_measures(
-        context.lines.rows, matches_of(shown[: len(estimated)]), context.known_walls, poses
-    ).tolist()
-    return measures
-
-
-def probabilities_of_others(
-    answer: Answer | None, verdict: Verdict, others: Sequence[ConsensusSet]
-) -> list[float | None]:
+def probabilities_of_others(verdict: Verdict, others: Sequence[ConsensusSet]) -> list[float | None]:
     """Return the probability that each of some other poses is right, 0 to 1; None where the verdict has none to share.
 
-    As in `probability_among`: the best explanation weighs 1, another one what it is counted, reduced by its gap.
+    That of the answer and these together is that the scan explains this place or a similar one: at most 1.
     """
-    if answer is None or verdict.status is Status.NO_MATCH or verdict.probability is None or verdict.contradicted:
+    comparison = verdict.comparison
+    if comparison is None or verdict.status is Status.NO_MATCH or verdict.probability is None or verdict.contradicted:
         return [None] * len(others)
-    alternatives = compare_alternatives(answer.best, others)
-    parts = alternatives["counted"] * np.exp(np.minimum(0.0, alternatives["gap"]))
-    inside = [one.inside for one in others]  # a hard prior excludes the others
-    found: list[float | None] = (verdict.probability * parts * inside).tolist()
-    return found
+    weights = comparison.weights / (1.0 + comparison.weights.sum())
+    by_set = {id(one): weight for one, weight in zip(comparison.others, weights.tolist(), strict=True)}
+    return [verdict.by_model * by_set.get(id(one), 0.0) * one.inside for one in others]
 
 
 def _alternative(
-    context: SearchContext,
-    other: ConsensusSet,
-    estimated: EstimatedPose,
-    measures: list[float],
-    probability: float | None,
+    context: SearchContext, other: ConsensusSet, probability: float | None, wall_sigma: float
 ) -> Alternative:
-    translation, mitsuta, wahba, reliability = measures
+    ambiguity, reliability = paper_measures(context, other, other.pose, wall_sigma)
+    _, _, _, xx, xy, xt, yy, yt, tt = other.estimate[0].item()
+    covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
     return Alternative(
-        pose=context.in_map(estimated.pose),
-        covariance=None if estimated.degenerate else estimated.covariance,
-        score=other.score_by(context.options.estimator),
-        ambiguity=Ambiguity(translation, wahba if context.options.rotation == "wahba" else mitsuta),
+        pose=context.in_map(other.pose),
+        covariance=None if other.free else covariance,
+        score=_score(context, other),
+        ambiguity=ambiguity,
         reliability=reliability,
-        inlier_fraction=other.fraction,
+        inlier_fraction=other.fraction(context.lines.rows),
         probability=probability,
     )

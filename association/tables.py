@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from registration.layout import Floats, Records
+from registration.layout import JOINT_SUMS, Floats, Records
 
-from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SUMS, Indices, Integers, record
-from .tuning import AT_ONCE
+from .layout import HELD, SCRATCH, WALL_SUMS, Integers, record
 
 
 class Walls(NamedTuple):
@@ -153,27 +152,6 @@ class Pieces(NamedTuple):
     firsts: Integers
 
 
-class PiecesAlong(NamedTuple):
-    """The pieces of a wall, or of linked walls, along a line.
-
-    Attributes
-    ----------
-    piece, wall : (k,) which they are, wall by wall, and of which wall
-    low, high : (k,) abscissae between which each lies, metres
-    place : (k,) places in these, by where they begin; ties by place
-    farthest : (k,) in that order, the place of the one that reaches farthest of those up to each
-    gaps : (k,) in that order, the length that is on none of them between the first and where each begins, metres
-    """
-
-    piece: Indices
-    wall: Indices
-    low: Floats
-    high: Floats
-    place: Indices
-    farthest: Indices
-    gaps: Floats
-
-
 class MapTables(NamedTuple):
     """All that the search reads of a map."""
 
@@ -195,175 +173,66 @@ class Measured(NamedTuple):
     points: Floats
 
 
-class Lines(NamedTuple):
-    """The lines of a scan, and the segments that they are made of.
-
-    Attributes
-    ----------
-    rows : (n,) of `SCAN_LINE`
-    row_of : (segments,) which row each segment is part of
-    least_overlap : float
-        Share of a segment's length that has to lie on a wall.
-    """
-
-    rows: Records
-    row_of: Indices
-    least_overlap: float
-
-
-class Sights(NamedTuple):
-    """The lines seen from each view.
-
-    Attributes
-    ----------
-    places : (v,) of `POINT`, where the sensor of each stood, in the scan frame
-    starts : (v + 1,) view v saw ``seen[starts[v]:starts[v + 1]]``; nothing where lines of sight are no evidence
-    seen : (k,) of `SIGHTING`
-    by_line : (k,) their order by scan line, and there by view
-    weights : (v,) weight of each view, so that views from one place count as one
-    """
-
-    places: Records
-    starts: Integers
-    seen: Records
-    by_line: Indices
-    weights: Floats
-
-
-class Rays(NamedTuple):
-    """Single beams of which something is known.
-
-    Attributes
-    ----------
-    beams : (m,) of `BEAM`
-    reach : float
-        Metres; how far a beam without return is known to be free.
-    """
-
-    beams: Records
-    reach: float
-
-
-class SeenByViews(NamedTuple):
-    """The walls as the views show them.
-
-    Attributes
-    ----------
-    seen : (k,) of `SIGHTING`
-    walls : (k,) of `WALL`, on which each lies
-    number : (k,) which of the walls that is, from 0 up
-    origins : (v,) of `POINT`, where the views' frames begin, as reported, in the scan frame
-    """
-
-    seen: Records
-    walls: Records
-    number: Indices
-    origins: Records
-
-
 class Question(NamedTuple):
-    """The input of a search: the scan, the terms and the rules.
-
-    Attributes
-    ----------
-    scan : (n,) of `SCAN_LINE`
-    terms : (1,) of `TERMS`
-    rules : (1,) of `RULES`
-    """
+    """The input of a search: the scan lines, (n,) of `SCAN_LINE`, and the terms, (1,) of `TERMS`."""
 
     scan: Records
     terms: Records
-    rules: Records
 
 
-class Odds(NamedTuple):
-    """A model of the verdict.
-
-    Attributes
-    ----------
-    curves : (n,) of `CURVE`
-    bends : (k,) of `BEND`
-    pairs : (m,) of `TWO_FEATURES`
-    """
-
-    curves: Records
-    bends: Records
-    pairs: Records
-
-
-class KnownWalls(NamedTuple):
-    """The walls, and the uncertainty of their positions.
+class ScoreRules(NamedTuple):
+    """Which poses are refined.
 
     Attributes
     ----------
-    walls : (m,) of `WALL`
-    ties : (m,) as of `Place`
-    variance : float
-        Of a wall's own error, m^2; negative where nothing is known of it.
+    rule : (1,) of `RULE`
+    parallel : (k,) chi-square of their angles up to which so many lines are parallel
     """
 
-    walls: Records
-    ties: Floats
-    variance: float
-
-
-class Blockers(NamedTuple):
-    """The walls that rays pass through.
-
-    Attributes
-    ----------
-    counts : (m,) of `BLOCKER`, by wall
-    touched : (m,) the walls that any ray passes through, as many as there are
-    """
-
-    counts: Records
-    touched: Integers
-
-
-class Workspace(NamedTuple):
-    """The arrays that the kernels write to while they look at one pose after the other.
-
-    Attributes
-    ----------
-    matches : (n,) of `MATCH`
-    spreads : (n,) angle gates in sectors
-    shifts : (n,) where in the raster's cells the bits for the offset gate begin; below 0 where none is looked up
-    later : (n,) possible gain of the scan lines after each, of those that are looked up, nats
-    possible : (n,) possible gain of each scan line at a pose, nats, -1 where it can lie on no wall
-    hypotheses : (k,) of `HYPOTHESIS`, those that are scored together
-    near : (n, k) whether each scan line may lie on a wall at each of them
-    held : (n,) which wall of each scan line is in the sums, or -1
-    shifts_held : (n,) lateral offset from that wall of the line that is in the sums, m
-    weights_held : (n,) its weight there
-    listed : (n,) walls, for now
-    wall_sums : (m,) of `WALL_SUMS`, by wall; all 0 between two poses
-    scratch : (1,) of `SCRATCH`
-    parallel : (k,) the chi-square of the angles of n pairs up to which they are parallel, by n from 0 on
-    """
-
-    matches: Records
-    spreads: Floats
-    shifts: Integers
-    later: Floats
-    possible: Floats
-    hypotheses: Records
-    near: Integers
-    held: Integers
-    shifts_held: Floats
-    weights_held: Floats
-    listed: Integers
-    wall_sums: Records
-    scratch: Records
+    rule: Records
     parallel: Floats
 
+
+class ScoreWork(NamedTuple):
+    """The arrays that `score_poses` writes to.
+
+    Attributes
+    ----------
+    held : (n,) of `HELD`
+    wall_sums : (m,) of `WALL_SUMS`, those of no pair between two calls
+    listed : (n,) walls
+    scratch : (1,) of `SCRATCH`
+    nothing : (1,) of `JOINT_SUMS`, those of no pair
+    """
+
+    held: Records
+    wall_sums: Records
+    listed: Integers
+    scratch: Records
+    nothing: Records
+
     @classmethod
-    def of(cls, count: int, walls: int, parallel: Floats) -> Workspace:
-        """Return one for a scan of `count` lines and a map of that many walls, with `parallel` as above."""
-        spreads, later, possible = np.zeros((3, count))
-        shifts, held, listed = np.zeros((3, count), np.int64)
-        shifts_held, weights_held = np.zeros((2, count))
-        held.fill(-1)
-        hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
-        matches, wall_sums, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SUMS), record(SCRATCH)
-        arrays = matches, spreads, shifts, later, possible, hypotheses, near
-        return cls(*arrays, held, shifts_held, weights_held, listed, wall_sums, scratch, parallel)
+    def of(cls, lines: int, walls: int) -> ScoreWork:
+        """Return the arrays for a scan of so many lines on a map of so many walls."""
+        held, wall_sums = np.zeros(lines, HELD), np.zeros(walls, WALL_SUMS)
+        return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), record(JOINT_SUMS))
+
+
+class Samples(NamedTuple):
+    """Sampled consensus sets of the stopping rule.
+
+    Attributes
+    ----------
+    orders : (samples, n) uint8, random orders of the lines
+    ranks : (n, samples) uint8, the place of each line in them
+    found : (samples,) uint8, the place at which an order has a base that was searched, n where it has none
+    sizes, gains : (samples,) how many lines each set has so far, and what they gain, nats
+    open_ones : (samples + 1,) the samples that are not decided, and last their number
+    """
+
+    orders: Integers
+    ranks: Integers
+    found: Integers
+    sizes: Integers
+    gains: Floats
+    open_ones: Integers

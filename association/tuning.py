@@ -58,7 +58,7 @@ AT_ONCE = 256  # runs, cells and poses that go through a stage together; measure
 
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
-RIVAL_SHARE = 0.75  # of the best value, tables; a pose above it must not have been missed, for the verdict weighs it
+COMPLETE_ABOVE = 0.75  # of the best value, tables; a pose above it must not have been missed: the verdict weighs it
 # Distinct poses that are kept at least, tables: the verdict compares the best with the others. Of a changed or mirrored
 # scan only the best matter, and no more are kept.
 FEW_KEPT = 24
@@ -74,43 +74,30 @@ MAX_RAYS = 12  # to one segment, tables
 # Walls that are looked at for rays between two looks at the clock, at most: a third of a second. If one pose takes
 # more, no ray is followed, and the search is not complete. Measured: scans in their maps take up to 3 million.
 MOST_LOOKED_AT = 200_000_000
+MOST_RAYS = 1000  # from one pose, about
 EMPTY_CELL = 4  # walls, measured; cost of going to the next cell
 LATE_CROWD = 500.0  # measured; walls on the list that a place on a wall has, from which rays are left out then
-COMPARED_BEAMS = 720  # measured; that many are looked at
+MOST_BEAMS = 180  # tables; of a laser; neighbouring beams say the same
 RAYS = 120  # tables
 FAR = 25.0  # m, tables; farther walls are looked for only as far as one and a half times the scan reaches
 FARTHER = 1.5
 
-# --- Scan and map that differ by a factor -----------------------------------------------------------------------------
+# --- Scan and map that differ by a factor, and sensors that turn ------------------------------------------------------
 
-LEAST_OFF_WALLS = 0.01  # m, tables; walls that are off by less, as estimated, leave nothing to a factor
-LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables; a factor is tried that is so far from one,
-FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations, as an offset that all walls share
-FACTOR_ROUNDS = 3  # tables
-FACTOR_GAP = GAIN  # nats, tables; it is taken where the answer scores so much more,
-FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
-# A greater factor puts the answer in doubt, if so many walls agree beyond those that it takes, or it is beyond noise.
-DOUBTING_WALLS = 1.0  # tables
-DOUBTING_DEVIATIONS = 3.0  # geometry
-SAME_PLACE = 1.0  # m, geometry; by which a factor may move a pose
+LEAST_OFF_WALLS = 0.01  # m, tables; walls of maps that are declared with less are not compared with walls farther off
+LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables; a scan is searched again with a factor that is so far from one
+DOUBTING_DEVIATIONS = 3.0  # geometry; a distortion beyond them is reported
+LEAST_TURN = math.radians(0.6)  # tables; likewise, if its sensor turned by more during the scan
 
 # --- Reporting --------------------------------------------------------------------------------------------------------
 
 CRITICAL_DISPLACEMENT = (
     0.1  # m, geometry: the finest pose that a robot docks by; a pose that moves less does not depend on one wall
 )
+SHOWN_TURN = math.radians(1.0)  # tables; a smaller rotation during a scan is not reported
 FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on either side
 # Of the ranges that came back at least that many, and that share, at one value to the digit. In the logs, which give
 # centimetres, it is 18 % at most.
 LEAST_STUCK = 10
 STUCK_SHARE = 0.5  # measured
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
-
-# --- Verdict ----------------------------------------------------------------------------------------------------------
-
-# The answer of the last view alone stands for a drive if the best pose of the drive is as near as `DISTINCT_DISTANCE`
-# and turned by no more than this. The cautious probability of the drive must also be this high. Measured on 764 drives
-# of 10 m in drawn buildings, as ranges and as segments: of 47 right answers that only the last view makes usable one is
-# below 0.5, of 14 in other buildings five.
-AGREED_ANGLE = math.radians(3.4)
-AGREED_CAUTIOUS = 0.5

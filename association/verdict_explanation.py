@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from registration import RigidTransform
 
 from .associating import DEFAULT_OPTIONS, run_stages
@@ -16,59 +14,38 @@ from .index.map_index import MapIndex
 from .options import AssociationOptions, Prior
 from .result import AssociationResult, Reason, ReasonCode, Status
 from .scan.scan import Scan
-from .verdict.alternatives import AmongAlternatives
-from .verdict.features import Description
-from .verdict.models import USUAL
-from .verdict.probabilities import Probabilities
+from .verdict.features import ROLES
+from .verdict.model import ELSEWHERE, USUAL, WRONG
 from .verdict.reasons import taken_by_reason
-from .verdict.roles import ROLES
 from .verdict.tuning import NO_MATCH_PROBABILITY
 from .verdict.verdict import Verdict
-from .verdict.vetoes import VETOES, Origin
+from .verdict.vetoes import VETOES
 
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """The term of one feature, or of a pair of features, in the logarithm of the odds.
+    """The term of one feature in the logarithm of the odds against one way of being not right.
 
     Attributes
     ----------
     name : str
-        Of the feature; of a pair its kind and both names.
-    value : float or None
-        Of the feature; None for a pair.
-    nats : float
-        The term.
-    usual : float
-        The same term of a usual right answer, nats.
-    reason : str or None
-        The reason that the feature speaks for where its term is lower than usual; None for the constant and pairs.
+        Of the feature.
+    against : "wrong" or "elsewhere"
+        Another pose of this map, or a scan that was taken elsewhere.
+    value : float
+        Of the feature.
+    nats, usual : float
+        The term, and that of a usual right answer.
+    reason : str
+        The reason that the feature gives where its term is lower than usual.
     """
 
     name: str
-    value: float | None
+    against: str
+    value: float
     nats: float
     usual: float
-    reason: ReasonCode | None
-
-
-@dataclass(frozen=True, slots=True)
-class ExplainedModel:
-    """The model, evaluated.
-
-    Attributes
-    ----------
-    contributions : tuple of Contribution
-        In the order of the model.
-    log_odds : float
-        The sum of the terms, nats.
-    probability : float
-        By the model and the prior probability `options.on_map`, 0 to 1.
-    """
-
-    contributions: tuple[Contribution, ...]
-    log_odds: float
-    probability: float
+    reason: ReasonCode
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +57,11 @@ class WeighedAlternative:
     pose : RigidTransform
         In the map frame.
     gap : float
-        Its evidence less that of the answer, nats.
+        Nats of evidence by which the answer is better, thing by thing.
     counted : float
-        Its weight by the ratio of its score to the answer's, 0 to 1.
+        How far it counts, 0 to 1.
     weight : float
-        Relative to the answer, whose weight is 1.
+        Its probability over that of the answer.
     """
 
     pose: RigidTransform
@@ -100,13 +77,11 @@ class ExplainedNull:
     Attributes
     ----------
     score : float
-        Nats; 0 where it is below `searched_above` of the answer's.
+        Nats; 0 where none was found.
     fraction : float
         Of the answer's score.
     symmetry : float
-        Fraction of the map's view that the map also shows mirrored, 0 to 1.
-    searched_above : float
-        Fraction of the answer's score; a lower null score makes no difference, and was not searched.
+        Fraction of directions in which the map shows the same from the answer, and mirrored from the null's pose.
     """
 
     score: float
@@ -116,47 +91,39 @@ class ExplainedNull:
 
 @dataclass(frozen=True, slots=True)
 class VetoOutcome:
-    """One veto of the table, and whether it applies to the answer."""
+    """One veto of the table, whether it applies to the answer, and the reason that it gives."""
 
     name: str
-    origin: Origin
     applies: bool
-    reasons: tuple[ReasonCode, ...]
+    reason: ReasonCode
 
 
 @dataclass(frozen=True, slots=True)
 class VerdictExplanation:
     """The numbers behind the verdict on an answer.
 
-    The answer is usable if ``cautious`` reaches its threshold and no veto applies. It is the probability by the model
-    times the least of those among the alternatives. ``probability_of_pose`` is that by the model for a scan of the map
-    times the mean of them.
+    The answer is usable if no veto applies and ``probability`` reaches ``usable_from``. It is the probability by the
+    model times that among the alternatives. The model has two logarithms of odds, a constant and the contributions of
+    the features each: against another pose of this map, and against another place. The latter is weighed by the prior
+    probability ``on_map``. All further numbers are None without an answer.
 
     Attributes
     ----------
-    status : Status
-    usable : bool
-    probability : float or None
-        As answered.
-    pose : RigidTransform or None
-    reasons : tuple of Reason
+    status, usable, probability, pose, reasons
+        As in the answer.
     vetoes : tuple of VetoOutcome
-        The whole table, in its order.
-    features : mapping or None
-        By name; None without an answer, as all that follows.
-    model : ExplainedModel or None
-    taken : mapping or None
-        By reason the decrease of the log odds by its features, nats.
+    features : mapping of str to float, or None
+    contributions : tuple of Contribution
+    log_odds : mapping, or None
+        Of ``wrong`` and ``elsewhere``, nats.
+    taken : mapping of reason to float, or None
+        By how much the log odds rise if the features of a reason are usual, nats.
+    by_model, among, explained : float or None
+        Probability by the model; among the alternatives; that the scan explains this place or a similar one.
     alternatives : tuple of WeighedAlternative
-    among : AmongAlternatives or None
-        Probability of the answer among its alternatives, by three comparisons.
     null : ExplainedNull or None
-        None where it was not needed.
-    probability_of_pose, cautious : float or None
-    explained : float or None
-        Probability that this place or a similar one is right.
+        None where the mirrored scan was not searched.
     thresholds : mapping of str to float
-        Of ``cautious`` and ``explained``.
     """
 
     status: Status
@@ -165,15 +132,16 @@ class VerdictExplanation:
     pose: RigidTransform | None
     reasons: tuple[Reason, ...]
     vetoes: tuple[VetoOutcome, ...]
+    thresholds: Mapping[str, float]
     features: Mapping[str, float] | None = None
-    model: ExplainedModel | None = None
+    contributions: tuple[Contribution, ...] = ()
+    log_odds: Mapping[str, float] | None = None
     taken: Mapping[ReasonCode, float] | None = None
-    alternatives: tuple[WeighedAlternative, ...] = ()
-    among: AmongAlternatives | None = None
-    null: ExplainedNull | None = None
-    probability_of_pose: float | None = None
+    by_model: float | None = None
+    among: float | None = None
     explained: float | None = None
-    thresholds: Mapping[str, float] | None = None
+    alternatives: tuple[WeighedAlternative, ...] = ()
+    null: ExplainedNull | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +153,6 @@ class AnswerExplanation:
     result : AssociationResult
         The answer, as `associate` returns it.
     verdict : VerdictExplanation
-        On the scan as a whole.
     """
 
     result: AssociationResult
@@ -222,62 +189,43 @@ def explain_verdict(
     """
     stages = run_stages(SearchContext.of(index, scan, prior, options, deadline or Deadline()))
     verdict = stages.verdict if stages.result.search.complete else stages.verdict.cut_short()
-    return AnswerExplanation(stages.result, explained(stages.found.context, verdict))
+    return AnswerExplanation(stages.result, _explained(stages.context, verdict))
 
 
-def explained(context: SearchContext, verdict: Verdict) -> VerdictExplanation:
-    """Return how a verdict came about."""
-    names = {veto.name for veto in verdict.vetoes}
-    vetoes = tuple(VetoOutcome(one.name, one.origin, one.name in names, one.reasons) for one in VETOES)
-    shown = VerdictExplanation(
-        verdict.status, verdict.usable, verdict.probability, verdict.pose, verdict.reasons, vetoes
-    )
-    found, description = verdict.probabilities, verdict.description
-    return shown if found is None or description is None else _with_numbers(context, shown, description, found)
-
-
-def _with_numbers(
-    context: SearchContext, shown: VerdictExplanation, description: Description, found: Probabilities
-) -> VerdictExplanation:
+def _explained(context: SearchContext, verdict: Verdict) -> VerdictExplanation:
+    applying = {veto.name for veto in verdict.vetoes}
+    vetoes = tuple(VetoOutcome(one.name, one.name in applying, one.reason) for one in VETOES)
+    options = context.options
+    thresholds = {"usable_from": options.usable_from, "on_map": options.on_map, "explained": NO_MATCH_PROBABILITY}
+    shown = (verdict.status, verdict.usable, verdict.probability, verdict.pose, verdict.reasons, vetoes, thresholds)
+    described, model = verdict.described, verdict.model
+    if described is None or model is None:
+        return VerdictExplanation(*shown)
+    features, comparison, null = described.features, described.comparison, described.null
+    contributions = [
+        Contribution(name, against, getattr(features, name), nats, odds.terms(USUAL)[name], ROLES[name].reason)
+        for against, odds in ((WRONG, model.wrong), (ELSEWHERE, model.elsewhere))
+        for name, nats in odds.terms(features).items()
+    ]
+    best = verdict.score or 1.0
     return VerdictExplanation(
-        shown.status,
-        shown.usable,
-        shown.probability,
-        shown.pose,
-        shown.reasons,
-        shown.vetoes,
-        features=found.features._asdict(),
-        model=_evaluated(found),
-        taken=taken_by_reason(found.features, found.model),
-        alternatives=_weighed(context, description),
-        among=found.among,
-        null=_null(description, found),
-        probability_of_pose=found.right,
-        explained=found.explained,
-        thresholds={"usable_from": context.options.usable_from, "explained": NO_MATCH_PROBABILITY},
+        *shown,
+        features=features._asdict(),
+        contributions=tuple(contributions),
+        log_odds={WRONG: model.wrong.at(features), ELSEWHERE: model.elsewhere.at(features)},
+        taken=taken_by_reason(model, features, options.on_map),
+        by_model=verdict.by_model,
+        among=comparison.probability,
+        explained=verdict.explained,
+        alternatives=tuple(
+            WeighedAlternative(context.in_map(one.pose), gap, counted, weight)
+            for one, gap, counted, weight in zip(
+                comparison.others,
+                comparison.gaps.tolist(),
+                comparison.counted.tolist(),
+                comparison.weights.tolist(),
+                strict=True,
+            )
+        ),
+        null=ExplainedNull(null.score, null.score / best, null.symmetry) if verdict.searched_null else None,
     )
-
-
-def _evaluated(found: Probabilities) -> ExplainedModel:
-    model, values = found.model, found.features._asdict()
-    terms, usual = model.terms(found.features), model.terms(USUAL)
-    contributions = tuple(
-        Contribution(name, values.get(name), nats, usual[name], ROLES[name].reason if name in ROLES else None)
-        for name, nats in terms.items()
-    )
-    return ExplainedModel(contributions, sum(terms.values()), found.by_model)
-
-
-def _weighed(context: SearchContext, description: Description) -> tuple[WeighedAlternative, ...]:
-    """Return the alternatives with their weights, as in `probability_among`."""
-    gaps, counted = description.alternatives["gap"], description.alternatives["counted"]
-    weights = counted * np.exp(np.minimum(0.0, gaps))
-    rows = zip(description.others, gaps.tolist(), counted.tolist(), weights.tolist(), strict=True)
-    return tuple(WeighedAlternative(context.in_map(one.pose), *numbers) for one, *numbers in rows)
-
-
-def _null(description: Description, found: Probabilities) -> ExplainedNull | None:
-    if found.null is None:
-        return None
-    score = found.null.score
-    return ExplainedNull(score, score / description.answer.best.score, found.null.symmetry)

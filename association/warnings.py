@@ -9,15 +9,23 @@ import numpy as np
 
 from registration import Beams
 
-from .consensus.common_offset import CommonOffset
-from .consensus.distortion import Distortion
+from .consensus.estimator import Estimate
 from .context import SearchContext
+from .explanations import Answer, Explanations
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
 from .scan.extents import extent, inner_extent
 from .scan.kernels.extents import facing_away
-from .to_scale import Factor, ScaledSearch
-from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
+from .tuning import (
+    DOUBTING_DEVIATIONS,
+    EXCEEDING,
+    FACING,
+    LEAST_FACTOR,
+    LEAST_OFF_WALLS,
+    LEAST_STUCK,
+    SHOWN_TURN,
+    STUCK_SHARE,
+)
 from .verdict.verdict import Verdict
 
 NOT_IN_ORDER = (
@@ -39,14 +47,17 @@ def warnings_of(context: SearchContext, search: SearchReport, verdict: Verdict) 
     return _listed(found)
 
 
-def warnings_of_map(found: ScaledSearch) -> tuple[AssociationWarning, ...]:
-    """List the warnings about the map around an answer."""
-    factor, offset, distortion = found.factor, found.offset, found.distortion
+def warnings_of_map(
+    context: SearchContext, explanations: Explanations, answer: Answer
+) -> tuple[AssociationWarning, ...]:
+    """List the warnings about the map around an answer, and about a sensor that turned."""
+    found = answer.estimate
     return _listed(
         {
-            "map_scale": None if factor is None else _off_scale(factor),
-            "common_offset": None if offset is None else _offset(offset, found.context.index.sigma or 0.0),
-            "map_distorted": None if distortion is None else _distorted(distortion),
+            "map_scale": None if explanations.scale == 1.0 else _off_scale(explanations.scale, found),
+            "common_offset": _offset(found, context.index.sigma or 0.0),
+            "map_distorted": _distorted(found),
+            "turned": _turned(explanations, found),
         }
     )
 
@@ -77,33 +88,52 @@ def _incomplete(context: SearchContext) -> str:
     )
 
 
-def _off_scale(factor: Factor) -> str:
+def _off_scale(scale: float, found: Estimate) -> str:
+    deviation = 0.5 * math.hypot(*found.strain[1][:2].tolist())
     return (
-        f"The scan fits much better with its lengths times {factor.value:.4f} (+-{factor.deviation:.4f}), and was "
+        f"The scan fits much better with its lengths times {scale:.4f} (+-{deviation:.4f}), and was "
         "searched with this factor. The pose is in the unscaled map. Check the scale of the map and of the ranges."
     )
 
 
-def _offset(offset: CommonOffset, sigma: float) -> str | None:
-    """Describe an offset of all walls that is greater than the map's sigma."""
-    if abs(offset.offset) <= sigma:
+def _offset(found: Estimate, sigma: float) -> str | None:
+    """Describe an offset of all walls that is beyond noise, and greater than the map's sigma."""
+    offset, deviation = found.offset
+    if not found.with_columns or abs(offset) <= max(sigma, LEAST_OFF_WALLS, DOUBTING_DEVIATIONS * deviation):
         return None
-    side = "nearer to the sensor" if offset.offset > 0.0 else "farther from the sensor"
+    side = "nearer to the sensor" if offset > 0.0 else "farther from the sensor"
     return (
-        f"All walls are {100.0 * abs(offset.offset):.1f} cm (+-{100.0 * offset.deviation:.1f} cm) {side} than the map "
+        f"All walls are {100.0 * abs(offset):.1f} cm (+-{100.0 * deviation:.1f} cm) {side} than the map "
         "has them. The pose is corrected for this offset. Check the range bias of the laser, and whether the map has "
         "the faces of walls or their centre lines."
     )
 
 
-def _distorted(distortion: Distortion) -> str | None:
+def _distorted(found: Estimate) -> str | None:
     """Describe a distortion that is beyond doubt, and as great as a factor that a scan would be searched with."""
-    if not distortion.large:
+    if not found.with_columns:
+        return None
+    xx, yy, xy = found.strain[0].tolist()
+    along, strain = 0.5 * math.atan2(2.0 * xy, xx - yy), 2.0 * math.hypot(0.5 * (xx - yy), xy)
+    deviation = math.hypot(*found.strain[1].tolist())
+    if not strain >= max(LEAST_FACTOR, DOUBTING_DEVIATIONS * deviation):
         return None
     return (
-        f"The map is distorted here: along {math.degrees(distortion.direction):.0f} degrees it is "
-        f"{100.0 * distortion.strain:.1f} % (+-{100.0 * distortion.deviation:.1f} %) longer than across. The pose is "
+        f"The map is distorted here: along {math.degrees(along):.0f} degrees it is "
+        f"{100.0 * strain:.1f} % (+-{100.0 * deviation:.1f} %) longer than across. The pose is "
         "corrected for this. Check the map against the building, or survey the building again."
+    )
+
+
+def _turned(explanations: Explanations, found: Estimate) -> str | None:
+    """Describe a rotation of the sensor during the scan."""
+    turn = explanations.turn + (found.turn[0] if found.with_columns else 0.0)
+    if abs(turn) <= SHOWN_TURN:
+        return None
+    return (
+        f"The sensor turned by {math.degrees(turn):.1f} degrees (+-{math.degrees(found.turn[1]):.1f}) during the scan, "
+        "as the walls show it. The pose is corrected for this, and is that in the middle of the scan. Send `twist` and "
+        "`time_increment`, or check `angle_increment`."
     )
 
 
@@ -151,7 +181,8 @@ def _facing_away(context: SearchContext) -> str | None:
         return None
     views = context.scan.views
     # A segment without a viewpoint, nan, does not face away from any.
-    seen_from = context.sights.places if views is None else as_records(POINT, views.viewpoints[views.of_segment])
+    places = context.viewpoints if views is None else context.viewpoints[views.of_segment]
+    seen_from = as_records(POINT, places)
     away = facing_away(context.ends, seen_from, FACING)
     if not away:
         return None

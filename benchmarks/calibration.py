@@ -1,18 +1,17 @@
-"""Fits the verdict's models, reports them by cross-validation over buildings, writes `association.verdict.models`.
+"""Fits the verdict's model, reports it by cross-validation over buildings, writes `association.verdict.models`.
 
-The probability that the best explanation is right is a logistic function of `association.verdict.features`, shared
-between explanations that are about as good. Scans of floor plans (three levels of clutter), of logs and of drawn
-worlds, as segments and with their raw ranges, and scans that were searched in the map of another building or of another
-part of it, where nothing is right. A robot goes by an answer only if it is probable with these. The probability that is
-answered holds for scans that are known to be of this map: it has the same log odds and a constant more. The report of
-an answer comes from a fit without its building, its log or its world; the coefficients come from all of these. The
-drawn worlds that ``python -m benchmarks worlds`` reports on are never fitted on.
+An answer is right, a wrong pose of its map, or the scan was taken elsewhere. The model has the logarithm of the odds
+against each of the latter two: a constant and a curve for each feature, which rises or falls throughout where the
+feature speaks so. An answer is right with the probability ``m / (1 + exp(-a) + exp(-b))``, where m is its probability
+among its alternatives. All three kinds are fitted at once, by their likelihood: scans of floor plans (three levels of
+clutter), of logs and of drawn worlds, as segments and with their raw ranges, and the same in the maps of other
+buildings. Out-of-map scans that no scan could tell are left out: all that these teach is to mistrust a scan that fits
+without fault.
 
-The tables are about the number that is answered, and vetoes apply.
+The report of an answer comes from a fit without its building, its log or its world; the coefficients come from all of
+these. The drawn worlds that ``python -m benchmarks worlds`` reports on are never fitted on.
 
-The features and pairs are those of the present models; ``--select`` selects them again.
-
-``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--select] [--write [FILE]]``
+``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]]``
 """
 
 from __future__ import annotations
@@ -21,138 +20,254 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
 
-from association.verdict.features import Features
-from association.verdict.models import MANIFEST, MODELS, ON_MAP, USUAL, Model
-from association.verdict.roles import ROLES
-from association.verdict.tuning import USABLE_CAUTIOUS
+from association.verdict.features import AGAINST, FOR, ROLES, Features
+from association.verdict.model import ELSEWHERE, MODELS, USUAL, WRONG, Curve, Model, Odds
 
-from .curves import Answers, Task, fit, log_loss
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, collected
-from .full_path import Answered, Probabilities, answered, by_model, veto_rows
 from .manifest import MODELS_FILE, data_of, manifest_of
 from .outcomes import progress
-from .reliability import TELLING, bins, print_bins
-from .selection import Selected, candidates, select
 from .table import print_table
 
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
 FORMS = (SEGMENTS, RANGES)
-THRESHOLDS = (0.8, 0.85, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99)
+BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
+RIDGE = 3.0  # on slopes of standardised pieces, in units of one answer
+LEAST_BESIDE = 0.03  # fraction of the examples that lies on either side of a bend,
+LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
+REAL = 3.0  # a scan of a real plan or log counts as that many of drawn buildings
+ON_MAPS = (0.5, 0.9, 1.0)
+THRESHOLDS = (0.8, 0.85, 0.9, 0.95, 0.98, 0.99)
 GROUPS = ("scan", "scan_30", "scan_50", "logs", DRAWN, STRANGERS)
-AWAY = (
-    "unmapped", "other_type", "sister", "mirrored", "rough_unmapped", "rough_sister", "rough_mirrored",
-)  # fmt: skip
-KEPT = ("clean", "clutter_33", "clutter_66", "changed", "scaled_1", "walls_5cm", "rough")
-"""Conditions of drawn worlds that are shown by themselves: of out-of-map scans, and of scans in the map."""
+AWAY = ("unmapped", "other_type", "sister", "mirrored", "rough_unmapped", "rough_sister", "rough_mirrored")
+BINS, TELLING = 10, 100  # bins of the probability, and answers that a bin has at least
 
 
-def present_task(form: str) -> Task:
-    """Return the features and pairs of the present model."""
-    part = MANIFEST["models"][form]
-    pairs = tuple((str(kind), str(one), str(other)) for kind, one, other in part["pairs"])
-    return Task(form, tuple(part["features"]), pairs, tuple(part["bends"]))
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """Some examples as arrays, (n,) if not stated otherwise.
+
+    Attributes
+    ----------
+    features, before_null : (n, d) float64
+        In the order of `Features`, with the null score and with the least one.
+    among : float64
+        Probability of the answer among its alternatives.
+    right, away, told, fixed : bool
+        True if the answer is right; if the scan is of another building; if it is right, of this map, or the scan shows
+        that it is not; if the walls fix the pose and no veto applies.
+    weights : float64
+    folds : str
+    """
+
+    features: Floats
+    before_null: Floats
+    among: Floats
+    right: Flags
+    away: Flags
+    told: Flags
+    fixed: Flags
+    weights: Floats
+    folds: NDArray[np.str_]
+
+    @classmethod
+    def of(cls, examples: Sequence[Example]) -> Answers:
+        """Return the arrays of some examples."""
+        drawn = np.array([e.group in (DRAWN, DRAWN_STRANGERS) for e in examples])
+        return cls(
+            np.array([e.features for e in examples], np.float64).reshape(len(examples), -1),
+            np.array([e.before_null for e in examples], np.float64).reshape(len(examples), -1),
+            np.array([e.among for e in examples]),
+            np.array([e.right for e in examples], bool),
+            np.array([e.stranger for e in examples], bool),
+            np.array([e.told or not e.stranger for e in examples], bool),
+            np.array([not e.degenerate and not e.vetoes for e in examples], bool),
+            np.where(drawn, 1.0, REAL),
+            np.array([e.fold for e in examples]),
+        )
+
+    def where(self, mask: Flags) -> Answers:
+        """Return some of the answers."""
+        return Answers(**{field.name: getattr(self, field.name)[mask] for field in fields(self)})
 
 
-def cross_validated(answers: Answers, task: Task) -> Probabilities:
-    """Return the probabilities of each answer by a fit to the other folds."""
-    out = np.zeros((4, len(answers.right)))
+def features_of(form: str) -> tuple[str, ...]:
+    """Return the features that a model may have: those of beams with ranges only."""
+    return tuple(name for name, role in ROLES.items() if not (form == SEGMENTS and role.needs_beams))
+
+
+def pieces(values: Floats, bends: Sequence[float]) -> Floats:
+    """Return how far values go into each piece of the axis between bends: (n, bends + 1), their sum the value."""
+    edges = np.array([-np.inf, *bends, np.inf])
+    starts = np.where(np.isfinite(edges[:-1]), edges[:-1], 0.0)
+    return np.asarray(np.clip(values[:, None], edges[:-1], edges[1:]) - starts)
+
+
+def knots(values: Floats) -> tuple[float, ...]:
+    """Return where the curve of a feature may bend: at quantiles of its values that have enough on either side."""
+    least, greatest = float(values.min()), float(values.max())
+    apart, found = LEAST_PIECE * (greatest - least), [least]
+    for k in np.unique(np.quantile(values, BENDS)).tolist():
+        enough = min(np.mean(values < k), np.mean(values > k)) >= LEAST_BESIDE
+        if enough and k - found[-1] >= apart and greatest - k >= apart:
+            found.append(k)
+    return tuple(found[1:])
+
+
+def fit(answers: Answers, names: Sequence[str]) -> Model:
+    """Find the curves of greatest likelihood, with a pull towards 0 on the slopes of standardised pieces."""
+    answers = answers.where(answers.told)
+    bends = {name: knots(answers.features[:, Features._fields.index(name)]) for name in names}
+    columns, bounds = [np.ones((len(answers.right), 1))], [(-np.inf, np.inf)]
+    for name in names:
+        values = answers.features[:, Features._fields.index(name)]
+        columns.append(pieces(values, bends[name]))
+        sign = ROLES[name].sign
+        bounds += [(0.0 if sign == FOR else -np.inf, 0.0 if sign == AGAINST else np.inf)] * (len(bends[name]) + 1)
+    w = _most_likely(answers, np.hstack(columns), bounds)
+    odds = []
+    for half in np.split(w, 2):
+        curves, at = {}, 1
+        for name in names:
+            slopes = half[at : at + len(bends[name]) + 1]
+            if np.any(slopes):
+                changes = np.diff(slopes).tolist()
+                curves[name] = Curve(float(slopes[0]), tuple(zip(bends[name], changes, strict=True)))
+            at += len(slopes)
+        odds.append(Odds(float(half[0]), curves))
+    on_map = float(answers.weights @ ~answers.away) / float(answers.weights.sum())
+    return Model(odds[0], odds[1], on_map)
+
+
+def _most_likely(answers: Answers, raw: Floats, bounds: list[tuple[float, float]]) -> Floats:
+    """Return the coefficients of some columns, (2 k,), of both odds; the first is constant."""
+    middle, scale = raw.mean(axis=0), raw.std(axis=0)
+    middle[0], scale[0] = 0.0, 1.0
+    scale[scale < 1e-9] = np.inf  # what never changes says nothing
+    z = (raw - middle) / scale
+    k, n = z.shape[1], answers.weights
+    pulled = np.arange(k) > 0
+    right, away = answers.right, answers.away
+    wrong = ~right & ~away
+    rest = np.maximum(1e-9, 1.0 - answers.among)
+
+    def loss(w: Floats) -> tuple[float, Floats]:
+        a, b = np.clip(z @ w[:k], -40.0, 40.0), np.clip(z @ w[k:], -40.0, 40.0)
+        by_a, by_b = np.exp(-a), np.exp(-b)
+        total = 1.0 + by_a + by_b
+        nats = -np.log(total) + np.where(right, np.log(np.maximum(1e-12, answers.among)), 0.0)
+        nats += np.where(away, -b, 0.0) + np.where(wrong, np.log(rest + by_a), 0.0)
+        of_a = by_a / total - np.where(wrong, by_a / (rest + by_a), 0.0)
+        of_b = by_b / total - away
+        value = -(n * nats).sum() + RIDGE * ((w[:k][pulled] ** 2).sum() + (w[k:][pulled] ** 2).sum())
+        slope = np.concatenate([z.T @ (-n * of_a), z.T @ (-n * of_b)])
+        return float(value), slope + 2.0 * RIDGE * np.where(np.tile(pulled, 2), w, 0.0)
+
+    start = np.zeros(2 * k)
+    options = {"maxiter": 2000, "maxfun": 5000}
+    w = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[*bounds, *bounds], options=options).x
+    halves = []
+    for half in np.split(w, 2):
+        half = half / scale
+        half[0] -= half[1:] @ middle[1:]
+        halves.append(half)
+    return np.concatenate(halves)
+
+
+def log_odds(odds: Odds, features: Floats) -> Floats:
+    """Return the logarithm of the odds for each row of features, (n,)."""
+    total = np.full(len(features), odds.constant)
+    for name, curve in odds.curves.items():
+        values = features[:, Features._fields.index(name)]
+        total += curve.slope * values
+        for start, more in curve.bends:
+            total += more * np.maximum(0.0, values - start)
+    return total
+
+
+def probability(model: Model, answers: Answers, on_map: float) -> Floats:
+    """Return the probability of each answer, with the null score only where it would be usable without."""
+    prior = (1.0 - on_map) / on_map * model.on_map / (1.0 - model.on_map)
+
+    def by(features: Floats) -> Floats:
+        a, b = (np.clip(log_odds(odds, features), -500, 500) for odds in (model.wrong, model.elsewhere))
+        return np.asarray(answers.among / (1.0 + np.exp(-a) + prior * np.exp(-b)))
+
+    return np.minimum(by(answers.before_null), by(answers.features))
+
+
+def log_loss(model: Model, answers: Answers) -> float:
+    """Return the mean of minus the log of the probability of what happened, nats; of those that could be told."""
+    here = answers.where(answers.told)
+    prior = model.on_map
+    p = np.clip(probability(model, replace(here, before_null=here.features), prior), 1e-12, 1.0 - 1e-12)
+    return float(-(here.weights * np.where(here.right, np.log(p), np.log1p(-p))).sum() / here.weights.sum())
+
+
+def cross_validated(answers: Answers, names: Sequence[str], on_maps: Sequence[float]) -> dict[float, Floats]:
+    """Return the probabilities of each answer, by prior, by a fit to the other folds."""
     folds = np.unique(answers.folds)
+    out = {on_map: np.zeros(len(answers.right)) for on_map in on_maps}
     for k, here in enumerate(folds):
         mine = answers.folds == here
-        one = by_model(fit(answers.where(~mine), task), answers.where(mine))
-        out[:, mine] = one.likely, one.fitted, one.careful, one.explained
-        progress(f"cross-validated as {task.form}", k + 1, len(folds))
-    return Probabilities(*out)
+        model = fit(answers.where(~mine), names)
+        for on_map, values in out.items():
+            values[mine] = probability(model, answers.where(mine), on_map)
+        progress("cross-validated", k + 1, len(folds))
+    return out
 
 
-def print_thresholds(title: str, p: Probabilities, examples: Sequence[Example]) -> None:
-    """Print for several thresholds of the cautious probability the usable share by group and how many are wrong.
-
-    Of drawn out-of-map scans, the share that is usable although the scan shows that it is wrong.
-    """
-    cells, kept = [], []
-    for threshold in THRESHOLDS:
-        usable = answered(examples, p, threshold).usable
-        row = [f"{threshold:g}"]
-        for group in GROUPS:
-            mine = [k for k, e in enumerate(examples) if e.group == group]
-            passed = [k for k in mine if usable[k]]
-            wrong = sum(not examples[k].right for k in passed)
-            row.append(f"{len(passed) / len(mine):.3f} ({wrong} wrong)" if mine else "")
-        for condition in AWAY:
-            mine = [k for k, e in enumerate(examples) if e.condition == condition and e.group == DRAWN_STRANGERS]
-            told = [usable[k] and examples[k].told for k in mine]
-            row.append(f"{100.0 * np.mean(told):.2f} %" if mine else "")
-        cells.append(row)
-        kept.append([f"{threshold:g}"])
-        for condition in KEPT:
-            passed = [usable[k] for k, e in enumerate(examples) if e.condition == condition and e.group == DRAWN]
-            kept[-1].append(f"{100.0 * np.mean(passed):.1f} %" if passed else "")
-    print_table(title, ("usable from", *GROUPS, *AWAY), cells)
-    print_table(f"{title}, drawn worlds", ("usable from", *KEPT), kept)
-
-
-def report(task: Task, examples: Sequence[Example]) -> dict[str, float]:
-    """Print how the present and the new model do on one form of scans; return the metrics of the new one."""
-    print(f"\n## Scans as {task.form}: {len(examples)} answers")
-    answers = Answers.of(examples)
-    metrics: dict[str, float] = {}
-    found = {"present": by_model(MODELS[task.form], answers), "cross-validated": cross_validated(answers, task)}
-    for title, p in found.items():
-        here = answers.where(~answers.away)
-        metrics = {
-            "log_loss": log_loss(p.fitted, answers),
-            "log_loss_on_map": log_loss(p.likely[~answers.away], here),
-        }
-        print(f"\nLog-loss, {title}: {metrics['log_loss']:.4f}; on the map {metrics['log_loss_on_map']:.4f}")
-        metrics |= print_answered(task.form, title, answered(examples, p, USABLE_CAUTIOUS), answers, examples)
-        print_thresholds(f"Usable share of scans as {task.form}, {title}", p, examples)
-    return metrics
-
-
-def print_answered(
-    form: str, title: str, verdicts: Answered, answers: Answers, examples: Sequence[Example]
-) -> dict[str, float]:
-    """Print how often the probability that is answered is right, and what each veto alone rejects; return metrics."""
-    stated = ~answers.away & ~np.isnan(verdicts.probability)
-    probability, right = verdicts.probability[stated], answers.right
-    print_bins(f"Scans as {form} in their own map, as answered, {title}", probability, right[stated])
-    print_table(
-        f"Rejected by one veto alone, scans as {form}, {title}",
-        ("veto", "right", "wrong", "out of map"),
-        veto_rows(examples, verdicts.passes),
-    )
-    off = [abs(p - observed) for count, p, observed in bins(probability, right[stated]) if count >= TELLING]
+def report(form: str, examples: Sequence[Example], answers: Answers, by: dict[float, Floats]) -> dict[str, float]:
+    """Print how often answers are usable, right and wrong; return metrics of the usual prior."""
+    for on_map, p in by.items():
+        cells = []
+        for threshold in THRESHOLDS:
+            usable = (p >= threshold) & answers.fixed
+            row = [f"{threshold:g}"]
+            for group in GROUPS:
+                mine = np.array([e.group == group for e in examples])
+                count = int(mine.sum())
+                wrong = int((usable & mine & ~answers.right).sum())
+                row.append(f"{(usable & mine).sum() / count:.3f} ({wrong} wrong)" if count else "")
+            for condition in AWAY:
+                mine = np.array([e.condition == condition and e.group == DRAWN_STRANGERS for e in examples])
+                told = usable & mine & np.array([e.told for e in examples])
+                row.append(f"{100.0 * told.sum() / mine.sum():.2f} %" if mine.any() else "")
+            cells.append(row)
+        print_table(f"Usable scans as {form}, on_map {on_map:g}", ("usable from", *GROUPS, *AWAY), cells)
+    p, here = by[1.0], ~answers.away & answers.fixed
+    order = np.flatnonzero(here)[np.argsort(p[here], kind="stable")]
+    rows = []
+    for some in np.array_split(order, BINS):
+        rows.append((f"{len(some)}", f"{p[some].mean():.3f}", f"{answers.right[some].mean():.3f}"))
+    print_table(f"Probability, scans as {form} in their map, on_map 1", ("answers", "stated", "right"), rows)
+    usable = (by[0.9] >= 0.95) & answers.fixed
     return {
-        "worst_bin_points": 100.0 * max(off, default=float("nan")),
-        "usable_right": float((verdicts.usable & right).sum()),
-        "usable_wrong_in_map": float((verdicts.usable & ~right & ~answers.away).sum()),
-        "usable_out_of_map": float((verdicts.usable & answers.away).sum()),
-        "usable_out_of_map_told": float((verdicts.usable & answers.away & answers.told).sum()),
+        "usable_right": float((usable & answers.right).sum()),
+        "usable_wrong_in_map": float((usable & ~answers.right & ~answers.away).sum()),
+        "usable_out_of_map": float((usable & answers.away).sum()),
+        "usable_out_of_map_told": float((usable & answers.away & answers.told).sum()),
     }
 
 
-def as_document(model: Model) -> dict[str, list[float]]:
-    """Do the opposite of `association.verdict.models.as_model`."""
-    numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
-    for pair in model.pairs:
-        numbers[pair.key] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
-    numbers[ON_MAP] = (model.on_map,)
-    return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
+def as_document(model: Model) -> dict[str, Any]:
+    """Do the opposite of `association.verdict.model.as_model`."""
 
+    def odds(one: Odds) -> dict[str, list[float]]:
+        numbers = {"constant": (one.constant,)}
+        numbers |= {name: (c.slope, *(v for bend in c.bends for v in bend)) for name, c in one.curves.items()}
+        return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
-def write(path: Path, models: dict[str, Model], manifest: dict[str, Any], usual: Features) -> None:
-    """Write the file that `association.verdict.models` reads."""
-    document = {
-        "manifest": manifest,
-        "usual": {name: float(f"{value:.4g}") for name, value in usual._asdict().items()},
-        "models": {name: as_document(model) for name, model in models.items()},
-    }
-    path.write_text(json.dumps(document, indent=2) + "\n")
+    return {"on_map": round(model.on_map, 4), WRONG: odds(model.wrong), ELSEWHERE: odds(model.elsewhere)}
 
 
 def usual_of(examples: Sequence[Example], before: Features, form: str) -> Features:
@@ -170,7 +285,6 @@ def main() -> None:
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
     parser.add_argument("--form", choices=FORMS, help="only these scans; by default both")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep answers there, and read those that are")
-    parser.add_argument("--select", action="store_true", help="select the features and pairs again")
     parser.add_argument(
         "--write",
         type=Path,
@@ -180,27 +294,25 @@ def main() -> None:
         help="write the models with their manifest; by default to the file that the verdict reads",
     )
     args = parser.parse_args()
-    models, usual, data = dict(MODELS), USUAL, {}
-    fitted: list[tuple[Task, list[Selected], dict[str, float]]] = []
+    models, usual, data, metrics = dict(MODELS), USUAL, {}, {}
     for form in (args.form,) if args.form else FORMS:
         examples = collected(args.keep, form, args.stride)
-        answers, task = Answers.of(examples), present_task(form)
-        steps: list[Selected] = []
-        if args.select:
-            task, steps = select(answers, form, candidates(form))
-            print_table(
-                f"Selected for scans as {form}", ("added", "log-loss"), [(s.added, f"{s.loss:.4f}") for s in steps]
-            )
-        fitted.append((task, steps, report(task, examples)))
-        models[form] = fit(answers, task)
+        answers, names = Answers.of(examples), features_of(form)
+        print(f"\n## Scans as {form}: {len(examples)} answers")
+        models[form] = fit(answers, names)
+        print(f"\nLog-loss, fitted: {log_loss(models[form], answers):.4f}")
+        metrics[form] = report(form, examples, answers, cross_validated(answers, names, ON_MAPS))
         usual = usual_of(examples, usual, form)
         data[form] = data_of(examples)
+    document = {
+        "manifest": manifest_of(" ".join(["python -m benchmarks.calibration", *sys.argv[1:]]), data, metrics),
+        "usual": {name: float(f"{value:.4g}") for name, value in usual._asdict().items()},
+        "models": {name: as_document(model) for name, model in models.items()},
+    }
     if args.write is None:
-        for name, model in models.items():
-            print(f"\n{name}: {as_document(model)}")
+        print(json.dumps(document["models"], indent=2))
         return
-    command = " ".join(["python -m benchmarks.calibration", *sys.argv[1:]])
-    write(args.write, models, manifest_of(command, data, fitted), usual)
+    args.write.write_text(json.dumps(document, indent=2) + "\n")
     print(f"\nWritten: {args.write}")
 
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
-from association.to_scale import search_to_scale
-from association.verdict.alternatives import AmongAlternatives, compare_three_ways
-from association.verdict.chance import find_null_score
-from association.verdict.features import Features, add_null_score, describe_answer
-from association.verdict.models import USUAL
+from association.explanations import explain_scan
+from association.verdict.alternatives import compare
+from association.verdict.features import Features, describe, with_null
+from association.verdict.null import find_null
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
 from batch import Engine, Lost, Processes
@@ -39,7 +38,6 @@ SEGMENTS, RANGES = "segments", "ranges"
 STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-map scans"
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 48, 160
-ALONE = AmongAlternatives(1.0, 1.0, 1.0)
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
@@ -84,16 +82,17 @@ class Example:
         Of a drawn world; the log or level of another.
     fold : str
         It is reported on by a fit without that one.
-    features : Features
+    features, before_null : Features
+        With the null score, and with the least one there is.
+    among : float
+        Probability of the answer among its alternatives.
     right, degenerate : bool
     told : bool
         True if the scan shows that the answer is not where it was taken, where the answer is wrong.
-    before_null : Features
-        The same with the least null score there is.
-    among : AmongAlternatives
-        Probability among the alternatives.
     vetoes : tuple of str
         That apply, in the order of the table.
+    gaps, posteriors : tuple of float
+        Of the alternatives: nats of evidence by which the answer is better, thing by thing, and as scored.
     """
 
     form: str
@@ -101,12 +100,14 @@ class Example:
     condition: str
     fold: str
     features: Features
+    before_null: Features
+    among: float
     right: bool
     degenerate: bool
     told: bool
-    before_null: Features = USUAL
-    among: AmongAlternatives = ALONE
-    vetoes: tuple[str, ...] = ()
+    vetoes: tuple[str, ...]
+    gaps: tuple[float, ...] = ()
+    posteriors: tuple[float, ...] = ()
 
     @property
     def stranger(self) -> bool:
@@ -144,19 +145,16 @@ class Case:
 
     def example(self) -> Example | None:
         """Search up to where the verdict is due; None where there is no explanation."""
-        searched = SearchContext.of(self.index, self.scan, None, OPTIONS, Deadline())
-        to_scale = search_to_scale(searched)
-        context, found = to_scale.context, to_scale.explanations
-        if found.answer is None:
+        context, found = explain_scan(SearchContext.of(self.index, self.scan, None, OPTIONS, Deadline()))
+        answer = found.answer
+        if answer is None:
             return None
-        best, pose, right = found.answer.best, found.answer.registered.pose, False
-        description = describe_answer(context, found, found.answer)
-        plain = Features(*description.features.item())
-        described = description.features.copy()
-        add_null_score(described, best, find_null_score(context, best))
-        features = Features(*described.item())
-        findings = findings_of(context, found, description, off_scale=to_scale.off_scale)
-        if self.truth is not None and pose is not None:
+        best, pose, right = answer.best, answer.pose, False
+        others = [one for one in found.others if one.inside]
+        described = describe(
+            context, best, answer.estimate, compare(context, best, others, answer.estimate.wall_sigma)
+        )
+        if self.truth is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle
         return Example(
@@ -164,13 +162,15 @@ class Case:
             group=self.group,
             condition=self.condition,
             fold=self.fold,
-            features=features,
+            features=with_null(described, best, find_null(context, best)).features,
+            before_null=described.features,
+            among=described.comparison.probability,
             right=right,
-            degenerate=found.answer.estimated.degenerate,
-            told=not right and (self.told is None or pose is None or self.told(pose)),
-            before_null=plain,
-            among=compare_three_ways(context, found.answer, description.others, description.alternatives),
-            vetoes=tuple(one.name for one in applied(replace(findings, mirrored_better=features.null_better))),
+            degenerate=answer.estimate.degenerate,
+            told=not right and (self.told is None or self.told(pose)),
+            vetoes=tuple(one.name for one in applied(findings_of(found, answer))),
+            gaps=tuple(described.comparison.gaps.tolist()),
+            posteriors=tuple(best.posterior - one.posterior for one in described.comparison.others),
         )
 
 

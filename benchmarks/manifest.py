@@ -26,26 +26,23 @@ import scipy
 
 import association
 from association.verdict.features import Features
-from association.verdict.models import FILE, MANIFEST
+from association.verdict.model import FILE, MANIFEST
 
-from .curves import Task
 from .examples import Example
 from .queries import DATA, data_found
-from .selection import Selected
 
 ROOT = Path(association.__file__).parents[1]
 MODELS_FILE = ROOT / "association" / "verdict" / FILE
 UNKNOWN = "unknown"
-FORMAT = 2  # of the manifest
+FORMAT = 3  # of the manifest
 DEFINITION = (
     "association/verdict/features.py",
     "association/verdict/alternatives.py",
-    "association/verdict/chance.py",
+    "association/verdict/null.py",
     "association/verdict/tuning.py",
-    "association/verdict/kernels/*.py",
     "association/consensus/tuning.py",
-    "association/consensus/kernels/beams.py",
-    "association/consensus/kernels/scoring.py",
+    "association/consensus/beams.py",
+    "association/consensus/kernels/*.py",
 )
 """The code that gives the features their values, and the score that they depend on."""
 
@@ -80,39 +77,24 @@ def code_of(text: str) -> str:
     return " ".join(tokens)
 
 
-def manifest_of(
-    command: str, data: dict[str, Any], fitted: Sequence[tuple[Task, Sequence[Selected], dict[str, float]]]
-) -> dict[str, Any]:
+def manifest_of(command: str, data: dict[str, Any], metrics: dict[str, dict[str, float]]) -> dict[str, Any]:
     """Return the manifest of a fit.
 
     Parameters
     ----------
     command : str
         That makes the models again.
-    data : dict
-        By form what `data_of` returns.
-    fitted : sequence of (Task, steps of its selection, metrics)
-        The models that were fitted; those that were not keep their part of the present manifest. Without steps the
-        features were those of the present model, and its selection stays.
+    data, metrics : dict
+        By form what `data_of` returns, and the metrics of the fit; forms that were not fitted keep their part.
     """
-    models = dict(MANIFEST["models"])
-    for task, steps, metrics in fitted:
-        selection = [f"{step.added}: {step.loss:.5f}" for step in steps]
-        models[task.form] = {
-            "features": list(task.names),
-            "pairs": [list(pair) for pair in task.pairs],
-            "bends": list(task.bends),
-            "selection": selection or models[task.form]["selection"],
-            "metrics": metrics,
-        }
     return {
         "format": FORMAT,
         "commit": commit(),
         "command": command,
         "seed": "none: cases are drawn by their numbers, and the fit is not random",
         "versions": {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__},
-        "data": {**MANIFEST["data"], **data},
-        "models": models,
+        "data": {**MANIFEST.get("data", {}), **data},
+        "metrics": {**MANIFEST.get("metrics", {}), **metrics},
         "code": {"features": list(Features._fields), "digest": digest(), "at_fit": digest(), "accepted": []},
     }
 
@@ -123,7 +105,7 @@ def data_of(examples: Sequence[Example]) -> dict[str, Any]:
     found = hashlib.sha256()
     for example in used:
         found.update(np.array([*example.features, example.right], np.float64).tobytes())
-        found.update(np.array([example.among.mean, example.among.least], np.float64).tobytes())
+        found.update(np.array([example.among], np.float64).tobytes())
     away = sum(e.stranger for e in used)
     return {
         "scans_in_map": len(used) - away,

@@ -15,7 +15,7 @@ import numpy as np
 
 from association import AssociationOptions, AssociationResult, Deadline, associate
 from association.context import SearchContext
-from association.search.candidates import find_candidates
+from association.search.search import search as find_candidates
 from batch import Engine, Lost
 from registration import RigidTransform, wrap_angle
 

@@ -37,7 +37,7 @@ def kernel(function: Function) -> Function:
         return interpreted(function)
     directory = cache_directory()
     with _cached_in(directory):
-        decorate = numba.njit(cache=directory is not None, nogil=True)
+        decorate = numba.njit(cache=directory is not None, nogil=True, error_model="numpy")
         return cast(Function, decorate(function))
 
 

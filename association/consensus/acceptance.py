@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from dataclasses import replace
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform, register
+from registration.layout import Floats
 from registration.values import value
 from registration.weights import MIN_WEIGHT
 
@@ -18,13 +16,9 @@ from ..context import SearchContext
 from ..index.map_index import MapIndex
 from ..options import Estimator, Rotation
 from ..result import Correspondence
-from ..tables import Lines
 from .consensus_set import ConsensusSet
-from .estimation import EstimatedPose
-from .kernels.acceptance import accept_matches
-from .tuning import LEAST_KNOWN_VARIANCE, PAIRS_COMPARED
+from .tuning import LEAST_KNOWN_VARIANCE, MAX_OTHERS, MIN_EXTENT, MOST_UNDER, PAIRS_COMPARED
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
@@ -34,74 +28,148 @@ class Accepted:
 
     Attributes
     ----------
-    pairs : (n, 2) scan index and index of the map piece, by scan index
-    overlaps : (n,) fraction of each scan segment's length that lies on pieces of its wall, or chain where it is long
-    others, other_starts : pair k lies also on the pieces ``others[other_starts[k]:other_starts[k + 1]]``
+    pairs : (k, 2) intp
+        Scan and map segment, ascending by scan segment; the map's of the index, which has each twice where directions
+        mean nothing.
+    overlaps : (k,) float64
+        Fraction of the scan segment's length that lies on the map.
+    others : tuple of tuple of int
+        Other map segments that each scan segment lies on.
     """
 
     pairs: Indices
     overlaps: Floats
-    others: Indices
-    other_starts: Indices
+    others: tuple[tuple[int, ...], ...]
 
     @property
     def scan_indices(self) -> list[int]:
         """Scan index of each pair."""
-        indices: list[int] = self.pairs[:, 0].tolist()
-        return indices
+        return list(map(int, self.pairs[:, 0]))
 
     def map_indices(self, index: MapIndex) -> list[int]:
         """Return the map index of each pair, as sent."""
-        indices: list[int] = (self.pairs[:, 1] % index.directed).tolist()
-        return indices
+        return list(map(int, self.pairs[:, 1] % index.directed))
 
 
-def accept(context: SearchContext, best: ConsensusSet) -> Accepted:
-    """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
-    index, ends = context.index, context.ends
-    lines = Lines(context.lines.rows, context.lines.row_of, float(context.gates["least_overlap"][0]))
-    found = accept_matches(best.matches, lines, ends, best.estimate, index.walls.rows, index.pieces)
-    return Accepted(*found)
+@value(frozen=True, slots=True)
+class _Chain:
+    """The pieces of walls that continue one another, by where they begin along the first of them.
+
+    `gaps` sums up the length without pieces before each; `reach` is how far those up to each reach.
+    """
+
+    direction: Floats
+    pieces: Indices
+    walls: Indices
+    lows: Floats
+    highs: Floats
+    reach: Floats
+    gaps: Floats
+
+    @classmethod
+    def of(cls, index: MapIndex, wall: int) -> _Chain:
+        rows, pieces = index.walls.rows, index.pieces
+        walls, w = [], int(pieces.firsts[wall])
+        direction = np.array([rows[w]["dx"], rows[w]["dy"]])
+        while w >= 0:
+            walls.append(w)
+            w = int(rows[w]["after"])
+        items = [pieces.items[pieces.starts[w] : pieces.starts[w + 1]] for w in walls]
+        own, of_wall = np.concatenate(items).astype(np.intp), np.repeat(walls, [len(one) for one in items])
+        ends = pieces.ends[own]
+        one = ends["x1"] * direction[0] + ends["y1"] * direction[1]
+        other = ends["x2"] * direction[0] + ends["y2"] * direction[1]
+        lows, highs = np.minimum(one, other), np.maximum(one, other)
+        order = np.argsort(lows, kind="stable")
+        lows, highs = lows[order], highs[order]
+        reach = np.maximum.accumulate(highs)
+        gaps = np.cumsum(np.maximum(0.0, np.concatenate([[0.0], lows[1:] - reach[:-1]])))
+        return cls(direction, own[order], of_wall[order], lows, highs, reach, gaps)
+
+    def bare_up_to(self, x: float) -> float:
+        """Return the length without pieces from the first of them to an abscissa, negative before it, metres."""
+        k = int(np.searchsorted(self.lows, x, side="right"))
+        if k == 0:
+            return float(x - self.lows[0])
+        return float(self.gaps[k - 1] + max(0.0, x - self.reach[k - 1]))
+
+    def lay(self, low: float, high: float, own: int) -> tuple[int, float, tuple[int, ...]]:
+        """Return the piece that a segment between two abscissae lies on most, its overlap, and the other pieces.
+
+        One that covers over half of it and is of its own wall comes first; of equal ones the first of the map.
+        """
+        end = int(np.searchsorted(self.lows, high, side="right"))
+        begin = max(int(np.searchsorted(self.reach, low, side="right")), end - MOST_UNDER)
+        if begin >= end:  # it lies beside all of them: on the nearest
+            begin, end = max(0, min(begin, len(self.lows) - 1) - 1), min(len(self.lows), max(end, 1) + 1)
+        some = slice(begin, end)
+        overlaps = np.minimum(self.highs[some], high) - np.maximum(self.lows[some], low)
+        on_own = (overlaps > 0.5 * (high - low)) & (self.walls[some] == own)
+        most = int(np.lexsort((self.pieces[some], -overlaps, ~on_own))[0])
+        covered = 0.0
+        if overlaps[most] > 0.0:
+            bare = self.bare_up_to(high) - self.bare_up_to(low)
+            covered = max(0.0, 1.0 - bare / max(high - low, MIN_EXTENT))
+        others = np.flatnonzero(overlaps > 0.0)
+        others = others[others != most][:MAX_OTHERS]
+        return int(self.pieces[some][most]), covered, tuple(map(int, self.pieces[some][others]))
 
 
-def overlaps_at(context: SearchContext, best: ConsensusSet, accepted: Accepted, pose: RigidTransform) -> Floats:
-    """Return the fraction of each accepted segment that lies on its wall, or chain, at a pose in the map, (n,)."""
-    index, ends = context.index, context.ends
-    at = best.estimate.copy()
-    at["x"], at["y"], at["theta"] = pose.x - index.origin[0], pose.y - index.origin[1], pose.theta
-    every = Lines(context.lines.rows, context.lines.row_of, 0.0)  # however little of a segment lies there
-    pairs, overlaps, _, _ = accept_matches(best.matches, every, ends, at, index.walls.rows, index.pieces)
-    fractions: Floats = overlaps[np.searchsorted(pairs[:, 0], accepted.pairs[:, 0])]
-    return fractions
+def accept(context: SearchContext, best: ConsensusSet, pose: RigidTransform) -> Accepted:
+    """Pick for every matched scan segment the piece of its wall that it lies on most at a pose; ties by index.
+
+    A scan line consists of several segments. Of these, one that hardly lies on the wall is left out. The pose is index
+    frame from scan frame.
+    """
+    index, row_of = context.index, context.lines.row_of
+    wall_of = best.matches["wall"][row_of]
+    segments = np.flatnonzero(wall_of >= 0)
+    walls = wall_of[segments]
+    ends = pose.apply(context.scan.measured.segments.endpoints[segments].reshape(-1, 2, 2))
+    pieces, overlaps = np.empty(len(segments), np.intp), np.empty(len(segments))
+    others: list[tuple[int, ...]] = [()] * len(segments)
+    first = index.pieces.starts[walls]
+    rows = index.walls.rows[walls]
+    single = (index.pieces.starts[walls + 1] - first == 1) & (rows["before"] < 0) & (rows["after"] < 0)
+    # Most walls are one piece of the map.
+    pieces[single] = index.pieces.items[first[single]]
+    along = np.sort(ends[..., 0] * rows["dx"][:, None] + ends[..., 1] * rows["dy"][:, None], axis=1)
+    covered = np.minimum(along[:, 1], rows["end"]) - np.maximum(along[:, 0], rows["begin"])
+    overlaps = np.clip(covered / np.maximum(along[:, 1] - along[:, 0], MIN_EXTENT), 0.0, 1.0)
+    chains: dict[int, _Chain] = {}
+    for k in np.flatnonzero(~single).tolist():
+        wall = int(walls[k])
+        key = int(index.pieces.firsts[wall])
+        chain = chains.get(key) or chains.setdefault(key, _Chain.of(index, wall))
+        low, high = sorted((ends[k] @ chain.direction).tolist())
+        pieces[k], overlaps[k], more = chain.lay(low, high, wall)
+        others[k] = tuple(other % index.directed for other in more)
+    several = np.bincount(row_of, minlength=len(best.matches))[row_of[segments]] > 1
+    kept = np.flatnonzero((overlaps >= context.gates["least_overlap"][0]) | ~several)
+    return Accepted(
+        np.stack([segments[kept], pieces[kept]], axis=1), overlaps[kept], tuple(others[k] for k in kept.tolist())
+    )
 
 
 def register_accepted(
-    context: SearchContext, best: ConsensusSet, accepted: Accepted, estimated: EstimatedPose, *, fitted: bool = True
-) -> tuple[RegistrationResult, EstimatedPose] | None:
-    """Register the scan by the pairs, with the estimated error of walls, and take that pose; None without pairs.
+    context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float, at: RigidTransform | None
+) -> RegistrationResult:
+    """Register the scan by the pairs, with the walls' error; or evaluate the pairs at a pose in the map frame.
 
-    So a caller who registers by the same pairs and weights gets the same pose. The estimated pose is evaluated on the
-    pairs instead if it is not fixed, if views are not exact, or unless it is to be `fitted`. With the paper's estimator
-    a pose of its own is fitted.
+    Pairs on the same wall, or on tied walls, see the same error of it. So each has the weight ``w / (1 + s^2 W)``: w is
+    its own information, ``1 / sigma^2`` times its points, W that of all pairs on its wall, and s the wall's standard
+    deviation. What another segment of the same line shows already is not counted again.
     """
-    if not len(accepted.pairs):
-        return None
     index, options, measured = context.index, context.options, context.scan.measured
-    sigma = estimated.wall_sigma if index.sigma is None else index.sigma
+    sigma = wall_sigma if index.sigma is None else index.sigma
     weights = _weights(context, best, accepted, sigma)
+    if weights is None and index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
+        sigma = wall_sigma  # nothing at all is known to be off, and pairs need a weight
     fit = _options(options.estimator, options.rotation)
     if weights is not None:
-        fit = replace(fit, weights=weights)
-    elif index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
-        sigma = estimated.wall_sigma  # nothing at all is known to be off, and pairs need a weight
-    if options.estimator == "one_step":
-        return register(index.segments, measured, accepted.pairs, sigma, fit), estimated
-    if fitted and estimated.views is None and not estimated.free and not estimated.degenerate:
-        found = register(index.segments, measured, accepted.pairs, sigma, fit)
-        if found.covariance is not None and found.pose is not None:
-            return found, replace(estimated, pose=context.in_index(found.pose), covariance=found.covariance)
-    at = context.in_map(estimated.pose)
-    return register(index.segments, measured, accepted.pairs, sigma, fit, at), estimated
+        fit = RegistrationOptions(estimator=options.estimator, rotation=options.rotation, weights=weights)
+    at = None if options.estimator == "one_step" else at
+    return register(index.segments, measured, accepted.pairs, sigma, fit, at)
 
 
 @lru_cache
@@ -110,12 +178,7 @@ def _options(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
 
 
 def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:
-    """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have.
-
-    Evidence of several segments for one line counts once. The error of a wall that several pairs lie on counts once,
-    too: each pair takes a part of the wall's variance. A pair alone on its wall has
-    ``1 / (sigma^2 / points + wall_sigma^2)``.
-    """
+    """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have."""
     rows = context.lines.row_of[accepted.pairs[:, 0]]
     walls = best.matches["wall"][rows]
     ties = context.index.ties[walls]
@@ -123,68 +186,36 @@ def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wal
         return None
     given = Correspondences.of(context.index.segments, context.scan.measured, accepted.pairs)
     alone = _not_shown_before(given, rows) / np.maximum(given.variances, LEAST_KNOWN_VARIANCE**2)
-    weights: Floats = alone / (1.0 + wall_sigma**2 * _known_together(alone, walls, ties))
-    return np.where(weights >= MIN_WEIGHT, weights, 0.0)
-
-
-def _known_together(alone: Floats, walls: NDArray[np.int32], ties: Floats) -> Floats:
-    """Return the information of all pairs on each pair's wall, (n,) 1/m^2; as far as their own walls are one with it.
-
-    Some pairs at a time are compared with all, so that the memory grows with their number, not with its square.
-    """
     together = np.empty(len(alone))
     step = max(1, PAIRS_COMPARED // max(1, len(alone)))
     for begin in range(0, len(alone), step):
-        some = slice(begin, begin + step)
-        here, there = ties[some, None], walls[some, None]
+        here, there = ties[begin : begin + step, None], walls[begin : begin + step, None]
         tied = (here >= 0.0) & (ties >= 0.0)
-        together[some] = np.where(there == walls, 1.0, np.where(tied, np.exp(-np.abs(here - ties)), 0.0)) @ alone
-    return together
+        one_wall = np.where(there == walls, 1.0, np.where(tied, np.exp(-np.abs(here - ties)), 0.0))
+        together[begin : begin + step] = one_wall @ alone
+    weights: Floats = alone / (1.0 + wall_sigma**2 * together)
+    return np.where(weights >= MIN_WEIGHT, weights, 0.0)
 
 
 def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
     """Return the fraction of each scan segment that no longer one of its line covers, (n,), of equal ones the first."""
     fractions = np.ones(len(rows))
-    for row in np.flatnonzero(np.bincount(rows) > 1):
+    for row in np.flatnonzero(np.bincount(rows) > 1).tolist():
         members = np.flatnonzero(rows == row)
         members = members[np.argsort(-given.lengths[members], kind="stable")]
         along = given.directions[members[0]]
-        middles = given.midpoints[members] @ along
-        reach = 0.5 * given.lengths[members]
-        covered = _Intervals()
+        middles, reach = given.midpoints[members] @ along, 0.5 * given.lengths[members]
+        edges = np.unique(np.concatenate([middles - reach, middles + reach]))
+        free = np.diff(edges)
         for member, low, high in zip(members.tolist(), middles - reach, middles + reach, strict=True):
-            fractions[member] = max(0.0, 1.0 - covered.add(float(low), float(high)) / float(high - low))
+            own = slice(*np.searchsorted(edges, (low, high)).tolist())
+            fractions[member] = float(free[own].sum()) / max(high - low, MIN_EXTENT)
+            free[own] = 0.0
     return fractions
 
 
-class _Intervals:
-    """Disjoint closed intervals, by where they begin, and when each was added."""
-
-    def __init__(self) -> None:
-        self._lows: list[float] = []
-        self._highs: list[float] = []
-        self._added: list[int] = []
-        self._count = 0
-
-    def add(self, low: float, high: float) -> float:
-        """Unite an interval with those that it meets; return how much of it they covered before."""
-        met = slice(bisect_left(self._highs, low), bisect_right(self._lows, high))
-        lows, highs = self._lows[met], self._highs[met]
-        # In the order in which they were added, on which the last bit of the sum depends.
-        by_age = sorted(zip(self._added[met], lows, highs, strict=True))
-        covered = sum(max(0.0, min(high, b) - max(low, a)) for _, a, b in by_age)
-        self._lows[met], self._highs[met] = [min([low, *lows])], [max([high, *highs])]
-        self._added[met] = [self._count]
-        self._count += 1
-        return covered
-
-
-def correspondences(
-    index: MapIndex, accepted: Accepted, overlaps: Floats, registered: RegistrationResult
-) -> tuple[Correspondence, ...]:
-    """Report the consensus set by scan index, with its reported overlaps, (n,)."""
-    others, starts = (accepted.others % index.directed).tolist(), accepted.other_starts.tolist()
-    columns = (overlaps, registered.offsets, registered.angles, registered.weights)
-    alternatives = (tuple(others[begin:end]) for begin, end in pairwise(starts))
+def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:
+    """Report the consensus set by scan index."""
+    columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
     values = (column.tolist() for column in columns)
-    return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives))
+    return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, accepted.others))

@@ -1,57 +1,127 @@
-"""Single beams as evidence: which of them read the wall that they should at a pose."""
+"""The table of beams: what the map shows each beam at each pose, and what follows from it."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numpy.typing import ArrayLike
 
 from registration.layout import Floats, Records
 
 from ..context import SearchContext
-from ..layout import BEAM, BEAM_EVIDENCE
-from ..tables import Rays
+from ..layout import BEAM_SCRATCH, SHOWN, Integers, record
+from ..scan.beams import BeamSet
 from ..tuning import MOST_LOOKED_AT
-from .kernels.beams import weigh_beams
-from .tuning import BEAMS_PASSED, BEAMS_READ
+from .consensus_set import BeamEvidence
+from .kernels.rays import cast_beams, move_to_beams
+from .tuning import (
+    BEAM_GATES,
+    BEAMS_PASSED,
+    BEAMS_READ,
+    BLOCKED,
+    BLOCKING_LENGTH,
+    BLOCKING_RAYS,
+    CERTAIN,
+    LEAST_INCIDENCE,
+    NEAR,
+    SIGHT_TOLERANCE,
+    SURE_LENGTH,
+    WALL_BEHIND,
+)
+
+GATES = np.array(BEAM_GATES)
 
 
-def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
-    """Return the evidence of at most `most` of the beams at each pose, (k,) of `BEAM_EVIDENCE`.
+def cast(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
+    """Return what the map shows each beam at each pose, (k, m) of `SHOWN`; nothing where rays cannot be followed.
 
-    Moves the first `refined` of the poses. The evidence of poses not reached before the deadline is 0, and all of it if
-    rays cannot be followed.
+    Beams end at points of the map as at walls. One that passes a point is compared with the walls alone, so that points
+    never speak against a pose.
     """
-    evidence, rays = np.zeros(len(poses), BEAM_EVIDENCE), rays_of(context, most)
-    place, obstacles = context.index.tables.place, context.index.obstacles
-    step = max(1, int(MOST_LOOKED_AT / (1.0 + context.looks)))
-    for begin in range(0, len(poses) if context.can_look else 0, step):
-        if begin > 0 and context.deadline.passed:
+    table, index = np.zeros((len(poses), len(beams)), SHOWN), context.index
+    table["wall"] = -1
+    if not context.can_look or not len(beams):
+        return table
+    step = max(1, int(MOST_LOOKED_AT / (1.0 + len(beams) * index.across * index.most_near)))
+    for begin in range(0, len(poses), step):
+        if begin and context.deadline.passed:
             break
-        some, moved = slice(begin, begin + step), max(0, refined - begin)
-        weigh_beams(rays, poses[some], place, obstacles, moved, context.workspace, evidence[some])
-    return evidence
+        some = slice(begin, begin + step)
+        cast_beams(beams.rows, beams.reach, WALL_BEHIND, poses[some], index.obstacles, table[some])
+        if len(index.points):
+            walls = np.zeros_like(table[some])
+            cast_beams(beams.rows, beams.reach, WALL_BEHIND, poses[some], index.tables.place, walls)
+            passed = table["wall"][some] >= len(index.walls.rows)
+            passed &= beams.rows["range"] - table["distance"][some] > CERTAIN
+            table[some][passed] = walls[passed]
+    return table
 
 
-def rays_of(context: SearchContext, most: int) -> Rays:
-    """Return at most `most` of the beams of which something is known, evenly spread."""
-    beams = context.scan.beams
-    assert beams is not None
-    known = np.flatnonzero(~np.isnan(beams.ranges))
-    chosen = known[:: max(1, math.ceil(len(known) / most))]
-    begins = (context.scan.viewpoint or (0.0, 0.0)) if beams.origins is None else beams.origins[chosen].T
-    return Rays(beam_rows(begins, beams.angles[chosen], beams.ranges[chosen]), beams.range_max)
+def evidence_of(context: SearchContext, beams: BeamSet, table: Records, wider: float = 1.0) -> BeamEvidence:
+    """Return what beams say at poses, all of (k, m), by a table of what the map shows; gates `wider` times as wide."""
+    ranges, obstacles = beams.rows["range"], context.index.obstacles.walls
+    lengths = obstacles["end"] - obstacles["begin"]
+    known = (table["wall"] >= 0) & np.isfinite(ranges)
+    with np.errstate(invalid="ignore"):
+        off = (ranges - table["distance"]) * np.maximum(LEAST_INCIDENCE, table["incidence"])
+        across = np.where(known, off, np.nan)
+        read = np.where(known, np.exp(-0.5 * (across / (NEAR * wider)) ** 2), 0.0)
+        passed = np.where(across > CERTAIN * wider, np.minimum(1.0, lengths[table["wall"]] / SURE_LENGTH), 0.0)
+    return BeamEvidence(table, across, read, passed)
 
 
-def beam_rows(begins: ArrayLike, angles: Floats, ranges: Floats) -> Records:
-    """Return beams as records (n,) of `BEAM`, of where they begin, (2,) for all of them or (2, n), m."""
-    rows = np.empty(len(angles), BEAM)
-    rows["x"], rows["y"] = np.asarray(begins)
-    rows["dx"], rows["dy"], rows["range"] = np.cos(angles), np.sin(angles), ranges
-    return rows
+def at_pose(evidence: BeamEvidence, k: int) -> BeamEvidence:
+    """Return the evidence at one of several poses."""
+    return BeamEvidence(evidence.shown[k], evidence.across[k], evidence.read[k], evidence.passed[k])
 
 
-def beam_score(evidence: Records) -> Floats:
-    """Return the term of beams in the score of each pose, nats, over one where none reads what it should."""
-    return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])
+def score_of_beams(beams: BeamSet, evidence: BeamEvidence) -> Floats:
+    """Return the term of a laser's beams in the score of each pose, (k,) nats."""
+    total = max(1e-9, float(beams.weights.sum()))
+    return np.asarray((BEAMS_READ * evidence.read - BEAMS_PASSED * evidence.passed) @ beams.weights / total)
+
+
+def passed_walls(beams: BeamSet, table: Records, matched: Integers) -> tuple[Integers, Integers, Floats, Floats]:
+    """Return the walls that rays to lines pass through well before their end, and how many rays do.
+
+    Parameters
+    ----------
+    beams : BeamSet
+        Rays to lines.
+    table : (k, m) of `SHOWN`
+    matched : (k, n) bool
+        Which lines are matched at each pose.
+
+    Returns
+    -------
+    poses, walls : (p,)
+    to_matched, to_clutter : (p,) float64
+        Rays to matched lines and to others, at most from any one view.
+    """
+    passes = (table["wall"] >= 0) & (beams.line >= 0)
+    passes &= beams.rows["range"] - SIGHT_TOLERANCE > table["distance"]
+    pose, beam = np.nonzero(passes)
+    wall, sensor = table["wall"][pose, beam], beams.sensor[beam]
+    walls, sensors = int(wall.max(initial=0)) + 1, int(sensor.max(initial=0)) + 1
+    keys, place = np.unique((pose * walls + wall) * sensors + sensor, return_inverse=True)
+    to_matched = np.bincount(place, matched[pose, beams.line[beam]], len(keys))
+    to_clutter = np.bincount(place, None, len(keys)) - to_matched
+    pairs, of = np.unique(keys // sensors, return_inverse=True)
+    counts = np.zeros((2, len(pairs)))
+    np.maximum.at(counts[0], of, to_matched)
+    np.maximum.at(counts[1], of, to_clutter)
+    return pairs // walls, pairs % walls, counts[0], counts[1]
+
+
+def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matched: Integers) -> Floats:
+    """Return the penalty of lines of sight at each pose, (k,) nats: for walls that should have blocked the view."""
+    poses, walls, to_matched, to_clutter = passed_walls(beams, table, matched)
+    rows = context.index.obstacles.walls[walls]
+    lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
+    rays = np.minimum(1.0, to_matched / BLOCKING_RAYS) + np.minimum(1.0, to_clutter / BLOCKING_RAYS)
+    return np.bincount(poses, BLOCKED * lengths * rays, len(table))
+
+
+def moved_to_beams(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
+    """Return poses, (k,) of `ESTIMATE`, moved to where the ends of the beams lie on walls."""
+    moved = poses.copy()
+    move_to_beams(beams.rows, moved, context.index.tables.place, GATES, record(BEAM_SCRATCH))
+    return moved

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform
+from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
 from registration.values import value
 
-from ..layout import ESTIMATE, MATCH
-from ..options import Estimator
-from .tuning import BEAMS_PASSED, BEAMS_READ
+
+@value(frozen=True, slots=True)
+class BeamEvidence:
+    """What the beams say at a pose, (m,) each.
+
+    Attributes
+    ----------
+    shown : Records
+        Of `SHOWN`: what the map shows each beam.
+    across : float64
+        By how much a beam reads farther than the map shows, metres across the wall; nan where the map shows no wall, or
+        the beam nothing.
+    read, passed : float64
+        How far a beam reads the wall that it should, and how far it passed through it, 0 to 1.
+    """
+
+    shown: Records
+    across: Floats
+    read: Floats
+    passed: Floats
 
 
 @value(frozen=True, slots=True)
@@ -24,56 +41,34 @@ class ConsensusSet:
     Attributes
     ----------
     estimate : (1,) of `ESTIMATE`
-        Index frame from scan frame; the covariance has the model's slack in it.
+        Index frame from scan frame, with the covariance by the search's model.
     score : float
-        Log-likelihood over that of a scan that is all clutter, nats; without the prior.
+        With beams and lines of sight, nats, over a scan that is all clutter.
     posterior : float
-        Score and prior together, nats.
+        Score and prior.
     inside : bool
-        True if it lies within a hard prior's window, and without one.
+        True unless it lies outside the window of a hard prior.
+    by_pairs : float
+        The score of the pairs alone: gains less half of the chi-square, less the log-determinant.
     chi_square : float
-        Of the offsets and angles of all pairs; the score takes half of it.
-    one_step_chi_square : float
-        Of the same pairs at the paper's estimate, Wahba's rotation first.
-    length : float
-        Of the matched segments together, metres.
-    fraction : float
-        Of the scan's length that is matched, 0 to 1.
-    misfit : float
-        Mean squared offset over what the sigmas alone expect.
-    blocked : float
-        Penalty in the score for lines of sight through walls, nats.
-    read, passed : float
-        Fractions of the beams that read the wall they should, and that passed through one; 0 without beams.
-    count : float
-        Rows of the scan that are matched; those that hardly are count in part.
+    sums : (1,) of `JOINT_SUMS`
+        Walls' own errors eliminated.
     matches : (n,) of `MATCH`
-        By row of the scan.
+    parts : (n,)
+        How much of each match there is, 0 to 1: one that scores little counts in part.
+    evidence : BeamEvidence
     """
 
     estimate: Records
     score: float
     posterior: float
     inside: bool
+    by_pairs: float
     chi_square: float
-    one_step_chi_square: float
-    length: float
-    fraction: float
-    misfit: float
-    blocked: float
-    read: float
-    passed: float
-    count: float
+    sums: Records
     matches: Records
-
-    @classmethod
-    def of(
-        cls, estimate: Records, scores: tuple[float, ...], matches: Records, *, posterior: float, inside: bool
-    ) -> ConsensusSet:
-        """Return the set of a record of `SET_SCORE`, given as a tuple, and of the other arguments by name."""
-        score, chi_square, one_step, length, fraction, misfit, blocked, read, passed, count = scores
-        sums, seen = (chi_square, one_step), (length, fraction, misfit, blocked)
-        return cls(estimate, score, posterior, inside, *sums, *seen, read, passed, count, matches)
+    parts: Floats
+    evidence: BeamEvidence
 
     @property
     def pose(self) -> RigidTransform:
@@ -82,46 +77,17 @@ class ConsensusSet:
         return RigidTransform(x, y, theta)
 
     @property
-    def scores(self) -> tuple[float, ...]:
-        """The same numbers in the order of `SET_SCORE`."""
-        sums = self.score, self.chi_square, self.one_step_chi_square
-        seen = self.length, self.fraction, self.misfit, self.blocked
-        return *sums, *seen, self.read, self.passed, self.count
-
-    @property
-    def by_segments(self) -> float:
-        """The score without the beams' part."""
-        return self.score - BEAMS_READ * self.read + BEAMS_PASSED * self.passed
-
-    def score_by(self, estimator: Estimator) -> float:
-        """Return the score by the sums at an estimator's pose; that of the joint one orders and judges."""
-        return self.score if estimator == "joint" else self.score + 0.5 * (self.chi_square - self.one_step_chi_square)
-
-    @property
-    def covariance(self) -> Floats:
-        """Of additive (x, y, theta), (3, 3)."""
-        _, _, _, xx, xy, xt, yy, yt, tt = self.estimate[0].item()
-        return np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation of the position along its weakest direction, metres."""
-        _, _, _, xx, xy, _, yy, _, _ = self.estimate[0].item()
-        return math.sqrt(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy))
-
-    @property
     def matched(self) -> NDArray[np.bool_]:
         """Which rows of the scan are matched, (n,)."""
         found: NDArray[np.bool_] = self.matches["wall"] >= 0
         return found
 
+    @property
+    def free(self) -> bool:
+        """Return whether a direction of the position is open: its deviation exceeds 0.5 m."""
+        _, _, _, xx, xy, _, yy, _, _ = self.estimate[0].item()
+        return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2
 
-def poses_of(sets: Sequence[ConsensusSet]) -> Records:
-    """Return the poses of consensus sets for the kernels, (k,) of `ESTIMATE`."""
-    return np.frombuffer(bytearray().join(one.estimate.tobytes() for one in sets), ESTIMATE)
-
-
-def matches_of(sets: Sequence[ConsensusSet]) -> Records:
-    """Return the matches of consensus sets for the kernels, (k, n) of `MATCH`."""
-    together = bytearray().join(one.matches.tobytes() for one in sets)
-    return np.frombuffer(together, MATCH).reshape(len(sets), -1)
+    def fraction(self, lines: Records) -> float:
+        """Return the fraction of the scan's length that is matched."""
+        return float(self.parts @ lines["length"]) / float(lines["length"].sum())

@@ -31,10 +31,6 @@ START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
 # Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
 # of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.
 RANKED_AT_ONCE = 200_000
-# Work between two looks at the clock while poses are estimated: pairs of scan lines. Some 20 ms; of fewer than 140
-# lines all poses that are returned.
-ESTIMATED_AT_ONCE = 1_000_000
-SORTED_BY_INSERTION = 64  # walls; of more an order by insertion takes longer than by merging
 PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at a time; 2 MB for each table
 
 # --- Estimation: the pose with the error of the map's walls -----------------------------------------------------------
@@ -68,17 +64,14 @@ FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of s
 
 # --- Beams ------------------------------------------------------------------------------------------------------------
 
-FEW_BEAMS = 60  # tables; for a first look: neighbouring beams say the same
-MOST_BEAMS = 180  # tables
-BEAM_FINALISTS = 32  # tables
-# When the deadline has passed so many candidates are looked at, and of them so many finalists. Measured.
-LATE_CANDIDATES = 16
-LATE_FINALISTS = 2
+FIRST_RANKED = 64  # tables; poses that are looked at with
+FEW_BEAMS = 60  # beams, tables: neighbouring beams say the same
+BEAM_FINALISTS = 16  # tables
+LATE_FINALISTS = 2  # measured; when the deadline has passed
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
 BEAMS_PASSED = 0.5 * BEAMS_READ  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
 CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
-BEHIND = 2.0  # m, tables; how far behind a reading a wall is looked for
 LEAST_INCIDENCE = 0.15  # cosine, tables; nearer to grazing the pose decides too much
 LEAST_POINTS = 10  # tables; for the beams to move a pose
 BEAM_GATES = (0.35, 0.25, 0.15, 0.15)  # m, tables; of the rounds in which they do
@@ -89,12 +82,11 @@ SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have 
 
 # --- Agreement: the view of the scan, compared with that of the map ---------------------------------------------------
 
-AGREEING = 0.2  # m, tables; a scan segment and a wall nearer to each other than that, and
+AGREEING = 0.2  # m, tables; a beam and a wall nearer to each other than that, and
 AGREEING_FRACTION = 0.02  # of the distance more, agree
-MISSING_RANGE = 15.0  # m, tables; a wall nearer than that, within the reach of the scan,
+MISSING_RANGE = 15.0  # m, tables; a wall nearer than that,
 MISSING_LENGTH = 0.8  # m, tables; as long,
-MISSING_SINE = 0.3  # tables; and not seen at a grazing angle, should have left a segment
-BLIND_FRACTION = 0.25  # of the circle, tables; a wider gap without any segment is out of the sensor's view
+MISSING_SINE = 0.3  # tables; and not seen at a grazing angle, should be seen where nothing is
 NEUTRAL = 0.8  # tables; where there is nothing to compare
 
 # --- Acceptance: correspondences with the map's own segments ----------------------------------------------------------
@@ -106,9 +98,9 @@ MIN_EXTENT = 1e-9  # m, rounding; least length that a segment along a wall count
 CONTRADICTION = GAIN  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls
 
-# --- Similarity: a pose together with a factor ------------------------------------------------------------------------
+# --- Estimation: unknowns beyond the pose, and their standard deviations before anything is seen ----------------------
 
-TRIMMED_FITS = 3  # tables
-TRIMMED_LINES = 4  # geometry: as many unknowns
-TRIMMED_OUTLIER = 3.0  # times the median, tables; ends of scan lines that are farther off are on wrong walls
-LEAST_TRIMMED = 1e-3  # m, rounding; of that median
+OFFSET_DEVIATION = 0.05  # m, tables; of the walls along the rays: a bias of ranges, or the walls of a grid
+STRAIN_DEVIATION = 0.004  # tables; of the map around the sensor
+TURN_DEVIATION = 0.1  # rad, tables; of the sensor during a scan: 1 rad/s for a tenth of a second
+SHOWN_DEVIATIONS = 1.5  # tables; a column that is nearer to 0 is noise

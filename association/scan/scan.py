@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,6 +116,9 @@ class Scan:
         True unless the scan was made of points that are not in scanning order.
     warnings : tuple of AssociationWarning
         Defects of how it was taken; each answer has them.
+    sweep_s : float or None
+        Seconds from the first beam to the last, during which the sensor may have turned; 0 if its motion is known and
+        corrected, or none; None if the duration is not known.
     """
 
     measured: MeasuredSegments
@@ -123,6 +127,12 @@ class Scan:
     views: Views | None = None
     ordered: bool = True
     warnings: tuple[AssociationWarning, ...] = ()
+    sweep_s: float | None = None
+
+    @property
+    def still(self) -> bool:
+        """Return whether the sensor is known not to have turned, or its motion is corrected."""
+        return self.sweep_s == 0.0
 
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
@@ -133,7 +143,9 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
     measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
-    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings)
+    return Scan(
+        measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings, scan.sweep_s
+    )
 
 
 def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
@@ -163,4 +175,49 @@ def scaled(scan: Scan, factor: float) -> Scan:
     )
     place = at and (at[0] * factor, at[1] * factor)
     views = views and views.scaled(factor)
-    return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings)
+    return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings, scan.sweep_s)
+
+
+def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, float]) -> Scan:
+    """Return a scan with its lengths from the sensor times a factor, and turned back by how its sensor turned.
+
+    Parameters
+    ----------
+    scan : Scan
+        Of one place.
+    factor : float
+    turn : float
+        Radians from the first beam to the last; the heading is that in the middle of the sweep.
+    sensor : (float, float)
+        The sensor's place in the scan frame, metres; it stays.
+    """
+    if factor != 1.0:
+        at = scan.viewpoint and (
+            sensor[0] + factor * (scan.viewpoint[0] - sensor[0]), sensor[1] + factor * (scan.viewpoint[1] - sensor[1])
+        )  # fmt: skip
+        larger, (x, y) = scaled(scan, factor), ((1.0 - factor) * sensor[0], (1.0 - factor) * sensor[1])
+        seen, beams = larger.measured, larger.beams
+        ends = Segments.derived(seen.segments.endpoints + [x, y, x, y])
+        if beams is not None and beams.origins is not None:
+            beams = replace(beams, origins=beams.origins + [x, y])
+        scan = replace(larger, measured=replace(seen, segments=ends, centroids=seen.centroids + [x, y]), beams=beams)
+        scan = replace(scan, viewpoint=at)
+    if turn == 0.0 or scan.beams is None:
+        return scan
+    first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
+    centre, way, sweep = np.array(sensor), math.copysign(1.0, last - first), abs(last - first)
+
+    def turned(points: Floats) -> Floats:
+        """Turn points by when they were seen."""
+        away = points - centre
+        bearings = way * (np.arctan2(away[:, 1], away[:, 0]) - first) % math.tau
+        angles = turn * (bearings / sweep - 0.5)
+        c, s = np.cos(angles), np.sin(angles)
+        return np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], axis=1) + centre
+
+    seen = scan.measured
+    # A line through the sensor's sweep is seen bent: its middle and its ends are turned by the time of each.
+    begins, finishes = turned(seen.segments.endpoints[:, :2]), turned(seen.segments.endpoints[:, 2:])
+    measured = replace(seen, segments=Segments.derived(np.hstack([begins, finishes])), centroids=turned(seen.centroids))
+    angles = scan.beams.angles + turn * (np.abs(scan.beams.angles - first) / sweep - 0.5)
+    return replace(scan, measured=measured, beams=replace(scan.beams, angles=angles))

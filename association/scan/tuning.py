@@ -53,3 +53,8 @@ LEAST_OVERLAP = 1e-3  # rounding, and as much less than all of a segment: its en
 
 EXTENT_ANGLES = 18  # directions in which a scan's extent is looked for, geometry
 OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie outside of the map
+
+# --- Beams of segments ------------------------------------------------------------------------------------------------
+
+END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
+BLIND_FRACTION = 0.25  # of the circle, tables; a wider gap without any segment is out of the sensor's view

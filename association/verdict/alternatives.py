@@ -1,21 +1,4 @@
-"""Estimate how probable the best explanation is among its alternatives: perceptual aliasing.
-
-Alternatives are compared three times.
-
-- As they were scored.
-- By what the scan shows. Suppose two rooms are equal but for a cupboard that the map shows in one of them. Today the
-  cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But a
-  single removed cupboard explains all of these beams. If another place explains everything that the scan does
-  show, each thing that is missing there counts little therefore, however many beams miss it.
-- With walls taken to be off by more than the answer shows. Suppose a building repeats itself and its map is
-  centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.
-  The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A
-  misfit of centimetres is therefore no evidence against a place.
-
-None of the three is right for every map. A weighted mean of their logarithms agrees best with how often answers are
-right; it leaves places that are equal in all three the same probability. The least of the three decides whether an
-answer is usable: one thing that may have been moved, or centimetres, must not decide alone.
-"""
+"""Compare the best explanation with its alternatives: perceptual aliasing."""
 
 from __future__ import annotations
 
@@ -27,161 +10,164 @@ import numpy as np
 from registration.layout import Floats, Records
 from registration.values import value
 
-from ..consensus.beams import rays_of
+from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
-from ..consensus.ranking import score_again
-from ..consensus.tuning import MOST_BEAMS, NEAR
+from ..consensus.ranking import score
+from ..consensus.tuning import BEAMS_PASSED, BEAMS_READ, BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, NEAR, SIGHT_TOLERANCE
 from ..context import SearchContext
-from ..explanations import Answer
-from ..layout import ALTERNATIVE, COMPARED
+from ..layout import ESTIMATE
+from ..scan.beams import together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
-from .inconsistencies import absences, readings_of
-from .kernels import alternatives as kernels
 from .tuning import (
-    ABSENCE,
-    COMPARISON_WEIGHTS,
-    LOOSE_ALTERNATIVES,
+    COMPARED,
+    COUNTED,
+    LEAST_OF_BEAM,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
-    LOOSE_TEMPERATURE,
-    NO_ALTERNATIVE,
+    OF_A_THING,
+    TEMPERATURE,
+    THING_WIDTH,
+    THINGS_APART,
+    UNCOUNTED,
 )
 
 
-def compare_alternatives(best: ConsensusSet, others: Sequence[ConsensusSet]) -> Records:
-    """Compare the best explanation with others; return (k,) of `ALTERNATIVE`."""
-    explanations = np.array([(one.posterior, one.chi_square, one.count) for one in (best, *others)], COMPARED)
-    alternatives = np.zeros(len(others), ALTERNATIVE)
-    kernels.compare(explanations, alternatives)
-    return alternatives
-
-
-def probability_among(alternatives: Records) -> float:
-    """Return the probability of the best explanation among those that are about as good, above 0 and up to 1."""
-    return kernels.probability_among(alternatives)
-
-
-def probability_by_shown(context: SearchContext, best: ConsensusSet, others: Sequence[ConsensusSet]) -> float:
-    """Return the probability of the best explanation where what the scan does not show counts little, up to 1.
-
-    An alternative is behind by ``shown + min(rest, limit)`` nats. ``shown`` is the difference of the scores of all
-    matches and of the prior. The rest is what lines of sight, beams and the log-determinant make. The limit is
-    `ABSENCE` for each thing that the map shows there and the scan does not, one at least.
-    """
-    if not others:
-        return 1.0
-    shown = np.array([_shown(one) for one in (best, *others)])
-    behind = shown[0] - shown[1:]
-    rest = np.array([best.posterior - one.posterior for one in others]) - behind
-    limits = np.full(len(others), ABSENCE)
-    near = (behind + np.minimum(rest, limits) < NO_ALTERNATIVE + ABSENCE) & (rest > limits)
-    limits[near] = np.maximum(ABSENCE, absences(context, best, [others[k] for k in np.flatnonzero(near).tolist()]))
-    behind += np.minimum(rest, limits)
-    return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind)).sum()))
-
-
 @value(frozen=True, slots=True)
-class AmongAlternatives:
-    """The probability of the best explanation among its alternatives, by three comparisons, above 0 and up to 1.
+class Comparison:
+    """An explanation compared with others, (k,) each.
 
     Attributes
     ----------
-    as_scored : float
-    by_shown : float
-        Things that the scan does not show count little.
-    with_loose_walls : float or None
-        Walls may be off by more; None on an exact map, and after the deadline.
+    others : tuple of ConsensusSet
+    gaps : float64
+        By how much the evidence is greater than that of each other, nats.
+    counted : float64
+        How far each counts, 0 to 1: fully where the search cannot have missed one as good.
     """
 
-    as_scored: float
-    by_shown: float
-    with_loose_walls: float | None
+    others: tuple[ConsensusSet, ...]
+    gaps: Floats
+    counted: Floats
 
     @property
-    def made(self) -> tuple[float, ...]:
-        """The comparisons that were made."""
-        two = self.as_scored, self.by_shown
-        return two if self.with_loose_walls is None else (*two, self.with_loose_walls)
+    def weights(self) -> Floats:
+        """The probability of each other over that of the explanation."""
+        return np.asarray(self.counted * np.exp(-np.clip(self.gaps / TEMPERATURE, -20.0, 500.0)))
 
     @property
-    def mean(self) -> float:
-        """Their geometric mean by `COMPARISON_WEIGHTS`."""
-        weights = COMPARISON_WEIGHTS[: len(self.made)]
-        nats = sum(weight * math.log(one) for weight, one in zip(weights, self.made, strict=True))
-        return math.exp(nats / sum(weights))
-
-    @property
-    def least(self) -> float:
-        """The least of them."""
-        return min(self.made)
+    def probability(self) -> float:
+        """The probability of the explanation among them, 0 to 1."""
+        return 1.0 / (1.0 + float(self.weights.sum()))
 
 
-def compare_three_ways(
-    context: SearchContext, answer: Answer, others: Sequence[ConsensusSet], alternatives: Records
-) -> AmongAlternatives:
-    """Compare an answer with its alternatives, (k,) of `ALTERNATIVE`, in all three ways.
+def compare(
+    context: SearchContext, best: ConsensusSet, others: Sequence[ConsensusSet], wall_sigma: float
+) -> Comparison:
+    """Compare an explanation with the next ones, thing by thing, with walls off by as much as they may be.
 
-    Raises
-    ------
-    CancelledError
-        When the deadline was cancelled.
+    Each explanation is matched again with wide gates, since of many similar places the one that fits best shows smaller
+    errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
+    what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
+    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most.
     """
-    return AmongAlternatives(
-        probability_among(alternatives),
-        probability_by_shown(context, answer.best, others),
-        probability_with_loose_walls(context, answer, others),
-    )
-
-
-def _shown(one: ConsensusSet) -> float:
-    """Return the scores of the matches and of the prior of an explanation, nats."""
-    return float(np.maximum(0.0, one.matches["score"]).sum()) + one.posterior - one.score
-
-
-def probability_with_loose_walls(
-    context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]
-) -> float | None:
-    """Return the probability of the best explanation among the next ones where walls may be off by more, up to 1.
-
-    None where the map is declared to be exact to `LEAST_OFF_WALLS`, and after the deadline.
-
-    Raises
-    ------
-    CancelledError
-        When the deadline was cancelled.
-    """
-    declared = context.index.sigma
-    if context.deadline.passed or (declared is not None and declared < LEAST_OFF_WALLS):
-        return None
+    others = tuple(others[:COMPARED])
     if not others:
-        return 1.0
-    if declared is None:
-        sigma = _loose_sigma(answer.estimated.wall_sigma)
-    else:
-        sigma = min(LOOSE_FACTOR * declared, max(declared, LOOSE_WALLS))
-    lines = ScanLines.of(context.scan, sigma, context.options, context.lines.given)
-    explanations = (answer.best, *others[:LOOSE_ALTERNATIVES])
-    scores = score_again(context.instead(context.scan, lines), explanations)
-    priors = [one.posterior - one.score for one in explanations]
-    posteriors = scores + priors + _loose_beams(context, explanations, math.hypot(sigma, MODEL_OFFSET))
-    weights = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / LOOSE_TEMPERATURE)
-    return 1.0 / (1.0 + float(weights.sum()))
+        return Comparison((), np.zeros(0), np.zeros(0))
+    sets = (best, *others)
+    posteriors = np.array([one.posterior for one in sets])
+    priors = np.array([one.posterior - one.score for one in sets])
+    ratios = posteriors[1:] / posteriors[0] if posteriors[0] > 0.0 else np.ones(len(others))
+    counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
+    evidence = _Evidence.of(context, sets, wall_sigma)
+    gaps = np.array([evidence.gap(0, k) for k in range(1, len(sets))]) + priors[0] - priors[1:]
+    return Comparison(others, gaps, counted)
 
 
-def _loose_beams(context: SearchContext, explanations: Sequence[ConsensusSet], sigma: float) -> Floats:
-    """Return the beams' part of each score, (k,) nats, where a beam reads a wall within some of its deviations.
+@value(frozen=True, slots=True)
+class _Evidence:
+    """What each explanation scores at each place in view.
 
-    Centimetres are left open then, but not whether a thing is there. 0 without beams, and where rays cannot be
-    followed.
+    Attributes
+    ----------
+    values : (k, m) nats
+    distances : (k, m) metres from the sensor, where the thing is that a value speaks of
+    begins, ways : (m, 2) from where each place is seen, and its direction; in the scan frame
+    order : (m,) by sensor and bearing
+    sensors : (m,)
     """
-    if not context.with_beams or not context.can_look:
-        return np.zeros(len(explanations))
-    rays, wider = rays_of(context, MOST_BEAMS), max(1.0, LOOSE_BEAMS * sigma / NEAR)
-    return np.array([readings_of(context, rays, one, wider)[:, 0].sum() for one in explanations])
+
+    values: Floats
+    distances: Floats
+    begins: Floats
+    ways: Floats
+    order: Floats
+    sensors: Floats
+
+    @classmethod
+    def of(cls, context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> _Evidence:
+        sigma = _loose_sigma(context, wall_sigma)
+        loose = context if sigma is None else context.with_scan(
+            context.scan, ScanLines.of(context.scan, sigma, context.options, context.lines.given)
+        )  # fmt: skip
+        wider = 1.0 if sigma is None else max(1.0, LOOSE_BEAMS * math.hypot(sigma, MODEL_OFFSET) / NEAR)
+        estimates = np.empty(len(sets), ESTIMATE)
+        for k, one in enumerate(sets):
+            estimates[k] = one.estimate[0]
+        _, matches = score(loose, estimates)
+        lines = context.rays_to_lines
+        of_lines = _of_lines(context, matches, np.bincount(lines.line, minlength=matches.shape[1]))
+        of_rays = of_lines[:, lines.line]
+        beams = together(lines, context.beams) if context.with_beams else lines
+        table = cast(context, beams, estimates)
+        ranges = beams.rows["range"]
+        distances = np.where(np.isfinite(ranges), ranges, beams.reach) + np.zeros((len(sets), 1))
+        passes = (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
+        distances[passes] = table["distance"][passes]
+        if context.with_beams:
+            own = slice(len(lines), None)
+            read = evidence_of(context, context.beams, table[:, own], wider)
+            weights = context.beams.weights / max(1e-9, float(context.beams.weights.sum()))
+            values = np.hstack([of_rays, weights * (BEAMS_READ * read.read - BEAMS_PASSED * read.passed)])
+        else:
+            rows = context.index.obstacles.walls
+            lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])[table["wall"]]
+            values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
+        begins = np.stack([beams.rows["x"], beams.rows["y"]], axis=1)
+        ways = np.stack([beams.rows["dx"], beams.rows["dy"]], axis=1)
+        order = np.lexsort((np.arctan2(ways[:, 1], ways[:, 0]), beams.sensor))
+        return cls(values, distances, begins, ways, order, beams.sensor)
+
+    def gap(self, one: int, other: int) -> float:
+        """Return by how much one explanation has more evidence than another, each thing within its limit, nats."""
+        more = (self.values[one] - self.values[other])[self.order]
+        differs = np.flatnonzero(np.abs(more) > LEAST_OF_BEAM)
+        if not len(differs):
+            return 0.0
+        more, at = more[differs], self.order[differs]
+        # A thing is where the map shows it to the explanation that it speaks against.
+        away = np.where(more > 0.0, self.distances[other, at], self.distances[one, at])
+        places = self.begins[at] + away[:, None] * self.ways[at]
+        steps = np.hypot(*np.diff(places, axis=0).T)
+        apart = (steps > THINGS_APART) | (np.diff(self.sensors[at]) != 0)
+        first = np.concatenate([[0], np.flatnonzero(apart) + 1])
+        last = np.concatenate([first[1:] - 1, [len(at) - 1]])
+        widths = np.hypot(*(places[last] - places[first]).T)
+        limits = OF_A_THING * np.maximum(1.0, widths / THING_WIDTH)
+        return float(np.clip(np.add.reduceat(more, first), -limits, limits).sum())
 
 
-def _loose_sigma(wall_sigma: float) -> float:
-    """Return the standard deviation of a wall's offset beyond `MODEL_OFFSET`, metres, for an estimate of its whole."""
-    loose = max(LOOSE_WALLS, LOOSE_FACTOR * wall_sigma)
-    return math.sqrt(loose * loose - MODEL_OFFSET * MODEL_OFFSET)
+def _of_lines(context: SearchContext, matches: Records, rays: Floats) -> Floats:
+    """Return the score of each scan line, (k, n) nats, for each of the rays to it."""
+    return np.asarray(np.where(matches["wall"] >= 0, matches["score"], 0.0) / np.maximum(1, rays))
+
+
+def _loose_sigma(context: SearchContext, wall_sigma: float) -> float | None:
+    """Return the deviation of walls' offsets beyond `MODEL_OFFSET`, metres; None where the map is declared exact."""
+    declared = context.index.sigma
+    if declared is None:
+        loose = max(LOOSE_WALLS, LOOSE_FACTOR * wall_sigma)
+        return math.sqrt(loose * loose - MODEL_OFFSET * MODEL_OFFSET)
+    if declared < LEAST_OFF_WALLS:
+        return None
+    return min(LOOSE_FACTOR * declared, max(declared, LOOSE_WALLS))

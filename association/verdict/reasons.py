@@ -2,41 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from registration.values import value
+from collections.abc import Iterable, Mapping
 
 from ..result import Reason, ReasonCode, Status
-from .features import Features
-from .models import USUAL, Model
-from .roles import FEATURES_OF
+from .features import ROLES, Features
+from .model import USUAL, Model
 from .tuning import NO_ALTERNATIVE, TELLING_REASON
 from .vetoes import Veto
-
-
-@value(frozen=True, slots=True)
-class Doubts:
-    """Evidence against an answer, except for its features.
-
-    Attributes
-    ----------
-    status : Status
-    vetoes : tuple of Veto
-        Those that count with the status.
-    not_on_map : bool
-        True if there is little evidence for this map at all.
-    similar_place : bool
-        True if alternatives alone make the answer too uncertain.
-    alone : bool
-        True if no other explanation was found where the prior allows one.
-    """
-
-    status: Status
-    vetoes: tuple[Veto, ...] = ()
-    not_on_map: bool = False
-    similar_place: bool = False
-    alone: bool = False
-
 
 REASON_MESSAGES: Mapping[ReasonCode, str] = {
     "prior_contradicted": "The pose that the scan supports contradicts the prior. Check the prior, or search without "
@@ -55,65 +27,38 @@ REASON_MESSAGES: Mapping[ReasonCode, str] = {
     "scan. Check that the map is up to date.",
     "insufficient_evidence": "The scan has too few walls to distinguish this place from others. Move and scan again.",
 }
-
 # The order of the reasons that do not come from the contributions of the features.
-ORDER: tuple[ReasonCode, ...] = (
-    "prior_contradicted", "search_incomplete", "not_on_map", "unobservable_direction", "insufficient_evidence",
-    "single_wall", "map_mismatch", "similar_place",
+SETTLED: tuple[ReasonCode, ...] = (
+    "prior_contradicted", "search_incomplete", "not_on_map", "unobservable_direction", "similar_place",
 )  # fmt: skip
 
 
-def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:
-    """List why an answer is not usable, the weightiest first.
-
-    Parameters
-    ----------
-    doubts : Doubts
-    features : Features or None
-        Of the best explanation; None where there is none.
-    cautious : Model or None
-        Whose odds fall short.
-    """
-    settled: set[ReasonCode] = {code for veto in doubts.vetoes for code in veto.reasons}
-    if doubts.not_on_map:
-        settled.add("not_on_map")
-    if doubts.similar_place and doubts.status is Status.AMBIGUOUS:
-        settled.add("similar_place")
-    codes = [code for code in ORDER if code in settled]
-    if doubts.status is Status.AMBIGUOUS and features is not None and cautious is not None:
-        codes += [code for code in _weighed(features, cautious, alone=doubts.alone) if code not in settled]
-    sentences = dict(REASON_MESSAGES)
-    sentences |= {veto.reasons[-1]: veto.message for veto in doubts.vetoes if veto.message is not None}
-    return tuple(Reason(code, sentences[code]) for code in codes)
+def reasons_of(
+    status: Status, vetoes: Iterable[Veto], settled: Iterable[ReasonCode], weighed: Iterable[ReasonCode] = ()
+) -> tuple[Reason, ...]:
+    """List why an answer is not usable: vetoes and what is settled in their order, then those of the features."""
+    codes: set[ReasonCode] = {veto.reason for veto in vetoes} | set(settled)
+    listed = [code for code in SETTLED if code in codes]
+    if status is Status.AMBIGUOUS:
+        listed += [code for code in weighed if code not in codes]
+    return tuple(Reason(code, REASON_MESSAGES[code]) for code in listed)
 
 
-def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[ReasonCode]:
-    """Order the reasons by the decrease of the log odds by their features; at least the first of them.
+def taken_by_reason(model: Model, features: Features, on_map: float) -> dict[ReasonCode, float]:
+    """Return for each reason by how much the log odds rise if its features are those of a usual right answer, nats."""
+    here = model.log_odds(features, on_map)
+    taken: dict[ReasonCode, float] = {}
+    for reason in dict.fromkeys(role.reason for role in ROLES.values()):
+        usual = {name: getattr(USUAL, name) for name, role in ROLES.items() if role.reason == reason}
+        taken[reason] = model.log_odds(features._replace(**usual), on_map) - here
+    return taken
 
-    `alone`: whether there is no other explanation; then the lead is the answer's own score.
-    """
-    lacking = taken_by_reason(features, cautious)
-    if alone or features.lead > NO_ALTERNATIVE:
+
+def weighed_reasons(model: Model, features: Features, on_map: float) -> list[ReasonCode]:
+    """Order the reasons by the decrease of the log odds by their features; at least the first of them."""
+    taken = taken_by_reason(model, features, on_map)
+    if features.lead > NO_ALTERNATIVE:
         # Many places explain a little of the scan, and none explains it about as well.
-        lacking["insufficient_evidence"] += max(0.0, lacking.pop("similar_place"))
-    ordered = sorted(lacking, key=lambda code: -lacking[code])
-    return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]
-
-
-def taken_by_reason(features: Features, cautious: Model) -> dict[ReasonCode, float]:
-    """Return for each reason the decrease of the logarithm of the odds by its features, nats."""
-    return {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
-
-
-def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float:
-    """Return the decrease of the logarithm of the odds by some features, nats.
-
-    This is the mean of two differences. One is the loss of a usual right answer if these features become as they are
-    here. The other is the gain of this answer if they become as usual. The mean splits the terms of pairs of features
-    between both.
-    """
-    here = {name: getattr(features, name) for name in names}
-    usual = {name: getattr(USUAL, name) for name in names}
-    loses = cautious.logit(USUAL) - cautious.logit(USUAL._replace(**here))
-    gains = cautious.logit(features._replace(**usual)) - cautious.logit(features)
-    return 0.5 * (loses + gains)
+        taken["insufficient_evidence"] += max(0.0, taken.pop("similar_place"))
+    ordered = sorted(taken, key=lambda code: -taken[code])
+    return [code for k, code in enumerate(ordered) if k == 0 or taken[code] > TELLING_REASON]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from registration import RigidTransform
@@ -11,34 +9,16 @@ from registration import RigidTransform
 from ..consensus.consensus_set import ConsensusSet
 from ..context import SearchContext
 from ..explanations import Answer
-from .tuning import TOLERANCE
 
 
-def beyond_tolerance(context: SearchContext, answer: Answer) -> float:
-    """Return the probability by the covariance that the pose is off by more than `TOLERANCE`, 0 to 1.
-
-    Of the position along its weakest direction, or of the heading. 0 where views are not exact: the error of the
-    steps between them, and of an unknown motion, is the robot's and no property of the place.
-    """
-    views, covariance = context.scan.views, answer.estimated.covariance
-    if answer.estimated.degenerate or (views is not None and views.uncertain):
-        return 0.0
-    xx, xy, yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-    variances = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), covariance[2, 2]
-    within = 1.0
-    for variance, most in zip(variances, TOLERANCE, strict=True):
-        within *= math.erf(most / math.sqrt(2.0 * variance)) if variance > 0.0 else 1.0
-    return 1.0 - within
-
-
-def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTransform | None:
+def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTransform:
     """Choose among poses that differ along the unobservable direction only; a pose that is fixed, if weakly, is that.
 
     The nearest to the prior, else to where the raw beams fit best. Without either it is the one that centres the
     observed segments on the walls that they matched.
     """
-    pose, direction = answer.registered.pose, answer.estimated.direction
-    if pose is None or not answer.estimated.free:
+    pose, direction = answer.pose, answer.estimate.direction
+    if not answer.estimate.free:
         return pose
     anchor = _anchor(context, answer.best)
     u = np.array(direction)

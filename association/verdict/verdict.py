@@ -8,17 +8,19 @@ from dataclasses import replace
 from registration import RigidTransform
 from registration.values import value
 
-from ..consensus.ranking import with_lines_of_sight
 from ..context import SearchContext
 from ..explanations import Answer, Explanations
-from ..result import Reason, Status
-from .features import Description, describe_answer
-from .inconsistencies import displaced_walls, turn_during_scan
-from .probabilities import Probabilities, work_out_probabilities
-from .reasons import REASON_MESSAGES, Doubts, reasons_of
+from ..result import Reason, ReasonCode, Status
+from .alternatives import Comparison, compare
+from .features import Described, Features, describe, with_null
+from .model import MODELS, USUAL, Model
+from .null import find_null
+from .reasons import reasons_of, weighed_reasons
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY
-from .unobservable import beyond_tolerance, choose_along_direction
-from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
+from .unobservable import choose_along_direction
+from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied
+
+NEUTRAL = 0.5  # prior probability at which it is judged whether a scan is of the map at all
 
 
 @value(frozen=True, slots=True)
@@ -33,31 +35,35 @@ class Verdict:
     usable : bool
     pose : RigidTransform or None
         In the map frame; along an unobservable direction the one that was chosen.
-    margin : float or None
-        Score and prior of the best explanation less those of the next, nats; None where no other was found. There
-        may be others below `SearchReport.complete_above` of the score.
-    runner_up : float or None
-        Those of the next over those of the best, never below 0.
     reasons : tuple of Reason
         Why it is not usable, the weightiest first.
     vetoes : tuple of Veto
-        Those that apply and count with the status, in the order of `vetoes.VETOES`.
-    description : Description or None
+        Those that apply, in the order of the table.
+    model : Model or None
+    described : Described or None
         The answer by its features; None without an answer.
-    probabilities : Probabilities or None
-        The numbers behind `probability`; likewise.
+    by_model : float
+        The probability by the model alone, before the alternatives are counted.
+    explained : float
+        Whether the scan explains this place or a similar one, with even odds of being elsewhere.
+    score : float
+        Of the answer, nats.
+    searched_null : bool
+        True if the mirrored scan was searched.
     """
 
     status: Status
     probability: float | None
     usable: bool
     pose: RigidTransform | None
-    margin: float | None
-    runner_up: float | None
     reasons: tuple[Reason, ...]
     vetoes: tuple[Veto, ...] = ()
-    description: Description | None = None
-    probabilities: Probabilities | None = None
+    model: Model | None = None
+    described: Described | None = None
+    by_model: float = 0.0
+    explained: float = 0.0
+    score: float = 0.0
+    searched_null: bool = False
 
     @property
     def complete(self) -> bool:
@@ -67,32 +73,35 @@ class Verdict:
     @property
     def contradicted(self) -> bool:
         """Return whether the prior contradicts the pose."""
-        return contradict_prior(self.vetoes)
+        return any(veto.reason == "prior_contradicted" for veto in self.vetoes)
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """Return the comparison with the alternatives."""
+        return None if self.described is None else self.described.comparison
 
     def cut_short(self) -> Verdict:
         """Return the same, not usable, where something was left undone."""
         if not self.complete:
             return self
-        reasons = (*(Reason(code, REASON_MESSAGES[code]) for code in INCOMPLETE.reasons), *self.reasons)
         vetoes = tuple(veto for veto in VETOES if veto in (*self.vetoes, INCOMPLETE))
-        return replace(self, usable=False, vetoes=vetoes, reasons=reasons)
+        codes = tuple(reason for reason in self.reasons if reason.code != INCOMPLETE.reason)
+        return replace(self, usable=False, vetoes=vetoes, reasons=(*reasons_of(self.status, (INCOMPLETE,), ()), *codes))
 
 
-def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
+def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     """Judge the best explanation.
 
-    1. Describe it by features, among its alternatives.
-    2. Evaluate the models: how probable it is.
-    3. Apply the vetoes.
-    4. Decide the status.
+    1. Compare it with its alternatives, and describe it by features.
+    2. Evaluate the model: how probable it is, with the prior probability ``options.on_map``.
+    3. If it would be usable, search the mirrored scan, and evaluate the model again.
+    4. Apply the vetoes of the contract, and decide the status.
     5. List the reasons, if it is not usable.
 
     Parameters
     ----------
     context : SearchContext
     explanations : Explanations
-    off_scale : bool
-        True if scan and map differ by a factor that was not corrected.
 
     Raises
     ------
@@ -101,37 +110,58 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     """
     answer = explanations.answer
     if answer is None:
-        return _no_match(explanations)
-    description = describe_answer(context, explanations, answer)
-    findings = findings_of(context, explanations, description, off_scale=off_scale)
-    found = work_out_probabilities(context, description, applied(findings))
+        vetoes = applied(Findings(explanations.search.complete, score_elsewhere=_best(explanations)))
+        return Verdict(Status.NO_MATCH, 0.0, False, None, reasons_of(Status.NO_MATCH, vetoes, ["not_on_map"]), vetoes)
+    on_map, usable_from = context.options.on_map, context.options.usable_from
+    model = MODELS["ranges" if context.with_beams else "segments"]
+    others = [one for one in explanations.others if one.inside]
+    comparison = compare(context, answer.best, others, answer.estimate.wall_sigma)
+    described = describe(context, answer.best, answer.estimate, comparison)
+    findings = findings_of(explanations, answer)
+    probability = model.probability(described.features, on_map) * comparison.probability
+    would_be = probability >= usable_from and not applied(findings)
+    if would_be:
+        described = with_null(described, answer.best, find_null(context, answer.best))
+        probability = model.probability(described.features, on_map) * comparison.probability
     pose = choose_along_direction(context, answer)
-    vetoes = applied(_all_findings(context, findings, found, pose))
-    status = _status(found, vetoes, context.options.usable_from)
-    vetoes = counted(vetoes, status)
+    window = context.window
+    vetoes = applied(
+        replace(
+            findings,
+            complete=findings.complete and not context.deadline.passed,
+            outside_window=window is not None and not window.contains(pose),
+        )
+    )
+    explained = model.probability(_as_if_alone_and_fixed(described), NEUTRAL)
+    status = _status(explained, probability, findings, vetoes, usable_from)
+    contradicted = any(veto.reason == "prior_contradicted" for veto in vetoes)
     usable = status is Status.OK and not vetoes
-    margin, runner_up = _margin(context, explanations, answer)
-    return Verdict(
+    verdict = Verdict(
         status=status,
-        probability=_probability(status, found.right, contradicted=contradict_prior(vetoes)),
+        probability=None if status is Status.DEGENERATE else min(probability, CONTRADICTED if contradicted else 1.0),
         usable=usable,
-        pose=pose,
-        margin=margin,
-        runner_up=runner_up,
-        reasons=() if usable else _reasons(context, description, found, status, vetoes),
+        pose=None if status is Status.NO_MATCH else pose,
+        reasons=(),
         vetoes=vetoes,
-        description=description,
-        probabilities=found,
+        model=model,
+        described=described,
+        by_model=model.probability(described.features, on_map),
+        explained=explained,
+        score=answer.best.score,
+        searched_null=would_be,
     )
+    return verdict if usable else replace(verdict, reasons=_reasons(verdict, on_map, usable_from))
 
 
-def _no_match(explanations: Explanations) -> Verdict:
-    """Return the verdict where nothing explains the scan within the prior's window."""
-    vetoes = counted(
-        applied(Findings(explanations.search.complete, score_elsewhere=_best(explanations))), Status.NO_MATCH
+def findings_of(explanations: Explanations, answer: Answer) -> Findings:
+    """Return what the vetoes need, as far as it is known before the pose is chosen."""
+    return Findings(
+        complete=explanations.search.complete,
+        score=answer.best.score,
+        score_elsewhere=_best(explanations),
+        prior=answer.best.posterior - answer.best.score,
+        unobservable=answer.estimate.degenerate,
     )
-    reasons = reasons_of(Doubts(Status.NO_MATCH, vetoes, not_on_map=True), None, None)
-    return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, reasons, vetoes)
 
 
 def _best(explanations: Explanations) -> float:
@@ -139,82 +169,42 @@ def _best(explanations: Explanations) -> float:
     return max((other.score for other in explanations.others), default=-math.inf)
 
 
-def findings_of(
-    context: SearchContext, explanations: Explanations, description: Description, *, off_scale: bool
-) -> Findings:
-    """Return what the vetoes need, as far as it is known before the probabilities."""
-    answer = description.answer
-    return Findings(
-        complete=explanations.search.complete,
-        score=answer.best.score,
-        score_elsewhere=_best(explanations),
-        prior=answer.best.posterior - answer.best.score,
-        unobservable=answer.estimated.degenerate,
-        few_walls=description.few_walls,
-        in_step=answer.beams.in_step,
-        off_scale=off_scale,
-        beyond_tolerance=beyond_tolerance(context, answer),
-        displaced_walls=displaced_walls(context, answer.best),
-        turned=turn_during_scan(context, answer.best),
-    )
+def _as_if_alone_and_fixed(described: Described) -> Features:
+    """Return features as if the position was as well fixed as usual, and no other place was similar.
 
-
-def _all_findings(
-    context: SearchContext, findings: Findings, found: Probabilities, pose: RigidTransform | None
-) -> Findings:
-    """Return all that the vetoes need.
-
-    The mirrored scan and the alternatives with walls farther off are searched, and scored, no further than the
-    deadline. The explanation was inside the window before its pose was registered: the window may be narrower than the
-    error of the pose.
+    These questions are separate: whether the scan is of this map, where on it, and whether it fixes the position there.
     """
-    window = context.window
-    return replace(
-        findings,
-        complete=findings.complete and not context.deadline.passed,
-        outside_window=window is not None and pose is not None and not window.contains(pose),
-        mirrored_better=found.features.null_better,
-    )
+    return described.features._replace(lead=USUAL.lead, solitude=USUAL.solitude, deviation=USUAL.deviation)
 
 
-def _margin(context: SearchContext, explanations: Explanations, answer: Answer) -> tuple[float | None, float | None]:
-    """Return by how much the best explanation is better than the next, nats, and that one's score over the best's."""
-    nearest = next(with_lines_of_sight(context, explanations.ranked, explanations.alternatives), None)
-    if nearest is None:
-        return None, None
-    best = answer.best.posterior
-    return max(0.0, best - nearest.posterior), None if not best > 0.0 else max(0.0, nearest.posterior / best)
-
-
-def _probability(status: Status, right: float, *, contradicted: bool) -> float | None:
-    """Return the probability that the pose is right; along an unobservable direction there is none.
-
-    The features are evidence of whether the walls that fix the pose are right. The pose along them is a choice.
-    """
-    if status is Status.DEGENERATE:
-        return None
-    return min(right, CONTRADICTED) if contradicted else right
-
-
-def _reasons(
-    context: SearchContext, description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...]
-) -> tuple[Reason, ...]:
-    """List why an answer is not usable."""
-    doubts = Doubts(
-        status,
-        vetoes,
-        not_on_map=found.explained < ELSEWHERE_PROBABILITY,
-        similar_place=found.among.least < context.options.usable_from,
-        alone=not description.others,
-    )
-    return reasons_of(doubts, found.features, found.model)
-
-
-def _status(found: Probabilities, vetoes: tuple[Veto, ...], usable_from: float) -> Status:
+def _status(
+    explained: float, probability: float, findings: Findings, vetoes: tuple[Veto, ...], usable_from: float
+) -> Status:
     """Decide in order of precedence."""
-    if found.explained < NO_MATCH_PROBABILITY:
+    if explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
-    caps = [veto.caps for veto in vetoes if veto.caps is not None]
-    if Status.DEGENERATE in caps:
+    if findings.unobservable:
         return Status.DEGENERATE
-    return Status.OK if found.right >= usable_from and not caps else Status.AMBIGUOUS
+    caps = any(veto.name == "better_elsewhere" for veto in vetoes)
+    return Status.OK if probability >= usable_from and not caps else Status.AMBIGUOUS
+
+
+def _reasons(verdict: Verdict, on_map: float, usable_from: float) -> tuple[Reason, ...]:
+    """List why an answer is not usable."""
+    assert verdict.described is not None
+    assert verdict.model is not None
+    settled: list[ReasonCode] = []
+    if verdict.explained < ELSEWHERE_PROBABILITY:
+        settled.append("not_on_map")
+    if verdict.described.comparison.probability < usable_from and verdict.status is Status.AMBIGUOUS:
+        settled.append("similar_place")
+    weighed: list[ReasonCode] = []
+    if verdict.status is Status.AMBIGUOUS and (verdict.probability or 0.0) < usable_from:
+        weighed = weighed_reasons(verdict.model, verdict.described.features, on_map)
+        weighed = weighed[: None if verdict.by_model < usable_from else 0]
+    vetoes = [
+        veto
+        for veto in verdict.vetoes
+        if veto.reason != "unobservable_direction" or verdict.status is Status.DEGENERATE
+    ]
+    return reasons_of(verdict.status, vetoes, settled, weighed)

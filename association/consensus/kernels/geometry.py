@@ -1,45 +1,20 @@
-"""Angles, and the gates that a scan line has to pass to lie on a wall at a pose."""
+"""Small arithmetic that several kernels share: angles, fading, gates, grid cells, priors."""
+
+from __future__ import annotations
 
 import math
 
 from compiled import kernel
 from registration.layout import Record
 
-from ...tuning import DIRECTION_BINS
-
-BINS_PER_RADIAN = DIRECTION_BINS / (2.0 * math.pi)
-GATE_MARGIN = 1.01  # over a gate: angles are tested by a cosine to the second order
+from ...layout import HARD_PRIOR, NO_PRIOR
+from ...tuning import INSIDE, SOFT_FLOOR
 
 
 @kernel
 def wrap(angle: float) -> float:
     """Return the angle in [-pi, pi]."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
-
-
-@kernel
-def rotated(x: float, y: float, c: float, s: float) -> tuple[float, float]:
-    """Return a vector rotated by an angle of cosine c and sine s."""
-    return c * x - s * y, s * x + c * y
-
-
-@kernel
-def offset_gate(line: Record, estimate: Record, gates: Record, lever: float, dx: float, dy: float) -> float:
-    """Return up to which offset from a wall a scan line lies on it, metres.
-
-    The gate is that of the innovation: with ``g = (n, n . J R m)``, the derivative of the offset by the pose, and the
-    covariance C of the pose, `sigmas` times the root of ``sigma^2 + g' C g``. ``(dx, dy)`` is the direction of the line
-    at the pose, and `lever` its abscissa from the sensor, m.
-    """
-    variance = (
-        dy * dy * estimate.xx
-        - 2.0 * dx * dy * estimate.xy
-        + dx * dx * estimate.yy
-        + 2.0 * lever * (dx * estimate.yt - dy * estimate.xt)
-        + lever * lever * estimate.tt
-    )
-    deviation = math.sqrt(line.offset_variance + max(variance, 0.0))
-    return min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
 
 
 @kernel
@@ -50,19 +25,21 @@ def angle_gate(line: Record, heading_variance: float, gates: Record) -> float:
 
 
 @kernel
-def bins_about(direction: float, gate: float) -> tuple[int, int]:
-    """Return the first and the last direction bin of walls whose direction is within a gate of another, both in rad."""
-    turned = (direction + math.pi) * BINS_PER_RADIAN
-    spread = GATE_MARGIN * gate * BINS_PER_RADIAN
-    return math.floor(turned - spread) % DIRECTION_BINS, math.floor(turned + spread) % DIRECTION_BINS
-
-
-@kernel
-def cell_about(shape: Record, x: float, y: float) -> int:
-    """Return the number of the cell of a grid that contains a point, -1 outside of the grid."""
-    per_cell = 1.0 / shape.cell
-    fx = (x - shape.x0) * per_cell
-    fy = (y - shape.y0) * per_cell
-    if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
-        return int(fy) * shape.columns + int(fx)
-    return -1
+def prior_value(prior: Record, pose: Record) -> float:
+    """Return the score of a pose by the prior, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
+    if prior.kind == NO_PRIOR:
+        return 0.0
+    dx = pose.x - prior.x
+    dy = pose.y - prior.y
+    turn = wrap(pose.theta - prior.theta)
+    if prior.kind == HARD_PRIOR:
+        return INSIDE if dx * dx + dy * dy <= prior.radius * prior.radius and abs(turn) <= prior.angle else 0.0
+    square = (
+        prior.xx * dx * dx
+        + 2.0 * prior.xy * dx * dy
+        + 2.0 * prior.xt * dx * turn
+        + prior.yy * dy * dy
+        + 2.0 * prior.yt * dy * turn
+        + prior.tt * turn * turn
+    )
+    return max(SOFT_FLOOR, -0.5 * square)

@@ -1,0 +1,402 @@
+"""The one estimator: pose, walls' errors, common offset, strain of the map, rotation of the sensor, steps of views.
+
+All are unknowns of one Gaussian model. The residual of a point m of the scan, seen at time tau from the sensor's place
+o, on a wall of normal n and offset p, is
+
+    r = n . (z + b u + g) - p - e      z = (I + S) R(theta) R(omega tau) (m - o),      u = z / |z|
+
+with the sensor's place g on the map, the error e of the wall, an offset b along the ray, a symmetric strain S of the map
+around the sensor, and the angle omega by which the sensor turned during the scan. All but g and theta have priors. A
+line enters by its centroid and by its direction. The errors of walls are eliminated. The sensor's place is the centre
+of all of it, so that the origin of the scan frame does not matter.
+"""
+
+from __future__ import annotations
+
+import math
+from copy import copy
+
+import numpy as np
+
+from registration import RigidTransform, wrap_angle
+from registration.kernels import MAX_DEVIATION
+from registration.layout import Floats
+from registration.values import value
+
+from ..context import SearchContext
+from .consensus_set import ConsensusSet
+from .observations import Observations, observations_of
+from .tuning import (
+    COMMON_WALL_ERROR,
+    ESTIMATION_ROUNDS,
+    FREE_DEVIATION,
+    LEAST_KNOWN_VARIANCE,
+    LEAST_WALL_ERROR,
+    MAX_STEP,
+    MAX_TURN,
+    OFFSET_DEVIATION,
+    ONE_OF_MANY,
+    ROUGH_FRACTION,
+    SHOWN_DEVIATIONS,
+    SPRING,
+    STRAIN_DEVIATION,
+    TURN_DEVIATION,
+    UNSEEN_ERROR,
+    USUAL_WALL_ERROR,
+    USUAL_WALLS,
+)
+
+J = np.array([[0.0, -1.0], [1.0, 0.0]])
+OFFSET, STRAIN, TURN = 3, slice(4, 7), 7  # unknowns after the sensor's place and the heading
+COLUMNS = 8
+ROUNDING = 1e-13
+PRIORS = np.array([OFFSET_DEVIATION, STRAIN_DEVIATION, STRAIN_DEVIATION, STRAIN_DEVIATION, TURN_DEVIATION])
+
+
+@value(frozen=True, slots=True)
+class Leverages:
+    """What the pose would be without each of the walls, (m,) each, the sensor's place.
+
+    Attributes
+    ----------
+    walls : int
+    own : float64
+        How far a wall counts as one of its own, next to those that it is tied to, 0 to 1.
+    displacements : float64
+        By how much the place would move, metres.
+    deviations : float64
+        Its standard deviation along its weakest direction then, metres.
+    directions : (m, 2)
+        Of the move, or the weakest one if that is not fixed.
+    """
+
+    walls: Floats
+    own: Floats
+    displacements: Floats
+    deviations: Floats
+    directions: Floats
+
+
+@value(frozen=True, slots=True)
+class Estimate:
+    """A pose with its covariance, and what it was estimated together with.
+
+    Attributes
+    ----------
+    pose : RigidTransform
+        Index frame from scan frame.
+    covariance : (3, 3) float64
+        Of additive (x, y, theta).
+    wall_sigma : float
+        Standard deviation of the walls' own errors, as known or as their residuals show it, metres.
+    weakest : float
+        If walls were off by centimetres, the deviation of the sensor's place along its weakest direction, metres.
+    direction : (float, float)
+        That direction, a unit vector of which the first component is not negative.
+    free : bool
+        True where a fit along that direction says less than the middle of the walls.
+    leverages : Leverages
+    with_columns : bool
+        True if the pose was estimated together with the following; else these are 0.
+    offset, strain, turn : (value, deviation)
+        Offset of the walls along the rays, metres, positive where walls are farther than measured; strain xx, yy, xy;
+        angle by which the sensor turned during the scan, radians.
+    found, spread : float64
+        Errors of the views, (u,), and their covariance; of length 0 where they are exact.
+    """
+
+    pose: RigidTransform
+    covariance: Floats
+    wall_sigma: float
+    weakest: float
+    direction: tuple[float, float]
+    free: bool
+    leverages: Leverages
+    with_columns: bool
+    offset: tuple[float, float]
+    strain: tuple[Floats, Floats]
+    turn: tuple[float, float]
+    found: Floats
+    spread: Floats
+
+    @property
+    def degenerate(self) -> bool:
+        """Return whether a direction of the position is not fixed: its deviation exceeds 0.5 m."""
+        return self.weakest > MAX_DEVIATION
+
+
+def estimate(context: SearchContext, best: ConsensusSet) -> Estimate | None:
+    """Estimate the pose of a consensus set; None where it has no pairs.
+
+    1. Solve for the pose, the errors of walls and of views, by Gauss-Newton; the variance of walls' errors is what
+       their residuals show, unless it is known.
+    2. Solve once for all columns from there. Where one differs from 0 by more than `SHOWN_DEVIATIONS`, go on with
+       them: always on, they widen the deviations on exact maps by a third.
+    3. Leave out each wall in turn.
+    """
+    seen = observations_of(context, best.matches)
+    if seen is None:
+        return None
+    declared = context.index.sigma
+    known = None if declared is None else max(declared**2, LEAST_KNOWN_VARIANCE)
+    model = _Model(seen, known, best.pose)
+    model.solve(ESTIMATION_ROUNDS)
+    columns, shown = _columns(context, seen), False
+    if len(columns):
+        full = model.with_columns(columns)
+        full.solve(1)
+        shown = bool((np.abs(full.x[columns]) > SHOWN_DEVIATIONS * full.deviations[columns]).any())
+        if shown:
+            full.solve(ESTIMATION_ROUNDS)
+            model = full
+    return model.estimate(shown=shown)
+
+
+def _columns(context: SearchContext, seen: Observations) -> np.ndarray:
+    """Return the columns beyond the pose that a scan may show."""
+    if seen.views is not None or context.options.estimator != "joint" or context.scan.viewpoint is None:
+        return np.zeros(0, np.intp)
+    return np.arange(3, COLUMNS if seen.timed else TURN)
+
+
+class _Model:
+    """The normal equations of some unknowns, and their solution."""
+
+    def __init__(self, seen: Observations, known: float | None, start: RigidTransform) -> None:
+        self.seen, self.known, self.start = seen, known, start
+        self.root = np.zeros((0, 0)) if seen.views is None else seen.views.root
+        self.started = np.zeros(0) if seen.views is None else seen.views.found
+        self.size = COLUMNS + self.root.shape[1]
+        self.active = np.concatenate([np.arange(3), np.arange(COLUMNS, self.size)]).astype(np.intp)
+        at = start.apply(seen.sensor[None])[0]
+        self.begin = np.concatenate([at, [start.theta], np.zeros(COLUMNS - 3), self.started])
+        self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if known is None else known
+        self.covariance = np.zeros((len(self.active), len(self.active)))
+        self.walls, self.own = self._wall_prior(), _own(seen.ties)
+        self.of_wall = np.zeros((len(seen.walls), len(seen)))
+        self.of_wall[seen.wall, np.arange(len(seen))] = 1.0
+
+    def with_columns(self, columns: np.ndarray) -> _Model:
+        """Return the same with further unknowns, at the same solution."""
+        full = copy(self)
+        full.active = np.concatenate([np.arange(3), columns, np.arange(COLUMNS, self.size)]).astype(np.intp)
+        full.x = self.x.copy()
+        return full
+
+    @property
+    def deviations(self) -> Floats:
+        """The standard deviation of each unknown, 0 of those that are not solved for."""
+        out = np.zeros(self.size)
+        out[self.active] = np.sqrt(np.maximum(0.0, np.diag(self.covariance)))
+        return out
+
+    def _wall_prior(self) -> Floats:
+        """Return the information of walls' errors of variance 1, (m, m): correlated along chains by their ties."""
+        ties, m = self.seen.ties, len(self.seen.ties)
+        out = np.eye(m)
+        if not (ties >= 0.0).any():
+            return out
+        r = np.zeros(m)
+        r[1:] = np.where((ties[1:] >= 0.0) & (ties[:-1] >= 0.0), np.exp(np.minimum(0.0, ties[:-1] - ties[1:])), 0.0)
+        r = np.minimum(r, 1.0 - 1e-9)
+        free = 1.0 / (1.0 - r[1:] ** 2)
+        at = np.arange(m - 1)
+        out[at + 1, at + 1] += r[1:] ** 2 * free
+        out[at, at] += r[1:] ** 2 * free
+        out[at, at + 1] = out[at + 1, at] = -r[1:] * free
+        return out
+
+    def solve(self, rounds: int) -> None:
+        """Take some steps of Gauss-Newton."""
+        for _ in range(rounds):
+            normal, gradient, by_wall = self._normal(self.variance)
+            self.covariance = _inverse(normal)
+            step = -self.covariance @ gradient
+            self.x[self.active] += step
+            if self.known is None:
+                self.variance = self._shown_variance(by_wall, step)
+        away = math.hypot(*(self.x[:2] - self.begin[:2])) > MAX_STEP
+        if away or abs(wrap_angle(self.x[2] - self.begin[2])) > MAX_TURN or not np.isfinite(self.x).all():
+            self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if self.known is None else self.known
+            self.covariance = _inverse(self._normal(self.variance)[0])
+
+    def _rows(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return the residuals of centroids and directions, (n,), and their derivatives, (n, active)."""
+        seen, x = self.seen, self.x
+        centroids, directions, of_views = self._by_views()
+        c, s = math.cos(x[2]), math.sin(x[2])
+        rotation = np.array([[c, -s], [s, c]])
+        strain = np.array([[x[4], x[6]], [x[6], x[5]]])
+        turns = x[TURN] * seen.times
+        ct, st = np.cos(turns)[:, None], np.sin(turns)[:, None]
+        away = centroids - seen.sensor
+        away = ct * away + st * (away @ J.T)
+        along = ct * directions + st * (directions @ J.T) + (x[TURN] * seen.paces)[:, None] * (away @ J.T)
+        q, d = away @ rotation.T, along @ rotation.T
+        z, e = q + q @ strain, d + d @ strain
+        n, reach = seen.normals, np.maximum(1e-6, np.hypot(z[:, 0], z[:, 1]))
+        incidence = (n * z).sum(axis=1) / reach
+        residuals = (n * (z + x[:2])).sum(axis=1) + x[OFFSET] * incidence - seen.offsets
+        slopes = (n * e).sum(axis=1)
+        nothing = np.zeros(len(seen))
+        by_turn = (n * (q @ J.T)).sum(axis=1)
+        columns = [
+            n[:, 0], n[:, 1], (n * (z @ J.T)).sum(axis=1), incidence,
+            n[:, 0] * q[:, 0], n[:, 1] * q[:, 1], n[:, 0] * q[:, 1] + n[:, 1] * q[:, 0], by_turn * seen.times,
+        ]  # fmt: skip
+        of_slopes = [
+            nothing, nothing, (n * (e @ J.T)).sum(axis=1), nothing,
+            n[:, 0] * d[:, 0], n[:, 1] * d[:, 1], n[:, 0] * d[:, 1] + n[:, 1] * d[:, 0],
+            (n * (d @ J.T)).sum(axis=1) * seen.times + by_turn * seen.paces,
+        ]  # fmt: skip
+        a, b = np.stack(columns, axis=1), np.stack(of_slopes, axis=1)
+        if seen.views is not None:
+            by_view = self.root.reshape(len(seen.views), 3, -1)[seen.view]
+            normal = n @ rotation
+            levers = np.stack([normal[:, 0], normal[:, 1], (normal * (of_views @ J.T)).sum(axis=1)], axis=1)
+            a = np.hstack([a, np.einsum("ni,nij->nj", levers, by_view)])
+            b = np.hstack([b, (normal * (directions @ J.T)).sum(axis=1)[:, None] * by_view[:, 2]])
+        return residuals, slopes, a[:, self.active], b[:, self.active]
+
+    def _by_views(self) -> tuple[Floats, Floats, Floats]:
+        """Return centroids and directions with the views where they are found, and from the view's origin, (n, 2)."""
+        seen = self.seen
+        if seen.views is None:
+            return seen.centroids, seen.directions, seen.centroids
+        shifts = (self.root @ (self.x[COLUMNS:] - self.started)).reshape(-1, 3)[seen.view]
+        origins = np.array([(pose.x, pose.y) for pose in seen.views.poses])[seen.view]
+        c, s = np.cos(shifts[:, 2:]), np.sin(shifts[:, 2:])
+        away = seen.centroids - origins
+        away = c * away + s * (away @ J.T)
+        return origins + shifts[:, :2] + away, c * seen.directions + s * (seen.directions @ J.T), away
+
+    def _weighted(self, variance: float) -> tuple[tuple[Floats, ...], Floats, Floats]:
+        weights = 1.0 / (self.seen.variances + ROUGH_FRACTION * variance)
+        return self._rows(), weights, weights * self.seen.spreads
+
+    def _normal(self, variance: float) -> tuple[Floats, Floats, Floats]:
+        """Return the normal matrix, the gradient, and by wall the sums of weights, rows and residuals, (m, 2 + k)."""
+        (residuals, slopes, a, b), weights, angular = self._weighted(variance)
+        normal = (a.T * weights) @ a + (b.T * angular) @ b
+        gradient = a.T @ (weights * residuals) + b.T @ (angular * slopes)
+        by_wall = (self.of_wall * weights) @ np.column_stack([np.ones(len(a)), residuals, a])
+        if variance > LEAST_KNOWN_VARIANCE:
+            information = self.walls / variance
+            information[np.diag_indices(len(information))] += by_wall[:, 0]
+            solved = np.linalg.solve(information, by_wall[:, 1:])
+            normal -= by_wall[:, 2:].T @ solved[:, 1:]
+            gradient -= by_wall[:, 2:].T @ solved[:, 0]
+        self._add_priors(normal, gradient)
+        return normal, gradient, by_wall
+
+    def _add_priors(self, normal: Floats, gradient: Floats) -> None:
+        of_columns = (self.active >= 3) & (self.active < COLUMNS)
+        information = np.zeros(len(self.active))
+        information[of_columns] = PRIORS[self.active[of_columns] - 3] ** -2.0
+        information[self.active >= COLUMNS] = 1.0
+        information[:3] = SPRING
+        at = np.arange(len(self.active))
+        normal[at, at] += information
+        gradient[3:] += information[3:] * self.x[self.active[3:]]
+
+    def _shown_variance(self, by_wall: Floats, step: Floats) -> float:
+        """Return the variance of the walls' own errors that their residuals show, shrunk where walls are few.
+
+        After a step. An estimate from few walls is uncertain itself: Student's t has that much more variance. And walls
+        that are farthest off match nothing.
+        """
+        weights = by_wall[:, 0]
+        rows = by_wall[:, 2:] / weights[:, None]
+        means = by_wall[:, 1] / weights + rows @ step
+        spreads = ((rows @ self.covariance) * rows).sum(axis=1)
+        free = np.maximum(0.0, 1.0 - spreads / (self.variance + 1.0 / weights))
+        found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float(self.own @ (means**2 - free / weights))
+        count = USUAL_WALLS + float(self.own @ free)
+        return UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0)) * max(found / count, LEAST_WALL_ERROR**2)
+
+    def estimate(self, *, shown: bool) -> Estimate:
+        """Return the solution in the frame of the scan's origin."""
+        self.covariance = _inverse(self._normal(self.variance)[0])
+        x, seen, deviations = self.x, self.seen, self.deviations
+        c, s = math.cos(x[2]), math.sin(x[2])
+        ox, oy = c * seen.sensor[0] - s * seen.sensor[1], s * seen.sensor[0] + c * seen.sensor[1]
+        lever = np.eye(3)
+        lever[:2, 2] = oy, -ox
+        covariance = lever @ self.covariance[:3, :3] @ lever.T
+        loose = _inverse(self._normal(max(self.variance, COMMON_WALL_ERROR**2))[0])
+        weakest, direction = _weakest(loose[:2, :2])
+        spread = math.sqrt(float(np.linalg.eigvalsh(self.covariance[:2, :2])[1]))
+        views = slice(len(self.active) - self.root.shape[1], None)
+        return Estimate(
+            pose=RigidTransform(float(x[0] - ox), float(x[1] - oy), float(x[2])),
+            covariance=0.5 * (covariance + covariance.T),
+            wall_sigma=math.sqrt(self.variance),
+            weakest=weakest,
+            direction=direction,
+            free=spread > ONE_OF_MANY,
+            leverages=self._leverages(weakest),
+            with_columns=shown,
+            offset=(float(x[OFFSET]), float(deviations[OFFSET])),
+            strain=(x[STRAIN].copy(), deviations[STRAIN]),
+            turn=(float(x[TURN]), float(deviations[TURN])),
+            found=x[COLUMNS:].copy(),
+            spread=self.covariance[views, views].copy(),
+        )
+
+    def _leverages(self, weakest: float) -> Leverages:
+        """Return what the solution would be without each wall, and the walls tied to it as far as they are one."""
+        seen, m = self.seen, len(self.seen.walls)
+        (residuals, slopes, a, b), weights, angular = self._weighted(self.variance)
+        p = len(self.active) - self.root.shape[1]
+        a, b = a[:, :p], b[:, :p]
+        of_wall = self.of_wall @ weights
+        by_wall, left = (self.of_wall * weights) @ a, self.of_wall @ (weights * residuals)
+        squares = (weights[:, None] * a)[:, :, None] * a[:, None, :]
+        squares += (angular[:, None] * b)[:, :, None] * b[:, None, :]
+        parts = (self.of_wall @ squares.reshape(len(a), -1)).reshape(m, p, p)
+        gradients = self.of_wall @ ((weights * residuals)[:, None] * a + (angular * slopes)[:, None] * b)
+        known = 1.0 / (of_wall + 1.0 / self.variance)
+        parts -= known[:, None, None] * by_wall[:, :, None] * by_wall[:, None, :]
+        gradients -= (known * left)[:, None] * by_wall
+        ties = seen.ties
+        tied = (ties[:, None] >= 0.0) & (ties >= 0.0)
+        correlation = np.where(tied, np.exp(-np.abs(ties[:, None] - ties)), np.eye(m))
+        kept = np.vstack([1.0 - correlation**2, np.ones(m)])
+        normal, gradient = np.einsum("kw,wij->kij", kept, parts), kept @ gradients
+        prior = np.zeros((p, p)), np.zeros(p)
+        active, self.active = self.active, self.active[:p]
+        self._add_priors(*prior)
+        self.active = active
+        covariances = np.linalg.inv(normal + prior[0])
+        steps = -np.einsum("kij,kj->ki", covariances, gradient + prior[1])
+        moves = steps[:-1, :2] - steps[-1, :2]
+        displacements = np.minimum(np.hypot(*moves.T), FREE_DEVIATION)
+        values, vectors = np.linalg.eigh(covariances[:-1, :2, :2])
+        deviations = np.minimum(np.sqrt(np.maximum(0.0, values[:, 1])), FREE_DEVIATION)
+        if len(self.root):
+            deviations = np.maximum(deviations, weakest)
+        moved = displacements > deviations
+        directions = np.where(moved[:, None], moves / np.maximum(displacements, 1e-12)[:, None], vectors[:, :, 1])
+        return Leverages(seen.walls, self.own, displacements, deviations, directions)
+
+
+def _own(ties: Floats) -> Floats:
+    """Return how far each wall, in the order of ties, is one of its own next to the one before it, 0 to 1."""
+    apart = np.full(len(ties), np.inf)
+    apart[1:] = np.where((ties[1:] >= 0.0) & (ties[:-1] >= 0.0), ties[1:] - ties[:-1], np.inf)
+    return np.asarray(1.0 - np.exp(-2.0 * apart))
+
+
+def _inverse(normal: Floats) -> Floats:
+    """Return the inverse of a normal matrix, scaled to a unit diagonal, for its units are unlike."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.inv(normal * scale[:, None] * scale + ROUNDING * np.eye(len(normal)))
+    return np.asarray(inverse * scale[:, None] * scale)
+
+
+def _weakest(covariance: Floats) -> tuple[float, tuple[float, float]]:
+    """Return the deviation along the weakest direction, and that direction, pointing right or straight up."""
+    values, vectors = np.linalg.eigh(covariance)
+    dx, dy = vectors[:, 1].tolist()
+    sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
+    return math.sqrt(max(0.0, float(values[1]))), (sign * dx, sign * dy)

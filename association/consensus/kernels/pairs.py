@@ -1,0 +1,298 @@
+"""Arithmetic on the records of one pair: how a scan line lies on a wall, and what the pair adds to the sums."""
+
+from __future__ import annotations
+
+import math
+
+from compiled import kernel
+from registration.kernels import invert3, joint_add, joint_cost, joint_information, joint_solve
+from registration.layout import Record
+
+from ...index.kernels.walls import fade
+from ...tuning import APART_GAP, APART_STEP, WHOLE_GAP
+from ..tuning import (
+    FLAT_GATE,
+    FLAT_STEP,
+    FREE_DEVIATION,
+    LONG_BRIDGE,
+    MAX_STEP,
+    MAX_TURN,
+    OVERLAP_TAPER,
+    SHORT_BRIDGE,
+    SPRING,
+)
+from .geometry import angle_gate, wrap
+
+
+@kernel
+def put_line(seen: Record, pose: Record, c: float, s: float, gates: Record, line: Record) -> None:
+    """Write a scan line at a pose of cosine `c` and sine `s`, with its gates, to `line`, a record of `POSED_LINE`."""
+    x = c * seen.x - s * seen.y
+    y = s * seen.x + c * seen.y
+    dx = c * seen.dx - s * seen.dy
+    dy = s * seen.dx + c * seen.dy
+    lever = dx * x + dy * y
+    variance = (
+        dy * dy * pose.xx
+        - 2.0 * dx * dy * pose.xy
+        + dx * dx * pose.yy
+        + 2.0 * lever * (dx * pose.yt - dy * pose.xt)
+        + lever * lever * pose.tt
+    )
+    deviation = math.sqrt(seen.offset_variance + max(variance, 0.0))
+    line.x = x + pose.x
+    line.y = y + pose.y
+    line.dx = dx
+    line.dy = dy
+    line.half = 0.5 * seen.length
+    line.gate = min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
+    line.angle_gate = angle_gate(seen, pose.tt, gates)
+    line.least_cosine = 1.0 - 0.5 * line.angle_gate * line.angle_gate
+
+
+@kernel
+def begin_cover(wall: Record, line: Record, cover: Record) -> bool:
+    """Write what a wall covers of a posed line to `cover`, a record of `COVER`; return False where it covers nothing."""
+    cover.offset = wall.dx * line.y - wall.dy * line.x - wall.offset
+    if abs(cover.offset) > line.gate or wall.dx * line.dx + wall.dy * line.dy < line.least_cosine:
+        return False
+    along = wall.dx * line.x + wall.dy * line.y
+    cover.low = max(wall.begin - along, -line.half)
+    cover.high = min(wall.end - along, line.half)
+    cover.counted = cover.high - cover.low
+    cover.covered = cover.counted
+    cover.first = 0.0
+    cover.second = 0.0
+    return cover.covered > 0.0
+
+
+@kernel
+def begin_way(cover: Record, way: float) -> None:
+    """Start to follow the walls that continue a wall in one direction: 1 forwards, -1 backwards."""
+    cover.reach = cover.high if way > 0.0 else -cover.low
+    cover.weight = 1.0
+    cover.net = 0.0
+    cover.more = 0.0
+    cover.more_first = 0.0
+    cover.more_second = 0.0
+    cover.best_net = 0.0
+    cover.best_more = 0.0
+    cover.best_first = 0.0
+    cover.best_second = 0.0
+
+
+@kernel
+def follow(wall: Record, base: Record, line: Record, way: float, cover: Record) -> bool:
+    """Add what the next wall that continues `base` covers of a line; return False where it begins beyond the line.
+
+    A gap up to `WHOLE_GAP` is as good as covered; a wider one counts against the cover, and what lies behind it less.
+    """
+    along = wall.dx * line.x + wall.dy * line.y
+    begin = wall.begin - along if way > 0.0 else along - wall.end
+    end = wall.end - along if way > 0.0 else along - wall.begin
+    if begin >= line.half:
+        return False
+    if begin > cover.reach:
+        gap = begin - cover.reach
+        whole = fade(gap, WHOLE_GAP, APART_GAP)
+        bridges = min(1.0, max(0.0, (2.0 * line.half - SHORT_BRIDGE) / (LONG_BRIDGE - SHORT_BRIDGE)))
+        cover.weight *= whole + (1.0 - whole) * bridges
+        cover.net += cover.weight * gap * (2.0 * whole - 1.0)
+    start = max(begin, cover.reach)
+    stop = min(end, line.half)
+    if stop > start:
+        middle = way * 0.5 * (start + stop)
+        x = line.x + middle * line.dx
+        y = line.y + middle * line.dy
+        off = wall.dx * y - wall.dy * x - wall.offset
+        beside = base.dx * y - base.dy * x - base.offset - off
+        part = cover.weight * (stop - start)
+        part *= fade(abs(off), FLAT_GATE * line.gate, line.gate) * fade(abs(beside), FLAT_STEP, APART_STEP)
+        cover.net += part
+        cover.more += part
+        cover.more_first += part * beside
+        cover.more_second += part * beside * beside
+        if cover.net > cover.best_net:
+            cover.best_net = cover.net
+            cover.best_more = cover.more
+            cover.best_first = cover.more_first
+            cover.best_second = cover.more_second
+        cover.reach = end
+    return True
+
+
+@kernel
+def end_way(cover: Record) -> None:
+    """Take over what the walls in one direction cover, as far as that is to the good."""
+    cover.counted += cover.best_net
+    cover.covered += cover.best_more
+    cover.first += cover.best_first
+    cover.second += cover.best_second
+
+
+@kernel
+def misfit_of(line: Record, cover: Record) -> float:
+    """Return the misfit of a line on a wall: its offset from what covers it, over the gate, and the missing overlap."""
+    overlap = min(1.0, cover.counted / (2.0 * line.half))
+    return abs(cover.offset - cover.first / cover.covered) / line.gate + 1.0 - overlap
+
+
+@kernel
+def write_match(match: Record, seen: Record, line: Record, wall: Record, cover: Record, least_overlap: float) -> None:
+    """Write how a scan line lies on a wall, with its gain: by the overlap, and nothing at a gate.
+
+    Steps between the walls under one straight line cost half of their chi-square.
+    """
+    shift = cover.first / cover.covered
+    match.overlap = min(1.0, cover.counted / (2.0 * line.half))
+    match.offset = cover.offset - shift
+    match.shift = shift
+    match.sine = line.dx * wall.dy - line.dy * wall.dx
+    gain = seen.gain * match.overlap
+    gain *= min(1.0, (match.overlap - least_overlap) / min(OVERLAP_TAPER, 1.0 - least_overlap))
+    gain *= fade(abs(cover.offset), FLAT_GATE * line.gate, line.gate)
+    gain *= fade(abs(match.sine), FLAT_GATE * line.angle_gate, line.angle_gate)
+    uneven = max(0.0, cover.second / cover.covered - shift * shift)
+    match.gain = max(0.0, gain - 0.5 * seen.weight * uneven)
+
+
+@kernel
+def change_pair(
+    sums: Record, angles: Record, own: Record, wall: Record, seen: Record, held: Record, sign: float
+) -> None:
+    """Add (`sign` 1) or remove (-1) a pair, in constant time, from the sums, those of its angles and of its wall.
+
+    `held` has the weight of the pair, and the shift of the line under the scan line from the wall's own.
+    """
+    line = held.line
+    line.dx = wall.dx
+    line.dy = wall.dy
+    line.offset = wall.offset + held.shift
+    joint_add(sums, line, seen, held.weight, sign)
+    information = sign * held.weight * seen.spread
+    angles.xx += information * line.dy * line.dy
+    angles.xy -= information * line.dx * line.dy
+    angles.yy += information * line.dx * line.dx
+    own.count += sign
+    weight = sign * held.weight
+    own.c += weight * (line.dx * seen.centroid_y - line.dy * seen.centroid_x)
+    own.s += weight * (line.dx * seen.centroid_x + line.dy * seen.centroid_y)
+    own.x -= weight * line.dy
+    own.y += weight * line.dx
+    own.one -= weight * line.offset
+    own.weight += weight
+
+
+@kernel
+def scale_wall(own: Record, factor: float) -> None:
+    """Multiply the sums of a wall; with 0 they are those of no pair."""
+    own.c *= factor
+    own.s *= factor
+    own.x *= factor
+    own.y *= factor
+    own.one *= factor
+    own.weight *= factor
+
+
+@kernel
+def add_wall(common: Record, own: Record) -> None:
+    """Add the sums of a wall to those of the walls before it that it is tied to."""
+    common.c += own.c
+    common.s += own.s
+    common.x += own.x
+    common.y += own.y
+    common.one += own.one
+    common.weight += own.weight
+
+
+@kernel
+def subtract_square(sums: Record, own: Record, k: float) -> None:
+    """Take the square of a wall's sums, times k, out of the sums: the wall's own error is eliminated."""
+    sums.cc -= k * own.c * own.c
+    sums.cs -= k * own.c * own.s
+    sums.cx -= k * own.c * own.x
+    sums.cy -= k * own.c * own.y
+    sums.c1 -= k * own.c * own.one
+    sums.ss -= k * own.s * own.s
+    sums.sx -= k * own.s * own.x
+    sums.sy -= k * own.s * own.y
+    sums.s1 -= k * own.s * own.one
+    sums.xx -= k * own.x * own.x
+    sums.xy -= k * own.x * own.y
+    sums.x1 -= k * own.x * own.one
+    sums.yy -= k * own.y * own.y
+    sums.y1 -= k * own.y * own.one
+    sums.one -= k * own.one * own.one
+
+
+@kernel
+def copy_sums(one: Record, other: Record) -> None:
+    """Write the first sums to the second."""
+    other.cc = one.cc
+    other.cs = one.cs
+    other.cx = one.cx
+    other.cy = one.cy
+    other.c1 = one.c1
+    other.ss = one.ss
+    other.sx = one.sx
+    other.sy = one.sy
+    other.s1 = one.s1
+    other.xx = one.xx
+    other.xy = one.xy
+    other.x1 = one.x1
+    other.yy = one.yy
+    other.y1 = one.y1
+    other.one = one.one
+    other.wahba_cos = one.wahba_cos
+    other.wahba_sin = one.wahba_sin
+    other.count = one.count
+
+
+@kernel
+def solve_pose(sums: Record, angles: Record, parallel: float, pose: Record, solution: Record) -> bool:
+    """Move a pose to the least chi-square of the sums, and write its covariance; return False where that is far.
+
+    `solution` gets the information and the chi-square. A weak spring holds the pose along directions that no pair
+    fixes. Where the reliability of the set, Eq. (28) by the information of its angles, is what noise makes of parallel
+    walls (`parallel`: their chi-square), the pose stays where it was along these walls.
+    """
+    x = pose.x
+    y = pose.y
+    sums.xx += SPRING
+    sums.yy += SPRING
+    sums.x1 -= SPRING * x
+    sums.y1 -= SPRING * y
+    sums.one += SPRING * (x * x + y * y)
+    theta, tx, ty, cost, _ = joint_solve(sums, pose.theta, False)
+    joint_information(sums, theta, solution)
+    near = abs(wrap(theta - pose.theta)) <= MAX_TURN and (tx - x) ** 2 + (ty - y) ** 2 <= MAX_STEP**2
+    regular = invert3(solution, pose)
+    if near and regular:
+        pose.theta = theta
+        pose.x = tx
+        pose.y = ty
+    solution.chi_square = joint_cost(sums, pose.theta, pose.x, pose.y) if not near else cost
+    sums.xx -= SPRING
+    sums.yy -= SPRING
+    sums.x1 += SPRING * x
+    sums.y1 += SPRING * y
+    sums.one -= SPRING * (x * x + y * y)
+    if not regular:
+        solution.chi_square = math.inf
+        return False
+    det = max(0.0, angles.xx * angles.yy - angles.xy * angles.xy)
+    weight = angles.xx + angles.yy
+    part = parallel / weight if weight > 0.0 else 1.0
+    solution.parallel = part >= 0.5 or 4.0 * det <= 4.0 * part * (1.0 - part) * weight * weight
+    if solution.parallel:
+        across = 0.5 * math.atan2(2.0 * sums.xy, sums.xx - sums.yy)
+        ux = -math.sin(across)
+        uy = math.cos(across)
+        shift = (pose.x - x) * ux + (pose.y - y) * uy
+        pose.x -= shift * ux
+        pose.y -= shift * uy
+        pose.xx += FREE_DEVIATION * FREE_DEVIATION * ux * ux
+        pose.xy += FREE_DEVIATION * FREE_DEVIATION * ux * uy
+        pose.yy += FREE_DEVIATION * FREE_DEVIATION * uy * uy
+        solution.chi_square = joint_cost(sums, pose.theta, pose.x, pose.y)
+    return near

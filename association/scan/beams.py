@@ -1,0 +1,133 @@
+"""The beams of a scan: those of its ranges, or of segments the rays to what was seen and to where nothing was."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Beams as Ranges
+from registration.layout import Floats, Records
+from registration.values import value
+
+from ..layout import BEAM
+from ..tuning import FAR, FARTHER, MAX_RAYS, MOST_BEAMS, RAY_SPACING, RAYS
+from .tuning import BLIND_FRACTION, END_MARGIN
+
+Indices = NDArray[np.intp]
+
+
+@value(frozen=True, slots=True)
+class BeamSet:
+    """Beams from known places.
+
+    Attributes
+    ----------
+    rows : (m,) of `BEAM`
+        In the scan frame; the range is inf where nothing was seen.
+    line : (m,)
+        The scan line that a ray goes to; -1 of a laser's beam, and where nothing was seen.
+    sensor : (m,)
+        Number of the view.
+    weights : (m,)
+        Less than 1 where several views are from one place.
+    reach : float
+        How far a beam may see, metres.
+    """
+
+    rows: Records
+    line: Indices
+    sensor: Indices
+    weights: Floats
+    reach: float
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def take(self, places: Indices) -> BeamSet:
+        """Return some of the beams."""
+        return BeamSet(self.rows[places], self.line[places], self.sensor[places], self.weights[places], self.reach)
+
+
+def beams_of_ranges(ranges: Ranges, viewpoint: tuple[float, float], views: Indices | None, weights: Floats) -> BeamSet:
+    """Return at most `MOST_BEAMS` of the beams of which something is known, evenly spread."""
+    known = np.flatnonzero(~np.isnan(ranges.ranges))
+    chosen = known[:: max(1, math.ceil(len(known) / MOST_BEAMS))]
+    begins = np.broadcast_to(viewpoint, (len(chosen), 2)) if ranges.origins is None else ranges.origins[chosen]
+    angles = ranges.angles[chosen]
+    sensor = np.zeros(len(chosen), np.intp) if views is None else views[chosen]
+    rows = _rows(begins, np.stack([np.cos(angles), np.sin(angles)], axis=1), ranges.ranges[chosen])
+    return BeamSet(rows, np.full(len(chosen), -1), sensor, weights[sensor], ranges.range_max)
+
+
+def rays_to_lines(seen: Records, viewpoints: Floats, weights: Floats) -> BeamSet:
+    """Return rays to evenly spread points of what each view shows, (k,) of `SIGHTING`; none of views without a place.
+
+    They keep away from the ends of a segment, where its neighbours are.
+    """
+    seen = seen[~np.isnan(viewpoints[seen["sensor"], 0])]
+    counts = np.clip(np.ceil(seen["length"] / RAY_SPACING), 1, MAX_RAYS).astype(np.intp)
+    of = np.repeat(np.arange(len(seen)), counts)
+    number = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    one = seen[of]
+    along = ((number + 0.5) / counts[of] - 0.5) * np.maximum(0.0, one["length"] - 2.0 * END_MARGIN)
+    ends = np.stack([one["x"] + along * one["dx"], one["y"] + along * one["dy"]], axis=1)
+    begins = viewpoints[one["sensor"]]
+    way = ends - begins
+    ranges = np.hypot(way[:, 0], way[:, 1])
+    rows = _rows(begins, way / np.maximum(ranges, 1e-12)[:, None], ranges)
+    farthest = float((ranges + 0.5 * one["length"]).max(initial=0.0))
+    return BeamSet(rows, one["row"], one["sensor"], weights[one["sensor"]], max(FAR, FARTHER * farthest))
+
+
+def rays_to_nothing(seen: Records, viewpoints: Floats, weights: Floats, reach: float) -> BeamSet:
+    """Return rays in the directions in which a view shows nothing, but for the widest gap, if that is wide.
+
+    A wide gap may be out of the sensor's view.
+    """
+    angles = 2.0 * math.pi * (np.arange(RAYS) + 0.5) / RAYS
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    begins, ways, sensors = [], [], []
+    for v in np.unique(seen["sensor"]).tolist():
+        own = seen[seen["sensor"] == v]
+        if np.isnan(viewpoints[v, 0]):
+            continue
+        mx, my = own["x"] - viewpoints[v, 0], own["y"] - viewpoints[v, 1]
+        dx, dy = directions[:, :1], directions[:, 1:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            across = dx * own["dy"] - dy * own["dx"]
+            away = (mx * own["dy"] - my * own["dx"]) / across
+            along = (mx * dy - my * dx) / across
+            shown = ((away > 0.0) & (np.abs(along) <= 0.5 * own["length"])).any(axis=1)
+        if not shown.any():
+            continue
+        places = np.flatnonzero(shown)
+        gaps = np.diff(places, append=places[0] + RAYS)
+        widest = int(gaps.argmax())
+        if gaps[widest] > BLIND_FRACTION * RAYS:
+            shown[(places[widest] + np.arange(1, gaps[widest])) % RAYS] = True
+        empty = directions[~shown]
+        begins.append(np.broadcast_to(viewpoints[v], empty.shape))
+        ways.append(empty)
+        sensors.append(np.full(len(empty), v))
+    if not begins:
+        begins, ways, sensors = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0, np.intp)]
+    sensor = np.concatenate(sensors)
+    rows = _rows(np.concatenate(begins), np.concatenate(ways), np.full(len(sensor), np.inf))
+    return BeamSet(rows, np.full(len(sensor), -1), sensor, weights[sensor], reach)
+
+
+def together(one: BeamSet, other: BeamSet) -> BeamSet:
+    """Return the beams of two sets."""
+    rows = np.empty(len(one) + len(other), BEAM)
+    rows[: len(one)], rows[len(one) :] = one.rows, other.rows
+    columns = (np.concatenate([getattr(one, name), getattr(other, name)]) for name in ("line", "sensor", "weights"))
+    return BeamSet(rows, *columns, max(one.reach, other.reach))
+
+
+def _rows(begins: Floats, directions: Floats, ranges: Floats) -> Records:
+    rows = np.empty(len(ranges), BEAM)
+    rows["x"], rows["y"], rows["dx"], rows["dy"] = *begins.T, *directions.T
+    rows["range"] = ranges
+    return rows

@@ -1,0 +1,378 @@
+"""Propose poses: a base of two scan lines laid on all pairs of wall chains, one line slid along all of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from compiled import kernel
+from registration.layout import Floats, Record, Records
+
+from ...consensus.kernels.geometry import angle_gate, prior_value, wrap
+from ...layout import HARD_PRIOR
+from ...tables import Question, Raster, Sweep, Walls
+from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS
+from ..tuning import (
+    COST_ANCHOR,
+    COST_BASE,
+    COST_HYPOTHESIS,
+    COST_SLIDE,
+    GAIN_POWER,
+    HYPOTHESIS_SCALE,
+    MIN_CROSSING_BASE,
+    SHORT_LENGTH,
+    SHORT_POWER,
+    SINE_POWER,
+    WINDOW_MARGIN,
+    WINDOW_TURN,
+)
+
+PER_RADIAN = SECTORS / (2.0 * math.pi)
+GATE_MARGIN = 1.01  # over a gate: angles are tested by a cosine to the second order
+
+
+@kernel
+def end_slack(length: float) -> float:
+    """Return how far a scan line, as part of a base, may stick out at each end of its wall."""
+    return BASE_SLACK + BASE_SLACK_SHARE * length
+
+
+@kernel
+def is_about(prior: Record, pose: Record) -> bool:
+    """Return whether a pose may be refined into the window of a hard prior."""
+    near = math.hypot(pose.x - prior.x, pose.y - prior.y) <= prior.radius + WINDOW_MARGIN
+    return near and abs(wrap(pose.theta - prior.theta)) <= prior.angle + WINDOW_TURN
+
+
+@kernel
+def sectors_about(middle: float, spread: float) -> int:
+    """Return which sectors there are within `spread` of `middle`, both in sectors, as bits."""
+    first = math.floor(middle - spread)
+    more = min(SECTORS - 1, math.floor(middle + spread) - first)
+    found = ((2 << more) - 1) << (first & (SECTORS - 1))
+    return (found | (found >> SECTORS)) & ((1 << SECTORS) - 1)
+
+
+@kernel
+def rank_bases(scan: Records, count: int, chains: Walls, area: float, bases: Records) -> int:
+    """Write the bases of the first `count` scan lines, pairs that are not parallel, to `bases`; return their number.
+
+    The merit of a base is the logarithm of the lesser gain, to a power, over the cost of its search: the chains that
+    one line slides on, the metres of them, and the hypotheses that are expected on the way. The line that slides at
+    the lower cost comes first.
+    """
+    bin_starts = chains.bin_starts
+    longest = chains.longest
+    summed = chains.summed
+    bins = len(bin_starts) - 1
+    slides = np.zeros((count, bins), np.float64)
+    near = np.zeros((count, 2 * bins), np.float64)
+    costs = np.zeros(count, np.float64)
+    for i in range(count):
+        need = scan[i].length - 2.0 * end_slack(scan[i].length)
+        for b in range(bins):
+            low = bin_starts[b]
+            high = bin_starts[b + 1]
+            while low < high:  # the longest of a bin come first
+                middle = (low + high) // 2
+                if longest[middle] >= need:
+                    low = middle + 1
+                else:
+                    high = middle
+            fit = low - bin_starts[b]
+            slides[i, b] = summed[low] - summed[bin_starts[b]] - fit * max(need, 0.0)
+            costs[i] += COST_ANCHOR * fit + COST_SLIDE * slides[i, b]
+        for b in range(bins):
+            after = b + 1 if b + 1 < bins else 0
+            near[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, after]
+            near[i, b + bins] = near[i, b]
+    number = 0
+    for i in range(count):
+        for j in range(i + 1, count):
+            sine = scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx
+            if abs(sine) < MIN_CROSSING_BASE:
+                continue
+            shift = int(np.rint((scan[j].angle - scan[i].angle) * bins / (2.0 * math.pi))) % bins
+            expected = 0.0
+            for b in range(bins):
+                expected += slides[i, b] * near[j, b + shift]
+            shorter = min(scan[i].length, scan[j].length)
+            expected *= HYPOTHESIS_SCALE / area * abs(sine) ** SINE_POWER * (shorter + SHORT_LENGTH) ** SHORT_POWER
+            cost = COST_BASE + min(costs[i], costs[j]) + COST_HYPOTHESIS * expected
+            base = bases[number]
+            first = costs[i] <= costs[j]
+            base.sliding = i if first else j
+            base.crossing = j if first else i
+            base.merit = GAIN_POWER * math.log(min(scan[i].gain, scan[j].gain)) - math.log(cost)
+            number += 1
+    return number
+
+
+@kernel
+def sweep_base(
+    question: Question, sliding: int, crossing: int, sweep: Sweep, first: int, posed: Records
+) -> tuple[int, int]:
+    """Write the poses that lay a base on two wall chains, from chain `first` on; return the next chain, and how many.
+
+    While line a slides along a chain, the midpoint of b passes the cells of a grid, which list the chains of each
+    direction: b lies on one where its midpoint crosses it. The array is left when it is half full. If one chain fills
+    it, -1 is returned in place of the number: the array has to be larger.
+
+    Parameters
+    ----------
+    question : Question
+    sliding, crossing : int
+        The scan lines a and b.
+    sweep : Sweep
+    first : int
+    posed : (k,) of `HYPOTHESIS`
+        Written.
+    """
+    terms = question.terms[0]
+    gates = terms.gates
+    prior = terms.prior
+    a = question.scan[sliding]
+    b = question.scan[crossing]
+    chains = sweep.chains
+    lengths = sweep.lengths
+    present = sweep.present
+    starts = sweep.sectors.starts
+    items = sweep.sectors.items
+    shape = sweep.sectors.shape[0]
+    cell = shape.cell
+    columns = shape.columns
+    rows = shape.rows
+    windowed = prior.kind == HARD_PRIOR
+    va = a.angle_variance
+    vb = b.angle_variance
+    gx = b.x - a.x
+    gy = b.y - a.y
+    turn = b.angle - a.angle
+    tolerance = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(va + vb)))
+    least_cosine = 1.0 - 0.5 * tolerance * tolerance
+    spread = tolerance * PER_RADIAN
+    # The rotation of the base is only known up to the angle between its lines: until then b is off by that much.
+    swing = tolerance * va / (va + vb) * math.hypot(gx, gy) / abs(math.sin(turn))
+    half_a = 0.5 * a.length - end_slack(a.length)
+    half_b = 0.5 * b.length - end_slack(b.length)
+    need = 2.0 * half_a
+    count = 0
+    for w in range(first, len(chains)):
+        if lengths[w] < need:
+            continue
+        if 2 * count >= len(posed):
+            return w, count
+        wa = chains[w]
+        dx = wa.dx
+        dy = wa.dy
+        c = dx * a.dx + dy * a.dy
+        s = dy * a.dx - dx * a.dy
+        if windowed and abs(wrap(wa.angle - a.angle - prior.theta)) > prior.angle + WINDOW_TURN + tolerance:
+            continue
+        # Midpoint and direction of b with the midpoint of a at abscissa 0 of the chain; the slide is that abscissa.
+        bdx = c * b.dx - s * b.dy
+        bdy = s * b.dx + c * b.dy
+        x = c * gx - s * gy - dy * wa.offset
+        y = s * gx + c * gy + dx * wa.offset
+        at = wa.begin + half_a - swing
+        high = wa.end - half_a + swing
+        wanted = sectors_about((wa.angle + turn + math.pi) * PER_RADIAN + 0.5, spread)
+        fx = (x + at * dx - shape.x0) / cell
+        fy = (y + at * dy - shape.y0) / cell
+        column = math.floor(fx)
+        row = math.floor(fy)
+        step_x = 1 if dx > 0.0 else -1
+        step_y = 1 if dy > 0.0 else -1
+        pace_x = cell / max(abs(dx), 1e-12)
+        pace_y = cell / max(abs(dy), 1e-12)
+        next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
+        next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
+        while at <= high:
+            until = min(next_x, next_y)
+            if 0 <= column < columns and 0 <= row < rows:
+                here = row * columns + column
+                if present[here] & wanted:
+                    for k in range(starts[here], starts[here + 1]):
+                        if not (wanted >> (items[k] & (SECTORS - 1))) & 1:
+                            continue
+                        wb = chains[items[k] >> SECTOR_BITS]
+                        across = wb.dx * dy - wb.dy * dx
+                        if wb.dx * bdx + wb.dy * bdy < least_cosine or abs(across) < MIN_CROSSING:
+                            continue
+                        slide = (wb.offset - wb.dx * y + wb.dy * x) / across
+                        if slide < at or slide >= until or slide > high:
+                            continue
+                        if count == len(posed):
+                            return w, -1
+                        if lay_base(a, b, wa, wb, half_a, half_b, posed[count]):
+                            count += 1
+            at = until
+            if next_x < next_y:
+                column += step_x
+                next_x += pace_x
+            else:
+                row += step_y
+                next_y += pace_y
+    return len(chains), count
+
+
+@kernel
+def lay_base(a: Record, b: Record, wa: Record, wb: Record, half_a: float, half_b: float, pose: Record) -> bool:
+    """Write the pose that puts the midpoints of lines `a` and `b` on `wa` and `wb`, both turned as their angles allow.
+
+    Return False where one of them sticks out at an end. The pose may turn about the middle between both.
+    """
+    gap = wrap(wb.angle - wa.angle - b.angle + a.angle)
+    turn = gap * a.angle_variance / (a.angle_variance + b.angle_variance)
+    theta = wa.angle - a.angle + turn
+    c = math.cos(theta)
+    s = math.sin(theta)
+    det = wa.dx * wb.dy - wa.dy * wb.dx
+    # n . t = p - n . R m for both, with n = (-d_y, d_x).
+    ax = c * a.x - s * a.y
+    ay = s * a.x + c * a.y
+    bx = c * b.x - s * b.y
+    by = s * b.x + c * b.y
+    ra = wa.offset + wa.dy * ax - wa.dx * ay
+    rb = wb.offset + wb.dy * bx - wb.dx * by
+    tx = (ra * wb.dx - rb * wa.dx) / det
+    ty = (ra * wb.dy - rb * wa.dy) / det
+    along = wa.dx * (ax + tx) + wa.dy * (ay + ty)
+    if along - half_a < wa.begin or along + half_a > wa.end:
+        return False
+    along = wb.dx * (bx + tx) + wb.dy * (by + ty)
+    if along - half_b < wb.begin or along + half_b > wb.end:
+        return False
+    pose.theta = theta
+    pose.cosine = c
+    pose.sine = s
+    pose.x = tx
+    pose.y = ty
+    pose.lever_x = 0.5 * (ax + bx)
+    pose.lever_y = 0.5 * (ay + by)
+    pose.angle_variance = a.angle_variance * b.angle_variance / (a.angle_variance + b.angle_variance)
+    return True
+
+
+@kernel
+def slide_line(
+    question: Question, sliding: int, sweep: Sweep, spacing: float, first: int, posed: Records
+) -> tuple[int, int]:
+    """Write the poses that lay one scan line on chains, `spacing` metres apart, from chain `first` on.
+
+    Return the next chain, and how many; both as of `sweep_base`.
+    """
+    prior = question.terms[0].prior
+    a = question.scan[sliding]
+    chains = sweep.chains
+    lengths = sweep.lengths
+    half = 0.5 * a.length - end_slack(a.length)
+    count = 0
+    for w in range(first, len(chains)):
+        if lengths[w] < 2.0 * half:
+            continue
+        if 2 * count >= len(posed):
+            return w, count
+        chain = chains[w]
+        theta = chain.angle - a.angle
+        c = math.cos(theta)
+        s = math.sin(theta)
+        x = c * a.x - s * a.y
+        y = s * a.x + c * a.y
+        low = chain.begin + half
+        high = chain.end - half
+        if prior.kind == HARD_PRIOR:
+            middle = chain.dx * (prior.x + x) + chain.dy * (prior.y + y)
+            low = max(low, middle - prior.radius)
+            high = min(high, middle + prior.radius)
+            if low > high or abs(wrap(theta - prior.theta)) > prior.angle + WINDOW_TURN:
+                continue
+        number = max(1, math.ceil((high - low) / spacing))
+        for k in range(number):
+            if count == len(posed):
+                return w, -1
+            at = low + (k + 0.5) / number * (high - low)
+            pose = posed[count]
+            pose.theta = theta
+            pose.cosine = c
+            pose.sine = s
+            pose.x = chain.dx * at - chain.dy * chain.offset - x
+            pose.y = chain.dy * at + chain.dx * chain.offset - y
+            pose.lever_x = x
+            pose.lever_y = y
+            pose.angle_variance = a.angle_variance
+            count += 1
+    return len(chains), count
+
+
+@kernel
+def reject(
+    question: Question, raster: Raster, gains: Floats, posed: Records, count: int, rule: Records, poses: Records
+) -> int:
+    """Write those of the first `count` hypotheses that may reach the floor, as (k,) of `ESTIMATE`; return how many.
+
+    A scan line counts only where the raster has a wall of its direction near its midpoint. The lines of the greatest
+    gain come first, so that most hypotheses are rejected by a few. `gains` (n,) are the gains of the lines; those of 0
+    are not looked up.
+    """
+    scan = question.scan
+    terms = question.terms[0]
+    gates = terms.gates
+    prior = terms.prior
+    bits = raster.bits
+    shape = raster.shape[0]
+    per_cell = 1.0 / shape.cell
+    columns = shape.columns
+    rows = shape.rows
+    n = len(scan)
+    spreads = np.empty(n, np.float64)
+    total = 0.0
+    for i in range(n):
+        total += gains[i]
+        variance = posed[0].angle_variance if count > 0 else 0.0  # the same for all hypotheses of a base
+        spreads[i] = GATE_MARGIN * angle_gate(scan[i], variance, gates) * PER_RADIAN
+    least = max(rule[0].kept_fraction * rule[0].best_value, rule[0].least_value) + rule[0].least_freedom
+    kept = 0
+    for k in range(count):
+        one = posed[k]
+        bonus = 0.0
+        if prior.kind == HARD_PRIOR:
+            if not is_about(prior, one):
+                continue
+        else:
+            bonus = prior_value(prior, one)
+        spare = total - (least - bonus)  # what may be lost
+        c = one.cosine
+        s = one.sine
+        turned = (one.theta + math.pi) * PER_RADIAN + 0.5
+        for i in range(n):
+            if spare < 0.0:
+                break
+            if gains[i] <= 0.0:
+                continue
+            fx = (c * scan[i].x - s * scan[i].y + one.x - shape.x0) * per_cell
+            fy = (s * scan[i].x + c * scan[i].y + one.y - shape.y0) * per_cell
+            fits = False
+            if fx >= 0.0 and fy >= 0.0 and fx < columns and fy < rows:
+                wanted = sectors_about(turned + scan[i].angle * PER_RADIAN, spreads[i])
+                fits = (bits[int(fy) * columns + int(fx)] & wanted) != 0
+            if not fits:
+                spare -= gains[i]
+        if spare < 0.0:
+            continue
+        pose = poses[kept]
+        v = one.angle_variance
+        x = one.lever_x
+        y = one.lever_y
+        pose.theta = one.theta
+        pose.x = one.x
+        pose.y = one.y
+        pose.xx = v * y * y
+        pose.xy = -v * x * y
+        pose.yy = v * x * x
+        pose.xt = v * y
+        pose.yt = -v * x
+        pose.tt = v
+        kept += 1
+    return kept

@@ -1,0 +1,327 @@
+"""The search: draw a base, propose poses, score them, ask the stopping rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from registration.layout import Floats, Records
+from registration.values import value
+
+from ..consensus.kernels.distinct import pick_distinct
+from ..consensus.kernels.scoring import score_poses
+from ..context import SearchContext
+from ..deadline import CancelledError
+from ..layout import BASE, ESTIMATE, HYPOTHESIS, MATCH, RULE, SET_SCORE, record
+from ..options import AssociationOptions
+from ..result import SearchReport
+from ..tables import ScoreRules
+from ..tuning import COMPLETE_ABOVE, DISTINCT_ANGLE, DISTINCT_DISTANCE
+from .kernels.proposals import rank_bases, reject, slide_line, sweep_base
+from .stopping import StoppingRule, random_order
+from .tuning import (
+    BASE_LINES,
+    KEPT,
+    KEPT_FOR_BEAMS,
+    KEPT_FRACTION,
+    KEPT_FRACTION_FOR_BEAMS,
+    MIN_CROSSING_BASE,
+    PARALLEL_SINE,
+    POSED,
+    PRUNED,
+    REUSE,
+    SLIDE_DISTINCT,
+    SLIDE_LINES,
+    SLIDE_SPACING,
+    SLIDE_SPACING_FOR_BEAMS,
+    TELLING,
+    TELLING_LINES,
+    UNTELLING,
+)
+
+
+@value(frozen=True, slots=True)
+class Candidates:
+    """The poses that a search found.
+
+    Attributes
+    ----------
+    poses : (k,) of `ESTIMATE`, the best value first
+    report : SearchReport
+    """
+
+    poses: Records
+    report: SearchReport
+
+
+@value(frozen=True, slots=True)
+class Effort:
+    """The limits of a search.
+
+    Attributes
+    ----------
+    kept : int
+        Poses that are stored at most, and
+    kept_fraction : float
+        the fraction of the best value that they reach.
+    complete_above : float
+        Fraction of the best value above which no pose is to be missed.
+    allowed : float
+        Probability of having missed one, that is allowed; -1: all bases are searched.
+    known : float
+        A value that is known to be reached, nats.
+    enough : float
+        The value that ends the search, nats.
+    """
+
+    kept: int
+    kept_fraction: float
+    complete_above: float
+    allowed: float
+    known: float = 0.0
+    enough: float = math.inf
+
+    @classmethod
+    def of(cls, context: SearchContext) -> Effort:
+        """Keep poses more freely where raw beams are to decide between them."""
+        kept, fraction = (KEPT_FOR_BEAMS, KEPT_FRACTION_FOR_BEAMS) if context.with_beams else (KEPT, KEPT_FRACTION)
+        return cls(max(kept, context.index.least_kept), fraction, COMPLETE_ABOVE, allowed_by(context.options))
+
+
+def allowed_by(options: AssociationOptions) -> float:
+    """Return the probability of having missed a better consensus set that a caller allows; -1 for none."""
+    return -1.0 if options.exhaustive else 1.0 - options.confidence
+
+
+def search(context: SearchContext, effort: Effort | None = None) -> Candidates:
+    """Search until no better pose can have been missed, no base is left or the deadline passes.
+
+    With a hard prior the window is searched, and then the whole map: the answer comes from the window, and a much
+    better pose outside contradicts the prior.
+
+    Parameters
+    ----------
+    context : SearchContext
+    effort : Effort or None
+        By default as much as the options call for.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    effort = effort or Effort.of(context)
+    found = _Search(context, effort).run()
+    if context.window is None:
+        return found
+    everywhere = _Search(context.anywhere(), effort).run()
+    one, other = found.report, everywhere.report
+    report = replace(
+        one,
+        complete=one.complete and other.complete,
+        exhaustive=one.exhaustive and other.exhaustive,
+        confidence=min(one.confidence, other.confidence),
+        bases=one.bases + other.bases,
+        hypotheses=one.hypotheses + other.hypotheses,
+        verified=one.verified + other.verified,
+        complete_above=max(one.complete_above, other.complete_above),
+    )
+    return Candidates(np.concatenate([found.poses, everywhere.poses]), report)
+
+
+class _BestPoses:
+    """The best poses so far, at most one within a distance and an angle."""
+
+    def __init__(self, effort: Effort, distance: float, best_value: float, *, within: bool) -> None:
+        self._kept, self._distance = effort.kept, distance
+        self._poses, self._values = np.empty(PRUNED * effort.kept, ESTIMATE), np.empty(PRUNED * effort.kept)
+        self._held = 0
+        self.rule = record(
+            RULE, kept_fraction=effort.kept_fraction, best_value=best_value, least_value=0.0, within=within
+        )
+
+    @property
+    def best_value(self) -> float:
+        return float(self.rule["best_value"][0])
+
+    def offer(self, poses: Records, values: Floats, best_value: float) -> None:
+        """Take poses that were scored; those of value 0 were rejected."""
+        self.rule["best_value"][0] = best_value
+        good = np.flatnonzero(values > 0.0)
+        while len(good):
+            taken = good[: len(self._poses) - self._held]
+            end = self._held + len(taken)
+            self._poses[self._held : end], self._values[self._held : end] = poses[taken], values[taken]
+            self._held, good = end, good[len(taken) :]
+            if self._held == len(self._poses):
+                self._prune()
+
+    def _prune(self) -> None:
+        held = np.flatnonzero(self._values[: self._held] >= self.rule["kept_fraction"][0] * self.best_value)
+        poses, values = self._poses[held], self._values[held]
+        chosen = pick_distinct(poses, values, self._kept, self._distance, DISTINCT_ANGLE, 0.0, 0.0)
+        self._held = len(chosen)
+        self._poses[: self._held], self._values[: self._held] = poses[chosen], values[chosen]
+        if self._held == self._kept:
+            self.rule["least_value"][0] = self._values[self._held - 1]
+
+    def result(self) -> tuple[Records, Floats]:
+        """Return the distinct ones with their values, the best first."""
+        self._prune()
+        return self._poses[: self._held], self._values[: self._held]
+
+
+class _Search:
+    """One search of the map, or of the window of a hard prior."""
+
+    def __init__(self, context: SearchContext, effort: Effort) -> None:
+        self.context, self.effort = context, effort
+        scan = context.lines.rows
+        self.scan, self.question, self.sweep = scan, context.question, context.index.tables.sweep
+        self.lines = min(len(scan), BASE_LINES if len(scan) <= BASE_LINES else TELLING_LINES)
+        self.posed = np.empty(POSED, HYPOTHESIS)
+        self.poses, self.scores = np.empty(POSED, ESTIMATE), np.zeros(POSED, SET_SCORE)
+        self.matches = np.zeros((1, len(scan)), MATCH)
+        self.bases = self.hypotheses = self.verified = 0
+        self.complete = True
+
+    def run(self) -> Candidates:
+        """Search bases, then parallel lines."""
+        context, effort = self.context, self.effort
+        within = context.window is not None
+        best = _BestPoses(effort, DISTINCT_DISTANCE, effort.known, within=within)
+        rule = StoppingRule(self.scan, self.lines, drawn=context.options.sampling == "random")
+        exhausted = self._search_bases(best, rule)
+        spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
+        if context.window is not None:
+            spacing = min(spacing, context.window.radius)
+        slides = _BestPoses(effort, SLIDE_DISTINCT * spacing, best.best_value, within=within)
+        if self.complete:
+            self._search_parallel(slides, spacing)
+        if context.deadline.cancelled:
+            raise CancelledError
+        of_bases, values = best.result()
+        of_slides, others = slides.result()
+        poses = np.empty(len(values) + len(others), ESTIMATE)
+        poses[: len(values)], poses[len(values) :] = of_bases, of_slides
+        order = np.argsort(-np.concatenate([values, others]), kind="stable")
+        return Candidates(poses[order], self._report(rule, exhausted=exhausted))
+
+    def _report(self, rule: StoppingRule, *, exhausted: bool) -> SearchReport:
+        exhaustive = exhausted and len(self.scan) <= BASE_LINES
+        proven = rule.bound <= 0.0 or exhaustive
+        report = SearchReport(
+            complete=True,
+            exhaustive=exhaustive,
+            confidence=1.0 if proven else 1.0 - rule.missed,
+            bases=self.bases,
+            hypotheses=self.hypotheses,
+            verified=self.verified,
+            seed=self.context.options.seed,
+            sampling=self.context.options.sampling,
+            complete_above=self.effort.complete_above,
+        )
+        return report if self.complete else report.cut_short()
+
+    def _search_bases(self, best: _BestPoses, rule: StoppingRule) -> bool:
+        """Search bases, the best first, until the stopping rule ends it; return whether none was left."""
+        scan, effort = self.scan, self.effort
+        bases, telling = self._bases()
+        merits, sliding, crossing = bases["merit"].copy(), bases["sliding"], bases["crossing"]
+        ordered = self.context.options.sampling == "ordered"
+        if not ordered:
+            merits = random_order(merits, self.context.options.seed)
+        fade = math.log(REUSE) if ordered else 0.0
+        if len(bases) == 0:
+            rule.missed = 0.0
+        gains = np.ascontiguousarray(scan["gain"])
+        of_line = [np.flatnonzero((sliding == i) | (crossing == i)) for i in range(self.lines)]
+        for _ in range(len(bases)):
+            k = int(merits.argmax())
+            i, j = int(sliding[k]), int(crossing[k])
+            merits[k] = -math.inf
+            if fade:
+                merits[of_line[i]] += fade
+                merits[of_line[j]] += fade
+            if not self._propose(
+                lambda first, posed, i=i, j=j: sweep_base(self.question, i, j, self.sweep, first, posed), gains, best
+            ):
+                return False
+            self.bases += 1
+            fraction = best.rule["kept_fraction"][0]
+            best.rule["least_freedom"][0] = rule.least_freedom(fraction * best.best_value)
+            needed = effort.complete_above * best.best_value
+            needed += rule.least_freedom(needed)
+            if telling[k]:
+                rule.searched(i, j, needed, effort.allowed)
+            done = rule.bound < needed or rule.missed <= effort.allowed
+            if best.best_value >= effort.enough or (effort.allowed >= 0.0 and done):
+                return False
+        return True
+
+    def _bases(self) -> tuple[Records, Floats]:
+        """Return the bases, (k,) of `BASE`, and whether each is precise enough to find the rest of its set."""
+        scan, m, index = self.scan, self.lines, self.context.index
+        room = np.empty(m * (m - 1) // 2, BASE)
+        bases = room[: rank_bases(scan, m, index.chains, index.area, room)]
+        weights = scan["gain"] / max(1e-9, float(scan["gain"].sum()))
+        x, y = float(weights @ scan["x"]), float(weights @ scan["y"])
+        square = float(weights @ ((scan["x"] - x) ** 2 + (scan["y"] - y) ** 2))
+        a, b = scan[bases["sliding"]], scan[bases["crossing"]]
+        variance = a["angle_variance"] * b["angle_variance"] / (a["angle_variance"] + b["angle_variance"])
+        off = square + (0.5 * (a["x"] + b["x"]) - x) ** 2 + (0.5 * (a["y"] + b["y"]) - y) ** 2
+        telling = variance * off <= TELLING**2
+        bases["merit"] += np.where(telling, 0.0, math.log(UNTELLING))
+        if m > BASE_LINES:
+            chosen = telling | (np.maximum(bases["sliding"], bases["crossing"]) < BASE_LINES)
+            bases, telling = bases[chosen], telling[chosen]
+        return bases, telling
+
+    def _search_parallel(self, slides: _BestPoses, spacing: float) -> None:
+        """Lay the longest of parallel lines on every chain, where these may gain more than the best pose does."""
+        scan, m = self.scan, min(len(self.scan), BASE_LINES)
+        if not m:
+            return
+        fraction = self.effort.kept_fraction if self.context.with_beams else self.effort.complete_above
+        floor = fraction * slides.best_value
+        sines = scan["dx"][:m, None] * scan["dy"] - scan["dy"][:m, None] * scan["dx"]
+        parallel = np.abs(sines) < PARALLEL_SINE
+        reach = parallel @ scan["gain"]
+        chosen: list[int] = []
+        for i in np.flatnonzero(reach > floor).tolist():
+            if len(chosen) < SLIDE_LINES and np.count_nonzero(parallel[i, chosen]) < 2:
+                chosen.append(i)
+        for i in chosen:
+            # Poses that explain other lines, too, are found from bases.
+            own = np.where(np.abs(sines[i]) < MIN_CROSSING_BASE, scan["gain"], 0.0)
+            if not self._propose(
+                lambda first, posed, i=i: slide_line(self.question, i, self.sweep, spacing, first, posed), own, slides
+            ):
+                return
+
+    def _propose(self, propose: Callable[[int, Records], tuple[int, int]], gains: Floats, best: _BestPoses) -> bool:
+        """Propose poses, reject most of them, score the rest; return False where the deadline passes."""
+        context, place, raster = self.context, self.context.index.tables.place, self.context.index.tables.raster
+        rules = ScoreRules(best.rule, context.parallel)
+        first, chains = 0, len(self.sweep.chains)
+        while first < chains:
+            if context.deadline.passed:
+                self.complete = False
+                return False
+            following, count = propose(first, self.posed)
+            if count < 0:
+                self.posed = np.empty(2 * len(self.posed), HYPOTHESIS)
+                self.poses, self.scores = np.empty(len(self.posed), ESTIMATE), np.zeros(len(self.posed), SET_SCORE)
+                continue
+            first = following
+            self.hypotheses += count
+            kept = reject(self.question, raster, gains, self.posed, count, best.rule, self.poses) if count else 0
+            if kept:
+                poses, scores = self.poses[:kept], self.scores[:kept]
+                value, refined = score_poses(self.question, place, poses, rules, scores, self.matches, context.work)
+                self.verified += refined
+                best.offer(poses, scores["value"] * (scores["score"] > 0.0), value)
+        return True

@@ -1,1 +1,0 @@
-"""Kernels of this stage. Each has a slow NumPy reference implementation in ``tests/association/reference``."""
