@@ -117,22 +117,8 @@ def explanation_json(found: Explanation) -> Json:
 
 def _verdict_json(one: VerdictExplanation) -> Json:
     return {
+        **asdict(one),
         "status": str(one.status),
-        "usable": one.usable,
-        "probability": one.probability,
         "pose": pose_json(one.pose),
-        "reasons": [{"code": reason.code, "message": reason.message} for reason in one.reasons],
-        "vetoes": [{**asdict(veto), "origin": str(veto.origin)} for veto in one.vetoes],
-        "features": None if one.features is None else dict(one.features),
-        "model": None if one.model is None else asdict(one.model),
-        "taken": None if one.taken is None else dict(one.taken),
-        "alternatives": [
-            {"pose": pose_json(other.pose), "gap": other.gap, "counted": other.counted, "weight": other.weight}
-            for other in one.alternatives
-        ],
-        "among_alternatives": None if one.among is None else {**asdict(one.among), "mean": one.among.mean},
-        "null": None if one.null is None else asdict(one.null),
-        "probability_of_pose": one.probability_of_pose,
-        "explained": one.explained,
-        "thresholds": None if one.thresholds is None else dict(one.thresholds),
+        "alternatives": [{**asdict(other), "pose": pose_json(other.pose)} for other in one.alternatives],
     }
