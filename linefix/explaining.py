@@ -88,7 +88,7 @@ def explain(
     >>> verdict = linefix.explain(room + other, seen).verdict
     >>> verdict.usable, [reason.code for reason in verdict.reasons]
     (False, ['similar_place'])
-    >>> len(verdict.alternatives), round(verdict.among.mean, 3)
+    >>> len(verdict.alternatives), round(verdict.among, 3)
     (1, 0.5)
     """
     index, how = prepared(map, options)

@@ -8,10 +8,10 @@ as a program would; a finding never changes an answer.
 from .analyze.analyze import Analysis, PlaceVerdict
 from .analyze.standing import Standing, standing_places
 from .check.check import check_map
-from .check.judging import judge_samples
+from .check.judging import conclude
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
-from .check.thickness import conclude, find_thickness, fit_better_mirrored, thickness_finding
+from .check.thickness import find_thickness
 from .update.applying import apply_changes
 from .update.result import (
     NOT_SHARPENED,
@@ -57,10 +57,7 @@ __all__ = [
     "check_map",
     "conclude",
     "find_thickness",
-    "fit_better_mirrored",
-    "judge_samples",
     "standing_places",
-    "thickness_finding",
     "try_sample",
     "update",
     "updating",

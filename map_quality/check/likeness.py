@@ -13,6 +13,7 @@ from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
 from ..views import Robot, look, similar_pose
+from .pieces import longest_pieces
 from .result import Finding, Place
 from .tuning import CLEARANCE, FOLLOWED, LEAST_ROOM, OFF_THE_WALL, PLACES, RAYS, REACH, SIGMA
 
@@ -81,21 +82,18 @@ def _places(index: MapIndex, segments: Segments) -> Iterator[RigidTransform]:
     """Yield free places in front of walls, in the map frame, at even steps of the length of all walls."""
     reached = np.cumsum(index.walls.longest)
     chosen = np.searchsorted(reached, (np.arange(PLACES) + 0.5) / PLACES * reached[-1])
-    for wall in dict.fromkeys(chosen.tolist()):
-        place = _free_place(index, segments, wall)
+    for piece in dict.fromkeys(longest_pieces(index)[chosen].tolist()):
+        place = _free_place(segments, piece % index.directed)
         if place is not None:
             yield place
 
 
-def _free_place(index: MapIndex, segments: Segments, wall: int) -> RigidTransform | None:
-    """Return a place in front of the middle of a wall, on its free side where a scan shows something from there."""
-    row = index.walls.rows[wall]
-    along, normal = 0.5 * float(row["begin"] + row["end"]), float(row["angle"]) + 0.5 * math.pi
-    x = float(row["dx"]) * along - float(row["dy"]) * float(row["offset"]) + float(index.origin[0])
-    y = float(row["dy"]) * along + float(row["dx"]) * float(row["offset"]) + float(index.origin[1])
-    for angle in (normal, normal + math.pi):
-        c, s = math.cos(angle), math.sin(angle)
-        room = float(scan(segments, RigidTransform(x + OFF_THE_WALL * c, y + OFF_THE_WALL * s, angle), RAY).ranges[0])
+def _free_place(segments: Segments, piece: int) -> RigidTransform | None:
+    """Return a place in front of the middle of a segment, on its free side where a scan shows something from there."""
+    (x, y), (dx, dy) = segments.midpoints[piece], segments.directions[piece]
+    for normal in (math.atan2(dx, -dy), math.atan2(-dx, dy)):
+        c, s = math.cos(normal), math.sin(normal)
+        room = float(scan(segments, RigidTransform(x + OFF_THE_WALL * c, y + OFF_THE_WALL * s, normal), RAY).ranges[0])
         if LEAST_ROOM < room < math.inf:
             away = min(CLEARANCE, 0.5 * room)
             return RigidTransform(x + away * c, y + away * s, 0.0)

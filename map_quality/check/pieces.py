@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
-from association.tables import Grid
 from registration.layout import Floats, Records
 
 from .result import Finding
@@ -68,19 +67,20 @@ def find_near_walls(index: MapIndex, deadline: Deadline) -> NearWalls:
     """Compare the walls of a directed map that are near to each other, as many as the deadline allows."""
     walls = index.walls.rows
     near = NearWalls(*(np.zeros(len(walls), dtype=bool) for _ in range(3)))
-    for pairs in near_pairs(index.grid):
+    for pairs in near_pairs(index):
         if deadline.passed:
             break
         _compare(walls, pairs, near)
     return near
 
 
-def near_pairs(grid: Grid) -> Iterator[Indices]:
+def near_pairs(index: MapIndex) -> Iterator[Indices]:
     """Yield the pairs of walls that one cell lists, (p, 2), the lower index first, up to `PAIRS_AT_A_TIME` together.
 
     Those of cells with few walls come first. A pair comes once for each cell that lists both.
     """
-    sizes, left = np.diff(grid.starts), MOST_PAIRS
+    grid, left = index.grid, MOST_PAIRS
+    sizes = np.diff(grid.starts)
     for size in range(2, MOST_IN_CELL + 1):
         cells = np.flatnonzero(sizes == size if size < MOST_IN_CELL else sizes >= size)
         first, second = np.triu_indices(size, 1)
@@ -170,12 +170,13 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     if least >= GREATEST_GAP:
         return
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
+    _, first, counts = np.unique(ends, axis=0, return_index=True, return_counts=True)
     # A segment whose end is as near as this to its own begin is too short for the test.
-    alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
-    if not alone.any() or deadline.passed:
+    alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > GREATEST_GAP)])
+    if not len(alone) or deadline.passed:
         return
     found = set()
-    for end, gap in _loose_ends(ends, np.flatnonzero(alone), least, deadline):
+    for end, gap in _loose_ends(ends, alone, least, deadline):
         if deadline.passed:
             break
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
@@ -188,15 +189,6 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
             "rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
-
-
-def _alone(ends: Floats) -> Flags:
-    """Return for each end, (n, 2) metres, whether no other is at the same place."""
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    same = (np.diff(ends[order], axis=0) == 0.0).all(axis=1)
-    alone = np.empty(len(ends), dtype=bool)
-    alone[order] = ~(np.append(same, False) | np.append(False, same))
-    return alone
 
 
 def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline) -> Iterator[tuple[int, float]]:
@@ -273,3 +265,11 @@ def segments_of(index: MapIndex, walls: NDArray[np.bool_] | NDArray[np.intp]) ->
     chosen[walls] = True
     pieces = np.flatnonzero(chosen[index.wall_of_piece]) % index.directed
     return tuple(np.unique(pieces).tolist())
+
+
+def longest_pieces(index: MapIndex) -> Indices:
+    """Return the longest segment of each wall, (walls,)."""
+    order = np.argsort(index.segments.lengths, kind="stable")
+    found = np.empty(len(index.walls.longest), dtype=np.intp)
+    found[index.wall_of_piece[order]] = order
+    return found

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from association import Deadline, MapIndex
-from association.consensus.kernels.sight import first_hit
-from association.layout import RAY, Flags
-from registration.layout import Floats, Records
+from registration import RigidTransform
+from registration.layout import Floats
+from simulation import Scanner, scan
 
-from .pieces import segments_of
+from .pieces import Flags, Indices, longest_pieces, segments_of
 from .result import Finding
 from .tuning import (
     CONTRADICTED,
@@ -34,35 +35,9 @@ from .tuning import (
     TURNS,
 )
 
-
-@dataclass(frozen=True, slots=True)
-class Looker:
-    """Follows single rays from places in the index frame, by the grid of the search: some 5 microseconds each.
-
-    `simulation.scan` takes time for every segment of the map, whatever a ray meets; this needs 24 rays from each wall.
-    """
-
-    index: MapIndex
-    _ray: Records = field(default_factory=lambda: np.zeros(1, RAY), repr=False)
-
-    def first(self, x: float, y: float, angle: float, limit: float) -> tuple[float, int]:
-        """Return how far away the first wall is along an angle, metres, and which; ``(limit, -1)`` where none is."""
-        ray, place = self._ray[0], self.index.tables.place
-        ray["x"], ray["y"], ray["limit"] = x, y, limit
-        ray["dx"], ray["dy"] = math.cos(angle), math.sin(angle)
-        reach, wall = first_hit(ray, place.walls, place.grid.starts, place.grid.items, place.grid.shape[0])
-        return float(reach), int(wall)
-
-    def is_within(self, x: float, y: float) -> bool:
-        """Return whether a place lies in the box around the walls, as far as cells list them."""
-        shape = self.index.tables.place.grid.shape[0]
-        right, top = shape["columns"] * shape["cell"], shape["rows"] * shape["cell"]
-        return bool(0.0 <= x - shape["x0"] <= right and 0.0 <= y - shape["y0"] <= top)
-
-    def is_front(self, wall: int, angle: float) -> bool:
-        """Return whether a ray along an angle meets a wall on its left, where free space is."""
-        row = self.index.walls.rows[wall]
-        return bool(row["dx"] * math.sin(angle) < row["dy"] * math.cos(angle))
+RAYS = Scanner(
+    len(TURNS), TURNS[0], (TURNS[-1] - TURNS[0]) / (len(TURNS) - 1), range_min=TOO_NEAR, range_max=FOLLOWED, sigma=0.0
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +53,7 @@ class Sides:
     lost : (k,) True where a ray on the left ended within the map without a hit: its hit is not known
     """
 
-    walls: np.ndarray[tuple[int], np.dtype[np.intp]]
+    walls: Indices
     lengths: Floats
     left: Floats
     right: Floats
@@ -107,18 +82,18 @@ class Sides:
         return self.share((self.against_left & self.against_right) | outside | within) >= MOST
 
     @property
-    def against_left(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def against_left(self) -> Flags:
         """The walls for which most rays from the side that should be free meet backs, (k,) flags."""
-        found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.left[:, 1] > CONTRADICTED * self.left.sum(axis=1)
+        found: Flags = self.left[:, 1] > CONTRADICTED * self.left.sum(axis=1)
         return found
 
     @property
-    def against_right(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def against_right(self) -> Flags:
         """The walls for which most rays from the side that should not be free meet fronts, (k,) flags."""
-        found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.right[:, 0] > CONTRADICTED * self.right.sum(axis=1)
+        found: Flags = self.right[:, 0] > CONTRADICTED * self.right.sum(axis=1)
         return found
 
-    def share(self, which: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+    def share(self, which: Flags) -> float:
         """Return how much of the length some of the walls have, 0 to 1."""
         return float(self.lengths[which].sum() / self.lengths.sum()) if len(self.lengths) else 0.0
 
@@ -129,44 +104,30 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong. No rays start from them, and a hit on
     one is no evidence.
     """
-    lengths = index.walls.longest
+    lengths, segments = index.walls.longest, index.segments.shifted(-index.origin)
     longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]
     chosen = longest[(lengths[longest] >= SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
-    left, right, room = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2)), np.full((len(chosen), 2), np.inf)
-    lost = np.zeros(len(chosen), bool)
-    looker, done = Looker(index), 0
-    for k, wall in enumerate(chosen):
+    ends = segments.endpoints.reshape(-1, 2, 2)
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    counts, room, lost = np.zeros((len(chosen), 2, 2)), np.full((len(chosen), 2), np.inf), np.zeros(len(chosen), bool)
+    done = 0
+    for k, piece in enumerate(longest_pieces(index)[chosen].tolist()):
         if deadline.passed:
             break
-        lost[k] = _look(looker, int(wall), both_ways, (left[k], right[k]), room[k])
+        near = np.flatnonzero(((high >= low[piece] - FOLLOWED) & (low <= high[piece] + FOLLOWED)).all(axis=1))
+        around, evidence = segments.take(near), ~both_ways[index.wall_of_piece[near]]
+        for place, (side, sign) in product(PLACES_ON_A_WALL, enumerate((1.0, -1.0))):
+            normal = sign * segments.normals[piece]
+            x, y = ends[piece, 0] + place * (ends[piece, 1] - ends[piece, 0]) + OFF_THE_WALL * normal
+            seen = scan(around, RigidTransform(x, y, math.atan2(normal[1], normal[0])), RAYS)
+            told = (seen.hits >= 0) & evidence[seen.hits]
+            counts[k, side] += [np.sum(told & seen.facing), np.sum(told & ~seen.facing)]
+            room[k, side] = min(room[k, side], seen.ranges[told].min(initial=np.inf))
+            angles = seen.angles[np.isinf(seen.ranges)] + seen.pose.theta
+            stops = np.array([x, y]) + FOLLOWED * np.column_stack([np.cos(angles), np.sin(angles)])
+            lost[k] |= side == 0 and ((stops >= low.min(axis=0)) & (stops <= high.max(axis=0))).all(axis=1).any()
         done = k + 1
-    return Sides(chosen[:done], lengths[chosen[:done]], left[:done], right[:done], room[:done], lost[:done])
-
-
-def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Floats], room: Floats) -> bool:
-    """Count fronts and backs that rays from a wall meet on its left and on its right, and note how near they are.
-
-    Returns whether a ray on the left met nothing as far as it was followed, and was still within the map.
-    """
-    lost = False
-    row = looker.index.walls.rows[wall]
-    normal = float(row["angle"]) + 0.5 * math.pi
-    nx, ny = -float(row["dy"]), float(row["dx"])
-    for share in PLACES_ON_A_WALL:
-        along = float(row["begin"]) + share * float(row["end"] - row["begin"])
-        x = float(row["dx"]) * along - float(row["dy"]) * float(row["offset"])
-        y = float(row["dy"]) * along + float(row["dx"]) * float(row["offset"])
-        for side, sign in enumerate((1.0, -1.0)):
-            px, py = x + sign * OFF_THE_WALL * nx, y + sign * OFF_THE_WALL * ny
-            for turn in TURNS:
-                angle = normal + turn + (0.0 if sign > 0.0 else math.pi)
-                reach, met = looker.first(px, py, angle, FOLLOWED)
-                if met >= 0 and reach > TOO_NEAR and not both_ways[met]:
-                    counts[side][0 if looker.is_front(met, angle) else 1] += 1.0
-                    room[side] = min(room[side], reach)
-                elif met < 0 and sign > 0.0:
-                    lost = lost or looker.is_within(px + reach * math.cos(angle), py + reach * math.sin(angle))
-    return lost
+    return Sides(chosen[:done], lengths[chosen[:done]], counts[:done, 0], counts[:done, 1], room[:done], lost[:done])
 
 
 def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:

@@ -1,81 +1,31 @@
-"""Thickness of walls, estimated from scans, and the conclusion from all sample scans."""
+"""Thickness of walls, estimated from sample scans."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
+from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, associate
 
-from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
-from association.context import SearchContext
-from association.rank_and_estimate import search_and_rank
-from registration import Segments
-
-from .judging import judge_samples
-from .result import Finding, SampleReport
-from .samples import Sample
+from ..scale import Matched, agreed
+from .result import Finding
 from .tuning import (
-    BETTER_THICKNESS,
+    CONFIDENCE,
+    DEVIATIONS,
     LEAST_THICKER,
-    MOST_FOR_THICKNESS,
-    MOST_LINES_FOR_THICKNESS,
-    THICKER,
-    THICKER_STEP,
+    LITTLE,
+    MANY,
+    MOST_SCANS,
+    SAME_THICKNESS,
     THICKNESS_SIGMA,
 )
-
-HIDES_THICKNESS = {"reversed", "scale"}  # codes of findings; the walls of such a map have no thickness to be found
-Scores = dict[float, float]
-"""Of the scans together, nats, by how much thicker the walls were taken to be, metres."""
-
-
-def conclude(
-    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample | None], deadline: Deadline, *, oriented: bool
-) -> SampleReport:
-    """Conclude from all samples together what would be better about their map, and how thick its walls are.
-
-    Parameters
-    ----------
-    index : MapIndex
-        Built with its directions, whatever they mean.
-    scans : sequence of Scan
-    samples : sequence of Sample or None
-        Of each scan, as of `try_sample`; None where there was no time for it.
-    deadline : Deadline
-    oriented : bool
-        True when the map states that directions mean something.
-
-    Raises
-    ------
-    CancelledError
-        When the deadline was cancelled.
-    """
-    tried = [one for one in samples if one is not None]
-    report = judge_samples(tried, sigma=index.sigma, oriented=oriented)
-    codes = {one.code for one in report.findings}
-    if codes & HIDES_THICKNESS or deadline.passed:
-        return report
-    directed, some = (
-        report.advice.oriented is not False,
-        [scan for scan, one in zip(scans, samples, strict=True) if one is not None],
-    )
-    found = find_thickness(index, some, deadline, oriented=directed)
-    if found is None:
-        return report
-    findings = report.findings
-    # A scan that fits badly for the thickness of walls may fit a little better mirrored.
-    if "mirrored" in codes and directed and not fit_better_mirrored(index, some, deadline):
-        findings = tuple(one for one in findings if one.code != "mirrored")
-    findings = (thickness_finding(found, oriented=directed), *findings)
-    return replace(report, findings=findings, wall_thickness=found)
 
 
 def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> float | None:
     """Return by how much the walls of a map are thicker than drawn, metres.
 
-    Lines without directions are walls of no thickness. Some changes are tried with both faces of each wall, then those
-    beside the best; between these the scores lie on a parabola.
+    Lines without directions are walls of no thickness. Scans are searched with a wide sigma of the walls. In each the
+    distance by which all walls are nearer than drawn is half of the thickness that is missing.
 
     Parameters
     ----------
@@ -90,47 +40,21 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
     Returns
     -------
     float or None
-        None where nothing clearly fits better than the walls as they are, or no time was left to see.
+        None where most scans agree on none, or no time was left to see.
     """
-    scores = _scores(index, scans, deadline, oriented=oriented)
-    if not scores:
+    some = scans[:: -(-len(scans) // MOST_SCANS)] if scans else []
+    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=oriented)
+    try:
+        place = replace(index if oriented else index.undirected_by(deadline), sigma=THICKNESS_SIGMA)
+    except IndexingEndedError:
         return None
-    found = _top(scores)
-    better = scores[_best(scores)] > BETTER_THICKNESS * scores[0.0]
-    return round(found, 3) if better and abs(found) >= LEAST_THICKER else None
-
-
-def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> Scores:
-    """Return scores of possible thicknesses and of those next to the best; empty without scans to try, or time."""
-    if not scans or index.directed > MOST_LINES_FOR_THICKNESS:
-        return {}
-    some, faces = scans[:: -(-len(scans) // MOST_FOR_THICKNESS)], _faces(index, oriented=oriented)
-    scores: Scores = {}
-
-    def tried(changes: Sequence[float]) -> bool:
-        for change in changes:
-            if deadline.passed:
-                return False
-            try:
-                scores[change] = _score(faces.moved_left(0.5 * change), some, deadline)
-            except IndexingEndedError:
-                return False
-        return not deadline.passed
-
-    first = [one for one in THICKER if oriented or one >= 0.0]
-    return scores if tried(first) and tried(_beside(_best(scores))) else {}
-
-
-def fit_better_mirrored(index: MapIndex, scans: Sequence[Scan], deadline: Deadline) -> bool:
-    """Return whether scans fit a directed map better mirrored, each with the thickness of walls that fits best."""
-    either = [_scores(index, some, deadline, oriented=True) for some in (scans, [mirrored(scan) for scan in scans])]
-    as_they_are, other = (max(one.values(), default=0.0) for one in either)
-    return other > as_they_are
-
-
-def _faces(index: MapIndex, *, oriented: bool) -> Segments:
-    lines = index.segments.take(np.arange(index.directed))
-    return lines if oriented else Segments.derived(np.vstack([lines.endpoints, lines.reversed().endpoints]))
+    results = ((scan, associate(place, scan, None, options, deadline)) for scan in some)
+    found = [Matched.of(index.segments, scan, result) for scan, result in results]
+    offset = agreed([one for one in found if one is not None], LITTLE, "offset", 0.5 * SAME_THICKNESS)
+    thicker = 2.0 * offset.value if oriented else max(0.0, 2.0 * offset.value)
+    if deadline.passed or offset.count <= MANY * len(some):
+        return None
+    return round(thicker, 3) if abs(thicker) >= max(LEAST_THICKER, 2.0 * DEVIATIONS * offset.deviation) else None
 
 
 def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
@@ -148,31 +72,3 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
         f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For any other map, "
         "for example a grid, state this uncertainty as `sigma`.",
     )
-
-
-def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
-    index = MapIndex.build(faces, THICKNESS_SIGMA, deadline=deadline)
-    options = AssociationOptions()
-    # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
-    found = (search_and_rank(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
-    return sum(max(0.0, one.best.score) for one in found if one is not None)
-
-
-def _best(scores: Scores) -> float:
-    return max(scores, key=lambda one: scores[one])
-
-
-def _beside(change: float) -> tuple[float, float]:
-    """Return the changes that are one step smaller and larger; rounded, as keys."""
-    return round(change - THICKER_STEP, 3), round(change + THICKER_STEP, 3)
-
-
-def _top(scores: Scores) -> float:
-    """Return the vertex of the parabola through the best score and those a step next to it."""
-    best = _best(scores)
-    low, high = _beside(best)
-    if low not in scores or high not in scores:
-        return best
-    below, above = scores[low], scores[high]
-    bend = below - 2.0 * scores[best] + above
-    return best if bend >= 0.0 else best + THICKER_STEP * 0.5 * (below - above) / bend

@@ -58,21 +58,29 @@ SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive 
 
 SIGMAS = (0.05, 0.1, 0.2)  # m, tables; tried in addition to the map's own: half the thickness of walls, or more
 WIDEST = max(SIGMAS)
+CONFIDENCE = 0.99  # tables; of a search under a hypothesis
 LITTLE = 0.01  # m, tables; the estimate where walls are right
-BETTER_SCALED = 1.05  # times, tables
-LADDER = tuple(1.12**k for k in range(-14, 15) if k)  # 0.2 to 5, tables; factors by which scans are tried to be off
-LADDER_SECONDS = 1.0  # of a scan, small maps take a quarter of that; or as long as all else took
 BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
 MANY = 0.5  # of the scans that give evidence
-LEAST_SCALE = 0.004  # as `LEAST_FACTOR`; a factor that is reported differs from one by this
-SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
-HIDDEN_SCALE = 0.08  # tables; as much the thickness of walls may feign where lines run along their middle
 MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
-LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
-MOST_FOR_THICKNESS, MOST_LINES_FOR_THICKNESS = 10, 20_000  # scans, and segments; time
-THICKER = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4)  # m; how much thicker walls may be than drawn
-THICKER_STEP = 0.05  # m, tables; the score is a parabola about as wide where walls are off by `THICKNESS_SIGMA`
-THICKNESS_SIGMA = 0.05  # m
-BETTER_THICKNESS, LEAST_THICKER = 1.02, 0.03  # times, and m, tables
 LEAST_SIGMA, GREATEST_SIGMA = 0.005, 1.0  # m
+MOST_SCANS, MOST_LINES = 10, 20_000  # scans, and segments, whose scale and thickness are searched for; time
+
+# --- Scale ------------------------------------------------------------------------------------------------------------
+
+LADDER = tuple(1.1**k for k in range(-17, 18))  # 0.2 to 5, tables; factors by which the map is tried to be off
+LAX_TOLERANCE = 0.4  # m, tables; of offsets, so that scans off by half a rung find the walls near them
+MOST_ON_LADDER = 4  # scans; time
+LEAST_SCALE = 0.004  # tables; a factor that is reported differs from one by this,
+DEVIATIONS = 3.0  # and by so many of its deviations
+SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
+LEAST_EXTENT = 1.5  # m, geometry; the part seen of any room
+GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
+EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
+
+# --- Thickness --------------------------------------------------------------------------------------------------------
+
+THICKNESS_SIGMA = 0.05  # m, tables; of walls where these are searched for
+LEAST_THICKER = 0.03  # m, tables
+SAME_THICKNESS = 0.03  # m, tables; of scans that agree

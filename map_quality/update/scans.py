@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
 from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
 
+from ..scale import Matched, errors_of
 from .result import RefusedVisit
 from .tuning import (
     AGREEING,
@@ -31,7 +32,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
-DOUBTFUL = frozenset(("map_scale", "unit_scale", "mirrored", "reversed", "stuck_ranges", "scan_exceeds_map"))
+DOUBTFUL = frozenset(("map_scale", "stuck_ranges", "scan_exceeds_map"))
 
 
 # Reasons that changes of a building alone may give.
@@ -249,55 +250,16 @@ def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float)
             f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building, "
             "and that the map shows the places where they were taken."
         )
-    factor, sigma_of_factor = scale_of(precise, sigma)
-    if sigma_of_factor > SURE_OF_SCALE:
+    matched = [Matched(one.scan, one.pose, one.pairs) for one in precise]
+    errors = errors_of(matched, sigma)
+    if errors.scale_deviation > SURE_OF_SCALE:
         return (
-            f"The scale of the scans is known to {100.0 * sigma_of_factor:.1f} % only, expected "
+            f"The scale of the scans is known to {100.0 * errors.scale_deviation:.1f} % only, expected "
             f"{100.0 * SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
         )
-    if abs(factor) > OFF_SCALE:
+    if abs(errors.scale) > OFF_SCALE:
         return (
-            f"Lengths of the scans are off by {100.0 * factor:.1f} % from those of the map, expected at most "
+            f"Lengths of the scans are off by {100.0 * errors.scale:.1f} % from those of the map, expected at most "
             f"{100.0 * OFF_SCALE:g} %. Check the scale of the map and of the ranges."
         )
     return None
-
-
-def scale_of(found: Sequence[Localized], sigma: float) -> tuple[float, float]:
-    """Estimate by which fraction the lengths of scans are off from those of the map.
-
-    The offset of a scan line from its wall is ``q s + k b + g . d`` with its lever arm ``q`` along the wall's normal,
-    the fraction ``s``, the cosine ``k`` between ray and normal, an error ``b`` of all ranges, and the error ``d`` of
-    the pose. Poses are marginal: only walls of one direction at several distances tell the scale.
-
-    Returns
-    -------
-    float
-        The fraction, above 0 where ranges are too long.
-    float
-        Its standard deviation.
-    """
-    information, right, square, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
-    for one in found:
-        pairs, c, s = one.pairs, math.cos(one.pose.theta), math.sin(one.pose.theta)
-        turn = np.array([[c, s], [-s, c]])
-        viewed, turned = (pairs.midpoints - np.asarray(one.scan.viewpoint)) @ turn, pairs.midpoints @ turn
-        normals, offsets = pairs.map_normals, np.array([pair.offset for pair in one.result.correspondences])
-        arms = np.einsum("ij,ij->i", normals, viewed)
-        scale = np.column_stack([arms, arms / np.maximum(np.hypot(*viewed.T), 1e-6)])
-        lever = normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]
-        pose = np.column_stack([normals, lever])
-        weight = 1.0 / (pairs.variances + sigma**2)
-        own = (pose * weight[:, None]).T @ pose + 1e-3 * np.eye(3)
-        gain = np.linalg.solve(own, (pose * weight[:, None]).T @ np.column_stack([scale, offsets]))
-        both = (scale * weight[:, None]).T @ np.column_stack([scale, offsets, pose])
-        information += both[:, :2] - both[:, 3:] @ gain[:, :2]
-        right += both[:, 2] - both[:, 3:] @ gain[:, 2]
-        square += float(weight @ offsets**2 - ((weight * offsets) @ pose) @ gain[:, 2])
-        count += len(offsets) - 3
-    # Of the range error 5 cm are usual; without that, and the scale of 10 %, they are not told apart in square rooms.
-    information += np.diag([1.0 / 0.1**2, 1.0 / 0.05**2])
-    covariance = np.linalg.inv(information)
-    solution = covariance @ right
-    inflation = max(1.0, (square - float(right @ solution)) / max(1, count))
-    return float(solution[0]), math.sqrt(covariance[0, 0] * inflation)

@@ -1,0 +1,214 @@
+"""The factor between the lengths of a map and of its sample scans: a unit that was taken for another, or a wrong scale.
+
+Where most scans are usable, their correspondences show the factor. Otherwise the map is divided by each factor of a
+ladder, and some scans are searched in it. The factor with the highest sum of scores is refined in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    IndexingEndedError,
+    InvalidMapError,
+    MapIndex,
+    Scan,
+    associate,
+    scaled,
+)
+from registration import Segments
+
+from ..scale import Matched, agreed
+from .samples import Sample, Trial
+from .tuning import (
+    CONFIDENCE,
+    DEVIATIONS,
+    EXCEEDING,
+    GREATEST_EXTENT,
+    LADDER,
+    LARGEST,
+    LAX_TOLERANCE,
+    LEAST_EXTENT,
+    LEAST_SCALE,
+    LITTLE,
+    MANY,
+    MOST_LINES,
+    MOST_ON_LADDER,
+    SAME_FACTOR,
+    SMALLEST,
+)
+
+# Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
+TAKEN_FOR: Mapping[float, tuple[str, str]] = {
+    10.0: ("decimetres", "metres"),
+    100.0: ("centimetres", "metres"),
+    1000.0: ("millimetres", "metres"),
+    1.0 / 0.0254: ("inches", "metres"),
+    1.0 / 0.3048: ("feet", "metres"),
+    25.4: ("millimetres", "inches"),
+    304.8: ("millimetres", "feet"),
+    2.54: ("centimetres", "inches"),
+    30.48: ("centimetres", "feet"),
+    12.0: ("inches", "feet"),
+}
+SAME_UNIT = 0.003  # of a factor; nearer to one of units it is that
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """The factor by which the lengths of a map are greater than those of its scans.
+
+    Attributes
+    ----------
+    factor, deviation : float
+        The factor and its standard deviation.
+    agreeing : int
+        Number of scans that have this factor, each by itself.
+    usable : int
+        Number of scans that are usable when map and scans are to scale.
+    """
+
+    factor: float
+    deviation: float
+    agreeing: int
+    usable: int
+
+    @property
+    def is_one(self) -> bool:
+        """Return whether map and scans may be of one scale."""
+        return abs(self.factor - 1.0) < max(LEAST_SCALE, DEVIATIONS * self.deviation)
+
+
+@dataclass(frozen=True, slots=True)
+class _Scaled:
+    """A map and scans that are searched in it, to scale by a factor.
+
+    Attributes
+    ----------
+    index : MapIndex
+    scans : sequence of Scan
+    factor : float
+        By which the map was divided; or, where the scans are of an unusual size, the scans were multiplied.
+    oriented : bool
+    deadline : Deadline
+    """
+
+    index: MapIndex
+    scans: Sequence[Scan]
+    factor: float
+    oriented: bool
+    deadline: Deadline
+
+    def by(self, factor: float) -> _Scaled | None:
+        """Return them with another factor, these having none; None where the map cannot be indexed, or not in time."""
+        if not self.is_usual:
+            return replace(self, scans=[scaled(scan, factor) for scan in self.scans], factor=factor)
+        segments = Segments.derived(self.index.segments.endpoints[: self.index.directed] / factor)
+        points, sigma = self.index.points, self.index.sigma
+        points = replace(points, positions=points.positions / factor)
+        with suppress(InvalidMapError, IndexingEndedError):
+            index = MapIndex.build(segments, sigma, oriented=self.oriented, points=points, deadline=self.deadline)
+            return replace(self, index=index, factor=factor)
+        return None
+
+    def search(self, *, lax: bool = False) -> list[AssociationResult]:
+        """Search each scan; `lax` finds walls that are off by decimetres, by segments alone, in half of the time."""
+        options = AssociationOptions(
+            max_alternatives=0,
+            confidence=CONFIDENCE,
+            oriented=self.oriented,
+            offset_tolerance=LAX_TOLERANCE if lax else None,
+        )
+        scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
+        return [associate(self.index, scan, None, options, self.deadline) for scan in scans]
+
+    def fit(self, results: Sequence[AssociationResult]) -> Scale:
+        """Estimate the factor from the correspondences."""
+        found = [Matched.of(self.index.segments, scan, one) for scan, one in zip(self.scans, results, strict=True)]
+        matched, sigma = [one for one in found if one is not None], self.index.sigma
+        off = agreed(matched, LITTLE if sigma is None else sigma, "scale", SAME_FACTOR)
+        usable = sum(one.usable for one in results)
+        return Scale(self.factor * (1.0 - off.value), self.factor * off.deviation, off.count, usable)
+
+    @property
+    def extent(self) -> float:
+        """The usual extent of the scans, metres."""
+        return float(np.median([np.hypot(*np.ptp(scan.measured.segments.midpoints, axis=0)) for scan in self.scans]))
+
+    @property
+    def is_usual(self) -> bool:
+        """Return whether the scans are as large as scans are: then the map is put to scale, else they are."""
+        return LEAST_EXTENT <= self.extent <= GREATEST_EXTENT
+
+    def rungs(self) -> Iterator[float]:
+        """Yield the factors that are tried: those after which the scans fit into the map, and robots drive about it."""
+        for factor in (*LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
+            of_map, of_scans = (1.0 / factor, 1.0) if self.is_usual else (1.0, factor)
+            extent, diagonal = of_scans * self.extent, of_map * self.index.diagonal
+            if LEAST_EXTENT <= extent <= EXCEEDING * diagonal and SMALLEST <= diagonal <= LARGEST:
+                yield factor
+
+
+def find_scale(
+    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample], deadline: Deadline, *, oriented: bool
+) -> Scale | None:
+    """Estimate the factor between a map and sample scans.
+
+    Parameters
+    ----------
+    index : MapIndex
+    scans, samples : sequence of Scan and of Sample
+        Each scan, and its search in the map as it is.
+    deadline : Deadline
+        When it passes, no factor is found.
+    oriented : bool
+        True when the map states that directions mean something.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    results = [one.result for one in samples]
+    sent = _Scaled(index, scans, 1.0, oriented, deadline)
+    if sum(one.usable for one in results) > MANY * len(scans):
+        first = sent.fit(results)
+    else:
+        rung = _best_rung(sent)
+        if rung is None:
+            return None
+        first = rung.fit(rung.search(lax=True))
+    place = None if first.is_one or deadline.passed else sent.by(first.factor)
+    return None if place is None else place.fit(place.search())
+
+
+def _best_rung(sent: _Scaled) -> _Scaled | None:
+    """Return map and scans by the factor of the ladder at which some scans fit best; None where none fits."""
+    few = replace(sent, scans=sorted(sent.scans, key=lambda scan: -len(scan.measured))[:MOST_ON_LADDER])
+    if sent.index.directed > MOST_LINES or few.extent <= 0.0:
+        return None
+    best, most = None, 0.0
+    for factor in few.rungs():
+        if sent.deadline.passed:
+            return None
+        place = few.by(factor)
+        score = 0.0 if place is None else sum(Trial.of(one).score for one in place.search(lax=True))
+        if score > most:
+            best, most = factor, score
+    return None if best is None else sent.by(best)
+
+
+def unit_mistake(factor: float) -> tuple[float, str]:
+    """Return the factor between two units that is near to one, and which was taken for which; or the same and ""."""
+    for known, (unit, other) in TAKEN_FOR.items():
+        for exact, told in ((known, f"{unit} taken for {other}"), (1.0 / known, f"{other} taken for {unit}")):
+            if abs(factor / exact - 1.0) < SAME_UNIT:
+                return exact, f" The map seems to be in {told}."
+    return factor, ""
