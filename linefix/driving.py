@@ -118,7 +118,7 @@ def last_view(scan: Scan) -> LastView | None:
     None where no view is, or all are: those are several sensors, or a drive of which no error is known.
     """
     views = scan.views
-    if views is None or not views.uncertain:
+    if views is None:
         return None
     exact: NDArray[np.bool_] = ~np.any(views.root.reshape(len(views), -1), axis=1)
     segments, beams = exact[views.of_segment], exact[views.of_beam]

@@ -179,6 +179,13 @@ def test_a_critical_wall_has_the_indices_of_the_drive() -> None:
     assert found.diagnostics.critical_wall == replace(wall, scan=(before, before + 2))
 
 
+def test_what_the_last_view_leaves_unmatched_stays_so() -> None:
+    whole, before = latest_last()
+    alone = replace(ALONE, unmatched_scan=(1,))
+    found = search_drive(lambda scan: DRIVE if scan is whole else alone, whole)
+    assert found.unmatched_scan == (*range(before), before + 1)
+
+
 def test_a_drive_that_is_usable_is_searched_once() -> None:
     usable = replace(DRIVE, usable=True)
     assert answered(drive=usable) is usable
@@ -221,6 +228,8 @@ def test_what_is_not_usable_alone_is_not_usable_as_a_drive() -> None:
 def test_a_prior_that_the_drive_contradicts_is_not_answered() -> None:
     elsewhere = HardPrior(RigidTransform(7.5, 2.0, INSIDE.theta), 0.5, 0.5)
     assert not linefix.associate(INDEX, WHOLE, elsewhere).usable
+    maps = linefix.index_maps({"room": ROOM, "hall": ROOM[:4] * [2.0, 3.0, 2.0, 3.0]})
+    assert not associate_on_maps(maps, WHOLE, KnownOfMaps(elsewhere, "room")).usable
     assert linefix.associate(INDEX, WHOLE, HardPrior(INSIDE, 0.5, 0.5)).usable
 
 
