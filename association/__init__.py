@@ -37,11 +37,13 @@ from .verdict_explanation import (
     WeighedAlternative,
     explain_verdict,
 )
+from .warnings import NOT_IN_ORDER
 
 __all__ = [
     "AS_WELL",
     "MAX_VIEWS",
     "NOTHING_KNOWN",
+    "NOT_IN_ORDER",
     "NO_POINTS",
     "PARTS",
     "Alternative",

@@ -92,7 +92,7 @@ def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
         factor, turn = _scale_of(found.answer.estimate), _turn_of(found.answer.estimate)
         if factor == 1.0 and turn == 0.0:
             break
-        again = context.with_scan(corrected_scan(context.scan, factor, turn, context.sensor))
+        again = context.with_scan(corrected_scan(context.scan, factor, turn))
         better = _explain(again, factor * found.scale, turn + found.turn)
         if better.answer is None or better.answer.best.posterior <= found.answer.best.posterior:
             break

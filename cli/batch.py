@@ -20,7 +20,7 @@ from registration import InputError
 
 from .compiling import compile_kernels
 from .errors import RefusedError, WrongUseError
-from .options import AsJson, grouped
+from .options import AsJson, UsableOptions, grouped
 from .printing import noted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def batch(
     out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row per scan.")],
     workers: WorkerOptions,
     search: SearchChoice,
+    usable: UsableOptions,
     as_json: AsJson = False,
 ) -> None:
     """Localize the scans of many logs; the same command continues an interrupted run.
@@ -70,7 +71,7 @@ def batch(
         from batch import associate_many
 
         with shown_progress() as watch:
-            options = _options(workers.block, search)
+            options = _options(workers.block, search, usable)
             summary = associate_many(logs, maps, out, options, _engine(workers), watch)
     except ModuleNotFoundError as error:
         extra = "ray" if workers.ray else "batch"
@@ -94,11 +95,11 @@ def _first_error(out: Path) -> str:
     return next((str(told) for told in pq.read_table(out, columns=["error"])["error"].to_pylist() if told), "unknown")
 
 
-def _options(block: int, chosen: SearchChoice) -> FleetOptions:
+def _options(block: int, chosen: SearchChoice, usable: UsableOptions) -> FleetOptions:
     from association import AssociationOptions
     from batch import FleetOptions
 
-    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not chosen.undirected)
+    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not chosen.undirected, **asdict(usable))
     return FleetOptions(search, chosen.deadline_ms, block, compile_kernels)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from .contract import Json
 from .errors import WrongUseError
 from .locate import NearOptions, SearchChoice, request_body
-from .options import AsJson, MapArgument, ScanArgument, grouped
+from .options import AsJson, MapArgument, ScanArgument, UsableOptions, grouped
 from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
@@ -13,16 +13,20 @@ MOST_ALTERNATIVES = 10  # that people read; --json has all
 
 @grouped
 def explain(
-    on: MapArgument, scan: ScanArgument, window: NearOptions, search: SearchChoice, as_json: AsJson = False
+    on: MapArgument,
+    scan: ScanArgument,
+    window: NearOptions,
+    search: SearchChoice,
+    usable: UsableOptions,
+    as_json: AsJson = False,
 ) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
-    The answer is that of linefix locate. It is usable if the cautious probability reaches its threshold and no veto
-    applies.
+    The answer is that of linefix locate. It is usable if its probability reaches --usable-from and no veto applies.
     """
     from . import here
 
-    body = request_body([on], scan, window, search)
+    body = request_body([on], scan, window, search, usable)
     if "maps" in body:
         raise WrongUseError(f"{on}: found a folder with {len(body['maps'])} maps, expected one map")
     found = here.explain(body)
@@ -39,38 +43,32 @@ def explain(
 def _print_verdict(one: Json) -> None:
     """Print a verdict, part by part."""
     if one["features"] is not None:
-        _print_model(one["model"])
-        _print_taken(one["taken"])
+        for against in one["log_odds"]:
+            _print_odds(one, against)
+        print("\nIncrease of the log odds if the features of a reason were usual, nats")
+        print_table(("reason", "nats"), list(one["taken"].items()))
         _print_alternatives(one)
         _print_null(one["null"])
     print("\nVetoes")
     print_table(
-        ("veto", "origin", "result"),
-        [(veto["name"], veto["origin"], "applies" if veto["applies"] else "passed") for veto in one["vetoes"]],
+        ("veto", "reason", "result"),
+        [(veto["name"], veto["reason"], "applies" if veto["applies"] else "passed") for veto in one["vetoes"]],
     )
     _print_probabilities(one)
 
 
-def _print_model(model: Json) -> None:
-    """Print the terms of the model, next to those of a usual right answer."""
-    print("\nContributions to the log odds, nats")
-    rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in model["contributions"]]
-    rows.append(("sum", None, model["log_odds"], sum(term["usual"] for term in model["contributions"])))
+def _print_odds(one: Json, against: str) -> None:
+    """Print the terms of the odds against one way of being not right, next to those of a usual right answer."""
+    print(f"\nContributions to the log odds against {against}, nats")
+    terms = [term for term in one["contributions"] if term["against"] == against]
+    rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in terms]
     print_table(("feature", "value", "contribution", "usual"), rows)
-    print(
-        f"probability by the model: {model['probability']:.4f}; if the robot is known to be on this map, with "
-        f"{model['on_map']:.3f} nats more: {model['probability_on_map']:.4f}"
-    )
-
-
-def _print_taken(taken: Json) -> None:
-    print("\nDecrease of the log odds by reason, nats")
-    print_table(("reason", "nats"), list(taken.items()))
+    print(f"log odds with the constant: {one['log_odds'][against]:.3f}")
 
 
 def _print_alternatives(one: Json) -> None:
     """Print the alternatives with their weights, and the probability among them."""
-    others, among = one["alternatives"], one["among_alternatives"]
+    others = one["alternatives"]
     print(f"\nAlternatives: {len(others)}; the answer has weight 1")
     rows = [
         (pose_text(other["pose"]), round(other["gap"], 3) + 0.0, other["weight"])
@@ -78,12 +76,6 @@ def _print_alternatives(one: Json) -> None:
     ]
     if rows:
         print_table(("pose", "gap in nats", "weight"), rows)
-    loose = among["with_loose_walls"]
-    compared = "not compared" if loose is None else f"{loose:.4f}"
-    print(
-        f"probability among them as scored: {among['as_scored']:.4f}; by what the scan shows: {among['by_shown']:.4f}; "
-        f"with walls off by more: {compared}; weighted mean: {among['mean']:.4f}"
-    )
 
 
 def _print_null(null: Json | None) -> None:
@@ -91,7 +83,7 @@ def _print_null(null: Json | None) -> None:
         print("\nNull score: not searched, because the answer is not usable without it")
         return
     if not null["score"]:
-        print(f"\nNull score: none above {null['searched_above']:.2f} of the answer's score")
+        print("\nNull score: the mirrored scan fits nowhere")
         return
     print(
         f"\nNull score: {null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score; "
@@ -100,12 +92,15 @@ def _print_null(null: Json | None) -> None:
 
 
 def _print_probabilities(one: Json) -> None:
-    """Print the probabilities that decide next to their thresholds, and what follows."""
-    if one["thresholds"] is not None:
-        print("\nProbabilities")
+    """Print the probabilities, their thresholds, and what follows."""
+    if one["features"] is not None:
+        least = one["thresholds"]
+        print(f"\nProbabilities, with the prior probability {least['on_map']:.2f} of the map")
         rows = [
-            (name, one[name], threshold, "reached" if one[name] >= threshold else "not reached")
-            for name, threshold in one["thresholds"].items()
+            ("by the model", one["by_model"], None),
+            ("among the alternatives", one["among"], None),
+            ("of the pose, their product", one["by_model"] * one["among"], least["usable_from"]),
+            ("explained", one["explained"], least["explained"]),
         ]
-        print_table(("probability", "value", "threshold", "result"), rows)
+        print_table(("probability", "value", "threshold"), rows)
     print(f"\nstatus {one['status']}, {'usable' if one['usable'] else 'not usable'}")

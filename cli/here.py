@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import linefix
-from association import IndexingEndedError, KnownOfMaps, Prior, associate_on_maps, explain_verdict
+from association import IndexingEndedError, KnownOfMaps, Prior
 from linefix.answers import Included, association_json, registration_json
-from linefix.explaining import explanation_json
+from linefix.driving import associate_on_maps
+from linefix.explaining import explain_search, explanation_json
 from linefix.map_answers import checked_json, import_json, map_json, update_json
 from map_quality import check_map
 from service.contract import (
@@ -63,7 +64,7 @@ def explain(body: Json) -> Json:
     compile_first()
     with refusing(Asked(id_of(body.get("map")))):
         asked = _Search.of(body)
-        found = explain_verdict(*asked.arguments)
+        found = explain_search(*asked.arguments)
         return {"answer": asked.answer(found.result), **explanation_json(found)}
 
 

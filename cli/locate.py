@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
 import typer
@@ -11,7 +11,7 @@ import typer
 from .asking import ask
 from .contract import Json
 from .errors import WrongUseError
-from .options import AsJson, MapsArgument, ScanArgument, Server, grouped
+from .options import AsJson, MapsArgument, ScanArgument, Server, UsableOptions, grouped
 from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
 from .scans import read_scan
 from .several import read_target
@@ -37,12 +37,6 @@ class SearchChoice:
     undirected: Annotated[bool, typer.Option("--undirected", help="The directions of segments have no meaning.")] = (
         False
     )
-    causes: Annotated[
-        bool,
-        typer.Option(
-            "--causes", help="If the answer is not usable, test the scan mirrored, reversed and in other units."
-        ),
-    ] = False
     weight: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,11 +53,12 @@ def locate(
     scan: ScanArgument,
     window: NearOptions,
     search: SearchChoice,
+    usable: UsableOptions,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Find the pose of a scan on a map, or on one of several; the answer is that of /v1/associate."""
-    answer = ask("associate", request_body(on, scan, window, search), server)
+    answer = ask("associate", request_body(on, scan, window, search, usable), server)
     if as_json:
         print_json(answer)
         return
@@ -76,9 +71,11 @@ def locate(
         print_table(columns, [_map_row(one) for one in answer["maps"]])
 
 
-def request_body(on: Sequence[str], scan: str, window: NearOptions, search: SearchChoice) -> Json:
+def request_body(
+    on: Sequence[str], scan: str, window: NearOptions, search: SearchChoice, usable: UsableOptions
+) -> Json:
     """Return the request of ``/v1/associate`` for the arguments and options of a command."""
-    body: Json = {**read_target(on), "scan": read_scan(scan), "options": {}}
+    body: Json = {**read_target(on), "scan": read_scan(scan), "options": asdict(usable)}
     if window.near is not None:
         pose = dict(zip(("x", "y", "theta"), window.near, strict=True))
         body["prior"] = pose | {"radius": window.radius, "angle": window.angle}
@@ -90,8 +87,6 @@ def request_body(on: Sequence[str], scan: str, window: NearOptions, search: Sear
         body["map_weights"] = dict(map(_weight, search.weight))
     if search.undirected:
         body["options"]["oriented"] = False
-    if search.causes:
-        body["options"]["include"] = ["correspondences", "alternatives", "segments", "missing_map", "causes"]
     if search.deadline_ms is not None:
         body["options"]["deadline_ms"] = search.deadline_ms
     return body

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -18,14 +18,13 @@ from .compiling import compile_first
 from .contract import Json
 from .errors import RefusedError
 from .logs import sent
+from .options import UsableOptions
 from .several import documents_of
 
 if TYPE_CHECKING:
     from formats import LoggedScan
 
     from .server import Server
-
-SEARCH = linefix.AssociationOptions(max_alternatives=0, parts=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +67,7 @@ class Locator(Protocol):
 
 
 @contextmanager
-def locating(target: Json, server: str | None) -> Iterator[Locator]:
+def locating(target: Json, usable: UsableOptions, server: str | None) -> Iterator[Locator]:
     """Give a locator for the map, or the maps, of a request: this process, or the server at a URL.
 
     Raises
@@ -78,7 +77,7 @@ def locating(target: Json, server: str | None) -> Iterator[Locator]:
     """
     if server is not None:
         with closing(server_at(server)) as remote:
-            yield Remote(remote, target)
+            yield Remote(remote, target, usable)
         return
     from .stored import require_size, settings_here
 
@@ -92,7 +91,7 @@ def locating(target: Json, server: str | None) -> Iterator[Locator]:
         index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
     except InputError as error:
         raise RefusedError(str(error)) from None
-    yield Local(index, seconds)
+    yield Local(index, linefix.AssociationOptions(max_alternatives=0, parts=(), **asdict(usable)), seconds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +101,13 @@ class Local:
     Attributes
     ----------
     index : MapIndex or MapSet
+    options : AssociationOptions
     seconds : float
         That a search may take.
     """
 
     index: linefix.MapIndex | linefix.MapSet
+    options: linefix.AssociationOptions
     seconds: float
 
     def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None, prior_map: str | None = None) -> Found:
@@ -117,7 +118,7 @@ class Local:
             read = time.perf_counter()
             deadline = linefix.Deadline(time.monotonic() + self.seconds)
             answer = linefix.locate(
-                self.index, scan, prior=prior, prior_map=prior_map, options=SEARCH, deadline=deadline
+                self.index, scan, prior=prior, prior_map=prior_map, options=self.options, deadline=deadline
             )
         except InputError as error:
             raise RefusedError(str(error)) from None
@@ -138,13 +139,14 @@ class Local:
 class Remote:
     """A server, over HTTP."""
 
-    def __init__(self, service: Server, target: Json) -> None:
+    def __init__(self, service: Server, target: Json, usable: UsableOptions) -> None:
         self._service = service
         self._target = target
+        self._options = {"include": [], "max_alternatives": 0, **asdict(usable)}
 
     def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None, prior_map: str | None = None) -> Found:
         """Return where a scan was taken."""
-        body: Json = {**self._target, "scan": sent(one), "options": {"include": [], "max_alternatives": 0}}
+        body: Json = {**self._target, "scan": sent(one), "options": self._options}
         if prior is not None:
             body["prior"] = {**_pose(prior.pose), "covariance": np.asarray(prior.covariance).tolist()}
             if prior_map is not None:

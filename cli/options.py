@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -41,6 +41,25 @@ ScanArgument = Annotated[
     ),
 ]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result to this PNG file.")]
+
+
+@dataclass(frozen=True, slots=True)
+class UsableOptions:
+    """When an answer is usable, as options."""
+
+    on_map: Annotated[
+        float,
+        typer.Option(
+            metavar="PROBABILITY",
+            min=0.5,
+            max=1.0,
+            help="Prior probability that a scan was taken on this map, or on one of these.",
+        ),
+    ] = 0.9
+    usable_from: Annotated[
+        float,
+        typer.Option(metavar="PROBABILITY", min=0.5, max=0.9999, help="Minimum probability of a usable answer."),
+    ] = 0.95
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:

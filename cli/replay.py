@@ -25,7 +25,7 @@ from .frames import Frames, odometry_of
 from .inputs import line_map_of, needing_formats
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
-from .options import AsJson, Server, grouped
+from .options import AsJson, Server, UsableOptions, grouped
 from .printing import plain, print_json, print_rows, print_table
 from .several import documents_of, read_target
 from .tracking import Stays, Tracker
@@ -122,6 +122,7 @@ def replay(
     ],
     source: LogChoice,
     scans: ScanChoice,
+    usable: UsableOptions,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the usable poses to this file in the TUM format.")
     ] = None,
@@ -141,7 +142,7 @@ def replay(
     told, opened_log = read_target(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
-    with locating(told, server) as locator:
+    with locating(told, usable, server) as locator:
         taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
             for one, found in located(locator, taken, frames, scans.mode):

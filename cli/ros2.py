@@ -18,7 +18,7 @@ from service.work.warmup import warm_up
 from .contract import Json
 from .errors import RefusedError, WrongUseError
 from .inputs import needing_formats
-from .options import grouped
+from .options import UsableOptions, grouped
 from .ros2_parameters import parameters_of, robots_of
 from .several import read_maps
 
@@ -188,7 +188,14 @@ class RosArguments:
 
 
 @grouped
-def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing: Publishing, ros: RosArguments) -> None:
+def ros2(
+    source: MapSource,
+    sources: ScanSources,
+    names: RobotNames,
+    usable: UsableOptions,
+    publishing: Publishing,
+    ros: RosArguments,
+) -> None:
     """Subscribe to scans of ROS 2, and publish initialpose when they agree, until an interrupt.
 
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
@@ -216,6 +223,8 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             namespace=where,
             remappings=remappings,
             frame_prefix=names.frame_prefix,
+            on_map=usable.on_map,
+            usable_from=usable.usable_from,
             agree=publishing.agree,
             when=publishing.when,
             min_sigma=publishing.min_sigma,

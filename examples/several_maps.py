@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import linefix
-from association.result import MapVerdict
+from association import MapVerdict
 from formats.colours import INK, MATCHED, UNMATCHED, WALL
 from registration.layout import Floats
 from simulation import FLOOR_KINDS, draw_floors

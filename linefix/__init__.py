@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import simulation
 from association import (
-    AnswerExplanation,
     AssociationOptions,
     AssociationResult,
     Deadline,
@@ -30,7 +29,6 @@ from association import (
     Status,
     View,
     assemble,
-    associate,
 )
 from registration import (
     Beams,
@@ -45,7 +43,8 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .checking import CheckedMap, check
-from .explaining import explain
+from .driving import associate
+from .explaining import Explanation, explain
 from .locating import index_map, index_maps, locate, scan_of
 from .ranges import MountedScan, view_of
 from .updating import update_map
@@ -56,12 +55,12 @@ if TYPE_CHECKING:
 _OF_FORMATS = frozenset(("ImportOptions", "LineMap", "LogOptions", "draw_map", "read_log", "read_map", "write_map"))
 
 __all__ = [
-    "AnswerExplanation",
     "AssociationOptions",
     "AssociationResult",
     "Beams",
     "CheckedMap",
     "Deadline",
+    "Explanation",
     "HardPrior",
     "ImportOptions",
     "InputError",

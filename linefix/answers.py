@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from association import (
+    NOT_IN_ORDER,
     Alternative,
     AssociationResult,
     AssociationWarning,
@@ -18,7 +19,6 @@ from association import (
     MapVerdict,
     message_of,
 )
-from association.warnings import NOT_IN_ORDER
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
@@ -208,8 +208,9 @@ def association_json(result: AssociationResult, included: Included) -> Json:
             "score": diagnostics.score,
             "runner_up": diagnostics.runner_up,
             "margin": diagnostics.margin,
-            "significance": diagnostics.significance,
             "critical_wall": critical_wall_json(diagnostics.critical_wall, named),
+            "corrections": None if diagnostics.corrections is None else asdict(diagnostics.corrections),
+            "turn_rate": diagnostics.turn_rate,
         },
         "reasons": [{"code": reason.code, "message": reason.message} for reason in result.reasons],
         "search": {

@@ -2,22 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from association import AnswerExplanation, AssociationOptions, Deadline, MapIndex, Prior, Scan, explain_verdict
-from association.verdict_explanation import VerdictExplanation
+from association import (
+    AnswerExplanation,
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    MapIndex,
+    Prior,
+    Scan,
+    VerdictExplanation,
+    explain_verdict,
+)
 from registration import Segments
 from vectorization import LaserScan
 
 from .answers import Json, pose_json
+from .driving import search_drive
 from .locating import prepared, scan_of
 from .ranges import MountedScan
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """An answer, and how its verdict came about.
+
+    Attributes
+    ----------
+    result : AssociationResult
+        As `locate` returns it.
+    verdict : VerdictExplanation
+        On the scan as a whole.
+    last_view : VerdictExplanation or None
+        On the last view of a drive alone, if it was searched.
+    """
+
+    result: AssociationResult
+    verdict: VerdictExplanation
+    last_view: VerdictExplanation | None
 
 
 def explain(
@@ -28,7 +57,7 @@ def explain(
     prior: Prior | None = None,
     options: AssociationOptions | None = None,
     deadline: Deadline | None = None,
-) -> AnswerExplanation:
+) -> Explanation:
     """Locate a scan, and return how the verdict on the answer came about, number by number.
 
     Parameters
@@ -38,9 +67,10 @@ def explain(
 
     Returns
     -------
-    AnswerExplanation
+    Explanation
         `result` is the answer of `locate`. `verdict` has the features with their contributions, the alternatives with
-        their weights, the null score, each veto, the probabilities and their thresholds.
+        their weights, the null score, each veto, the probabilities and their thresholds. `last_view` is that of the
+        last view of a drive, if that was searched alone.
 
     Raises
     ------
@@ -58,14 +88,28 @@ def explain(
     >>> verdict = linefix.explain(room + other, seen).verdict
     >>> verdict.usable, [reason.code for reason in verdict.reasons]
     (False, ['similar_place'])
-    >>> len(verdict.alternatives), round(verdict.among.mean, 3)
+    >>> len(verdict.alternatives), round(verdict.among, 3)
     (1, 0.5)
     """
     index, how = prepared(map, options)
-    return explain_verdict(index, scan_of(scan, angles), prior, how, deadline)
+    return explain_search(index, scan_of(scan, angles), prior, how, deadline)
 
 
-def explanation_json(found: AnswerExplanation) -> Json:
+def explain_search(
+    index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline | None
+) -> Explanation:
+    """Search a scan as `linefix.associate`, and return how the verdict came about."""
+    found: list[AnswerExplanation] = []
+
+    def search(seen: Scan) -> AssociationResult:
+        found.append(explain_verdict(index, seen, prior, options, deadline))
+        return found[-1].result
+
+    result = search_drive(search, scan)
+    return Explanation(result, found[0].verdict, found[1].verdict if len(found) > 1 else None)
+
+
+def explanation_json(found: Explanation) -> Json:
     """Return how a verdict came about as JSON, without the answer itself."""
     last = found.last_view
     return {"verdict": _verdict_json(found.verdict), "last_view": None if last is None else _verdict_json(last)}
@@ -73,23 +117,8 @@ def explanation_json(found: AnswerExplanation) -> Json:
 
 def _verdict_json(one: VerdictExplanation) -> Json:
     return {
+        **asdict(one),
         "status": str(one.status),
-        "usable": one.usable,
-        "probability": one.probability,
         "pose": pose_json(one.pose),
-        "reasons": [{"code": reason.code, "message": reason.message} for reason in one.reasons],
-        "vetoes": [{**asdict(veto), "origin": str(veto.origin)} for veto in one.vetoes],
-        "features": None if one.features is None else dict(one.features),
-        "model": None if one.model is None else asdict(one.model),
-        "taken": None if one.taken is None else dict(one.taken),
-        "alternatives": [
-            {"pose": pose_json(other.pose), "gap": other.gap, "counted": other.counted, "weight": other.weight}
-            for other in one.alternatives
-        ],
-        "among_alternatives": None if one.among is None else {**asdict(one.among), "mean": one.among.mean},
-        "null": None if one.null is None else asdict(one.null),
-        "probability_of_pose": one.probability_of_pose,
-        "cautious": one.cautious,
-        "explained": one.explained,
-        "thresholds": None if one.thresholds is None else dict(one.thresholds),
+        "alternatives": [{**asdict(other), "pose": pose_json(other.pose)} for other in one.alternatives],
     }

@@ -21,13 +21,12 @@ from association import (
     Prior,
     Scan,
     assemble,
-    associate,
-    associate_on_maps,
     map_set,
 )
 from registration import InvalidArgumentError, MeasuredSegments, Segments
 from vectorization import LaserScan
 
+from .driving import associate, associate_on_maps
 from .ranges import MountedScan, ranges_scan, view_of
 
 if TYPE_CHECKING:

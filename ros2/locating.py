@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from registration import RigidTransform
 from .agreement import Observation, Place
 from .looking import Look
 from .messages import Time
+from .options import NodeOptions
 from .tuning import INCONCLUSIVE_NATS
 
 OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
@@ -63,9 +64,17 @@ class Located:
         return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 
 
+def search_options(options: NodeOptions) -> linefix.AssociationOptions:
+    """Return how the node searches each scan."""
+    return replace(OPTIONS, on_map=options.on_map, usable_from=options.usable_from)
+
+
 def locate(
-    index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], deadline: linefix.Deadline | None = None
+    index: linefix.MapIndex | linefix.MapSet,
+    looks: Sequence[Look],
+    options: linefix.AssociationOptions = OPTIONS,
+    deadline: linefix.Deadline | None = None,
 ) -> Located:
     """Find where the robot is by one scan, or several together, at the time of the first beam of the first."""
     together = linefix.assemble([look.view for look in looks])
-    return Located(looks[0].stamp, linefix.locate(index, together, options=OPTIONS, deadline=deadline))
+    return Located(looks[0].stamp, linefix.locate(index, together, options=options, deadline=deadline))

@@ -16,6 +16,7 @@ from .frames import Frames
 from .gathering import Gathering, looks_of
 from .health import Health, State, current_time
 from .localization import Localization
+from .locating import search_options
 from .map_conversion import MapConverter
 from .maps import Maps
 from .messages import LaserScan, Odometry
@@ -84,7 +85,7 @@ class Node:
         self._silence = Silence(options, self._topics, self._health.note)
         self._localization = Localization(options, self._topics, self._health, self._frames, self._odometry)
         self._waiting = Waiting(participant, self._topics.subscriptions)
-        self._searcher = Searcher(self._waiting.wake)
+        self._searcher = Searcher(search_options(options), self._waiting.wake)
         self._converter = MapConverter(self._waiting.wake) if options.map_topic else None
         if maps is not None:
             self._localization.use(maps)

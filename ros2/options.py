@@ -38,6 +38,10 @@ class NodeOptions:
         Of names of topics.
     frame_prefix : str
         That all frames of the robot begin with, such as ``robot1/``.
+    on_map : float
+        Prior probability that a scan was taken on the map, or on one of the maps; 0.5 to 1.
+    usable_from : float
+        Least probability of a usable answer, 0.5 to 0.9999.
     agree : int
         Scans that have to agree before a pose is published; 1: each usable scan alone.
     when : "start", "lost" or "always"
@@ -63,6 +67,8 @@ class NodeOptions:
     namespace: str = ""
     remappings: Mapping[str, str] = field(default_factory=dict)
     frame_prefix: str = ""
+    on_map: float = 0.9
+    usable_from: float = 0.95
     agree: int = 3
     when: When = "start"
     min_sigma: float = 0.05

@@ -54,11 +54,14 @@ class Searcher:
 
     Parameters
     ----------
+    options : AssociationOptions
+        Of each search.
     found : callable
         Called in the thread of the searches when a result can be taken.
     """
 
-    def __init__(self, found: Callable[[], None]) -> None:
+    def __init__(self, options: linefix.AssociationOptions, found: Callable[[], None]) -> None:
+        self._options = options
         self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
         self._results: queue.SimpleQueue[Found] = queue.SimpleQueue()
         self._deadline = linefix.Deadline()
@@ -97,7 +100,7 @@ class Searcher:
         stamp, begun = task.looks[0].stamp, time.monotonic()
         located, problem = None, ""
         try:
-            located = locate(task.index, task.looks, self._deadline.within(begun + SEARCH_SECONDS))
+            located = locate(task.index, task.looks, self._options, self._deadline.within(begun + SEARCH_SECONDS))
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan

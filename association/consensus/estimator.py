@@ -59,7 +59,8 @@ def _prior(known: float | None) -> Floats:
     better is strained less.
     """
     strain = STRAIN_DEVIATION * (1.0 if known is None else min(1.0, math.sqrt(known) / USUAL_WALL_ERROR))
-    out = np.diag(np.array([OFFSET_DEVIATION, strain, strain, strain, TURN_DEVIATION]) ** -2.0)
+    # Across half as much: so it is the same along any axes.
+    out = np.diag(np.array([OFFSET_DEVIATION, strain, strain, strain / math.sqrt(2.0), TURN_DEVIATION]) ** -2.0)
     scale, shape = 0.25 * SCALE_DEVIATION**-2.0, 0.5 * strain**-2.0
     out[1:3, 1:3] = [[scale + shape, scale - shape], [scale - shape, scale + shape]]
     return out
@@ -336,7 +337,6 @@ class _Model:
         x, seen = self.x, self.seen
         c, s = math.cos(x[2]), math.sin(x[2])
         ox, oy = c * seen.sensor[0] - s * seen.sensor[1], s * seen.sensor[0] + c * seen.sensor[1]
-        ox, oy = (1.0 + x[4]) * ox + x[6] * oy, x[6] * ox + (1.0 + x[5]) * oy
         lever = np.eye(3)
         lever[:2, 2] = oy, -ox
         covariance = lever @ self.covariance[:3, :3] @ lever.T

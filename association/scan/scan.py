@@ -178,8 +178,21 @@ def scaled(scan: Scan, factor: float) -> Scan:
     return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings, scan.sweep_s)
 
 
-def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, float]) -> Scan:
-    """Return a scan with its lengths times a factor, and turned back by how its sensor turned.
+def shifted(scan: Scan, by: Floats) -> Scan:
+    """Return a scan of one place, moved in its frame by (2,) metres."""
+    seen, at, beams = scan.measured, scan.viewpoint, scan.beams
+    ends = Segments.derived(seen.segments.endpoints + np.tile(by, 2))
+    measured = replace(seen, segments=ends, centroids=seen.centroids + by)
+    if beams is not None and beams.origins is not None:
+        beams = replace(beams, origins=beams.origins + by)
+    place = at and (at[0] + float(by[0]), at[1] + float(by[1]))
+    return replace(scan, measured=measured, viewpoint=place, beams=beams)
+
+
+def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
+    """Return a scan with its lengths from the sensor times a factor, and turned back by how its sensor turned.
+
+    The sensor's place, or the origin if that is not known, stays.
 
     Parameters
     ----------
@@ -188,14 +201,14 @@ def corrected_scan(scan: Scan, factor: float, turn: float, sensor: tuple[float, 
     factor : float
     turn : float
         Radians from the first beam to the last; the heading is that in the middle of the sweep.
-    sensor : (float, float)
-        The sensor's place in the frame of this scan, metres.
     """
-    scan = scaled(scan, factor)
+    sensor = np.array(scan.viewpoint or (0.0, 0.0))
+    if factor != 1.0:
+        scan = shifted(scaled(scan, factor), (1.0 - factor) * sensor)
     if turn == 0.0 or scan.beams is None:
         return scan
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
-    centre, way, sweep = factor * np.array(sensor), math.copysign(1.0, last - first), abs(last - first)
+    centre, way, sweep = sensor, math.copysign(1.0, last - first), abs(last - first)
 
     def turned(points: Floats) -> Floats:
         """Turn points by when they were seen."""

@@ -28,6 +28,8 @@ OPTIONS = {
     "namespace": ("", "namespace of the robot"),
     "frame_prefix": ("", "prefix of all frames of the robot"),
     "together_s": ("", "seconds within which scans of several topics are one"),
+    "on_map": ("", "prior probability that a scan was taken on the map"),
+    "usable_from": ("", "least probability of a usable scan"),
     "agree": ("", "scans that have to agree"),
     "when": ("", "start, lost or always"),
     "min_sigma": ("", "least standard deviation of initialpose, metres"),

@@ -25,7 +25,7 @@ from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict, in_rad
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
 PointSigma = Annotated[float, Field(gt=0.0, le=10.0)]
 RaySigma = Annotated[float, Field(ge=1e-6, le=10.0)]
-IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map", "causes"]
+IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map"]
 EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segments", "missing_map")
 
 # Union tags; in brackets, so that no field of a request is ever taken for one.
@@ -338,6 +338,12 @@ class SearchOptions(Strict):
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         0.5, description="fraction of a scan segment's length that must lie on the map"
     )
+    on_map: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
+        0.9, description="prior probability that the scan was taken on this map, or on one of these"
+    )
+    usable_from: Annotated[float, Field(ge=0.5, le=0.9999)] = Field(
+        0.95, description="least `probability` of a usable answer"
+    )
     estimator: Literal["joint", "one_step"] = Field(
         "joint", description="estimator of the final pose; `one_step` is the published closed form"
     )
@@ -345,5 +351,5 @@ class SearchOptions(Strict):
     include: list[IncludeName] = Field(
         default_factory=lambda: list(EVERYTHING),
         max_length=16,
-        description="parts of the answer; `causes` takes additional time and is not among the defaults",
+        description="parts of the answer",
     )

@@ -157,6 +157,16 @@ class CriticalWallAnswer(Answer):
     )
 
 
+class CorrectionsAnswer(Answer):
+    """Errors of the map around the sensor, or of the ranges, that were estimated together with the pose."""
+
+    scale: float = Field(description="factor on the lengths of the scan; 1: none")
+    offset: float = Field(description="metres by which all walls are nearer to the sensor than on the map")
+    strain: Row3 = Field(
+        description="elongation of the map along its x and y axis, and half of the shear, as fractions: xx, yy, xy"
+    )
+
+
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
     """Diagnostics of a search."""
 
@@ -169,9 +179,15 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
         description="`score` minus that of the best other pose, nats; null: no other pose above "
         "`search.complete_above` of `score`"
     )
-    significance: float = Field(description="probability that random walls reach this score; a small value is good")
     critical_wall: CriticalWallAnswer | None = Field(
         description="the wall whose removal would move the pose most, or make it unobservable"
+    )
+    corrections: CorrectionsAnswer | None = Field(
+        description="errors of the map or the ranges that the pose is corrected for; null: none"
+    )
+    turn_rate: float | None = Field(
+        description="rate at which the sensor turned during the scan, estimated from the walls, rad/s; null: `twist` "
+        "was sent, or the walls show no rotation"
     )
 
 
@@ -233,7 +249,7 @@ class FoundAnswer(Answer):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool = Field(description="whether a robot may use the pose")
     probability: Share | None = Field(
-        description="calibrated probability that the pose is right, given that the robot is on this map; 0 for "
+        description="calibrated probability that the pose is right, with the prior `options.on_map`; 0 for "
         "`no_match`, null for `degenerate`, whose position is unobservable along `unobservable`"
     )
     message: str = Field(description="the verdict in words, for people")

@@ -17,10 +17,9 @@ from association import (
     InvalidSearchError,
     KnownOfMaps,
     Scan,
-    associate,
-    associate_on_maps,
 )
 from linefix.answers import Json, association_json
+from linefix.driving import associate, associate_on_maps
 
 from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap, CachedMaps, FoundMaps

@@ -135,7 +135,8 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
         parts=tuple(part for part in PARTS if part in options.include),
-        causes="causes" in options.include,
+        on_map=options.on_map,
+        usable_from=options.usable_from,
         estimator=options.estimator,
         rotation=options.rotation,
     )

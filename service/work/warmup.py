@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,25 +12,19 @@ from association import (
     AssociationOptions,
     Deadline,
     HardPrior,
+    KnownOfMaps,
     MapIndex,
-    Prior,
+    MapPart,
+    MapPoints,
     Scan,
     SoftPrior,
     View,
     assemble,
     associate,
+    associate_on_maps,
+    map_set,
 )
-from association.consensus.sight import missing_segments
-from association.consensus.similarity import fit_similarity
-from association.context import SearchContext
-from association.layout import FOUND
-from association.rank_and_estimate import estimate_at
-from association.search.branch_and_bound import match_points
-from association.verdict.chance import symmetry_of
-from association.verdict.inconsistencies import absences
-from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
-from map_quality.analyze.standing import is_free
 from registration import (
     IDENTITY,
     Beams,
@@ -37,7 +32,6 @@ from registration import (
     MeasuredSegments,
     OneStepSums,
     RegistrationOptions,
-    RigidTransform,
     Segments,
     register,
 )
@@ -55,7 +49,7 @@ ROOM = np.array(
         [-4.0, 3.0, -4.0, -3.0],
     ]
 )
-# As another, but symmetric about an axis: seen from there, the mirrored scan is found as well.
+# As another, but symmetric about an axis.
 SYMMETRIC_ROOM = np.array(
     [
         [-4.0, -3.0, 4.0, -3.0],
@@ -70,6 +64,7 @@ SYMMETRIC_ROOM = np.array(
 )
 
 
+THINGS = np.array([[1.0, 2.0], [-2.0, 1.0]])  # too small for walls
 STANDARD_INPUT = 0
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
@@ -78,44 +73,38 @@ def warm_up() -> None:
     """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
     warm_up_registering()
     warm_up_vectorizing()
+    warm_up_simulating()
     warm_up_searching()
     warm_up_analyzing()
-    room = Segments.from_array(ROOM)
-    index = MapIndex.build(room, 0.0)
-    for sample in (_with_beams(), _one_wall()):
-        try_sample(index, sample, Deadline(), oriented=True)
 
 
 def warm_up_first_half() -> None:
-    """Compile about half of the kernels: those of the search and of the analysis of maps."""
+    """Compile about half of the kernels: those of the search."""
     warm_up_searching()
-    warm_up_analyzing()
 
 
 def warm_up_second_half() -> None:
-    """Compile the other kernels, in an order in which the two halves seldom meet at the same kernel."""
-    warm_up_indexing()
+    """Compile other kernels, so that the two halves seldom meet at the same kernel."""
     warm_up_registering()
     warm_up_vectorizing()
-    warm_up_explaining()
     warm_up_simulating()
 
 
 def warm_up_analyzing() -> None:
-    """Check a map, and look from its places, once."""
+    """Check a map, alone and by samples, and look from its places, once."""
     room = Segments.from_array(ROOM)
     index, robot = MapIndex.build(room, 0.0), Robot(beams=360)
     check_map(index)
+    for sample in (_with_beams(), Scan(MeasuredSegments.from_segments(room.take([0])))):
+        try_sample(index, sample, Deadline(), oriented=True)
     analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
     for number in range(len(analysis.standing.poses)):
         analysis.look(number)
 
 
 def warm_up_simulating() -> None:
-    """Take a scan of a map, from where a robot can stand."""
-    room, pose, robot = Segments.from_array(ROOM), IDENTITY, Robot(beams=360)
-    assert is_free(room, pose, robot.range_max, oriented=True)
-    scan(room, pose, robot.scanner, np.random.default_rng(0))
+    """Take a scan of a map."""
+    scan(Segments.from_array(ROOM), IDENTITY, Robot(beams=360).scanner, np.random.default_rng(0))
 
 
 def warm_up_registering() -> None:
@@ -143,53 +132,37 @@ def warm_up_vectorizing() -> None:
     vectorize(points, viewpoint=None)
 
 
-def warm_up_indexing() -> None:
-    """Index a map."""
-    MapIndex.build(Segments.from_array(ROOM), 0.0)
-
-
-def warm_up_explaining() -> None:
-    """Compute the answer to scans at a given pose, without a search, and the results that are derived from it."""
-    index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for seen, prior, options in _asked():
-        context = SearchContext.of(index, seen, prior, options, Deadline())
-        answer = estimate_at(context, RigidTransform(0, 0, 0)).answer
-        assert answer is not None
-        missing_segments(context, answer.best)
-        symmetry_of(context, answer.best, answer.best)
-        fit_similarity(context, answer.best)
-    # It is nothing that would have to stand up to a null, which costs a search.
-    context = SearchContext.of(index, _one_wall(), None, AssociationOptions(), Deadline())
-    assert not judge(context, estimate_at(context, RigidTransform(0, 0, 0))).usable
-
-
 def warm_up_searching() -> None:
     """Associate once in each way that has kernels of its own."""
-    index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for seen, prior, options in _asked():
-        associate(index, seen, prior, options, Deadline())
-    context = SearchContext.of(index, _with_beams(), None, AssociationOptions(), Deadline())
-    answer = estimate_at(context, RigidTransform(0, 0, 0)).answer
-    assert answer is not None
-    absences(context, answer.best, [answer.best])
-    match_points(context, np.zeros(0, FOUND), np.zeros(0, FOUND))
-    symmetric = Segments.from_array(SYMMETRIC_ROOM)
-    alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
-    associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
-    # This map, which is not to scale, states no sigma.
-    too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
-    associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
+    room, symmetric = Segments.from_array(ROOM), Segments.from_array(SYMMETRIC_ROOM)
+    index, with_things = (MapIndex.build(room, 0.0, points=MapPoints.of(some)) for some in (THINGS[:0], THINGS))
+    for seen in _scans():
+        associate(index, seen)
+        associate(with_things, seen, SoftPrior(IDENTITY, np.eye(3)))
+    window = HardPrior(IDENTITY, 1.0, 1.0)
+    associate(index.undirected, _scans()[0], window, AssociationOptions(oriented=False))
+    associate(index, _scans()[0], None, AssociationOptions(estimator="one_step"))
+    # The mirrored scan is found as well; a map that is not to scale states no sigma.
+    for other in (MapIndex.build(symmetric, 0.0), MapIndex.build(Segments.from_array(1.02 * SYMMETRIC_ROOM))):
+        associate(other, Scan(MeasuredSegments.from_segments(symmetric)))
+    maps = map_set({"room": MapPart(room, 0.0), "symmetric": MapPart(symmetric, 0.0)})
+    for known in (KnownOfMaps(), KnownOfMaps(window, "room", {"room": 0.5})):
+        associate_on_maps(maps, _with_beams(), known)
 
 
-def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
-    """Return the scan, the prior and the options of requests in each way that has kernels of its own."""
-    measured, pose = MeasuredSegments.from_segments(Segments.from_array(ROOM)), RigidTransform(0, 0, 0)
-    views = assemble([View(Scan(measured)), View(Scan(measured), pose, 1e-4 * np.eye(3))])
+def _scans() -> list[Scan]:
+    """Return scans in each form that has kernels of its own."""
+    room = Segments.from_array(ROOM)
+    whole = Scan(MeasuredSegments.from_segments(room))
+    drive = [View(_with_beams()), View(_with_beams(), IDENTITY, 1e-4 * np.eye(3))]
     return [
-        (Scan(measured), None, AssociationOptions()),
-        (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
-        (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
-        (views, None, AssociationOptions()),
+        whole,
+        _with_beams(),
+        replace(whole, viewpoint=None),
+        assemble([View(whole), View(whole, IDENTITY, 1e-4 * np.eye(3))]),
+        assemble(drive),
+        Scan(MeasuredSegments.from_segments(room.take([0]))),
+        Scan(MeasuredSegments.from_segments(room.take([]))),
     ]
 
 
@@ -197,11 +170,6 @@ def _with_beams() -> Scan:
     """Return the room as a laser in its middle sees it."""
     beams = Beams(TURN, room_ranges(TURN), 30.0)
     return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
-
-
-def _one_wall() -> Scan:
-    """Return a scan that is never usable, so that mistakes of the map are looked for."""
-    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM).take([0])))
 
 
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

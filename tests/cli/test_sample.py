@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from association import causes
 from examples.sample import SEED, main, way_through, write_sample
 from map_quality.check import samples
 from simulation import OfficePlan, offices
@@ -38,7 +37,6 @@ def test_a_map_that_is_not_to_scale_is_hinted_at(
 ) -> None:
     """At 3 % most scans are usable, put to scale; at 50 % too large none is."""
     # On a busy machine the search for a factor would end before it is found.
-    monkeypatch.setattr(causes, "LEAST_TIME_FOR_CAUSES", 60.0)
     monkeypatch.setattr(samples, "LADDER_SECONDS", 60.0)
     write_sample(folder)
     resolution = (folder / "hq.yaml").read_text()

@@ -22,6 +22,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "annotations",
         "answers",
         "checking",
+        "driving",
         "explaining",
         "importlib",
         "locating",

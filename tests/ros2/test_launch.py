@@ -71,7 +71,8 @@ class Launch:
 VALUES = {
     "map": "/maps/hq-1.yaml,/maps/hq-2.yaml", "map_topic": "/map", "scan": "front,back", "odom": "wheels",
     "base": "base_footprint", "odom_frame": "odometry", "namespace": "robot1", "frame_prefix": "robot1/",
-    "together_s": "0.2", "agree": "4", "when": "lost", "min_sigma": "0.1", "min_sigma_theta": "0.1",
+    "together_s": "0.2", "on_map": "1.0", "usable_from": "0.9",
+    "agree": "4", "when": "lost", "min_sigma": "0.1", "min_sigma_theta": "0.1",
     "hardware_id": "amr-17", "motion": "false", "publish_tf": "true",
 }  # fmt: skip
 

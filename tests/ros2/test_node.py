@@ -91,3 +91,21 @@ def test_a_stored_map_is_taken_by_its_id(
         robot = Robot(domain)
         robot.mounts.publish(mount())
         assert is_at_truth(robot.until(robot.initial, lambda: robot.scans.publish(scan(2))))
+
+
+def test_each_scan_is_searched_with_the_options_of_the_node(
+    domain: int, room: linefix.MapIndex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[linefix.AssociationOptions] = []
+    search = linefix.locate
+
+    def spied(*arguments: Any, options: linefix.AssociationOptions, **named: Any) -> linefix.AssociationResult:
+        searched.append(options)
+        return search(*arguments, options=options, **named)
+
+    monkeypatch.setattr(linefix, "locate", spied)
+    with running(NodeOptions(domain=domain, agree=1, on_map=0.6, usable_from=0.7), room):
+        robot = Robot(domain)
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+    assert {(one.on_map, one.usable_from, one.max_alternatives) for one in searched} == {(0.6, 0.7, 10)}

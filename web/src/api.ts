@@ -57,6 +57,7 @@ export interface Asked {
   maps?: (Named | (MapDocument & Named))[];
   scan: Scan;
   prior?: Record<string, number | string>;
+  options: { on_map: number; usable_from: number };
 }
 
 export const associate = (asked: Asked, signal: AbortSignal) => post<Answer>("/v1/associate", asked, signal);

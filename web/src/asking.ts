@@ -12,7 +12,8 @@ const AGAIN = 1000; // ms until the next request to a service that is not ready 
 let running: AbortController | null = null;
 let due = 0;
 
-const checked = (id: string) => document.querySelector<HTMLInputElement>(id)!.checked;
+const input = (id: string) => document.querySelector<HTMLInputElement>(id)!;
+const options = () => ({ on_map: Number(input("#on-map").value), usable_from: Number(input("#usable-from").value) });
 
 /** The request for what is on the page; null without a map or without a scan. */
 export function request(): { asked: Asked; sentTo: number[] } | null {
@@ -24,8 +25,8 @@ export function request(): { asked: Asked; sentTo: number[] } | null {
   const kept = state.walls.map((_, k) => k).filter((k) => !state.off.has(k));
   const map = asStored() ? { map_id: state.mapId! } : { ...state.map, segments: kept.map((k) => state.walls[k]) };
   const several = state.floors.map((map_id) => (map_id === state.mapId ? { ...map, map_id } : { map_id }));
-  const asked: Asked = { ...(several.length ? { maps: several } : { map }), scan: noisy(scan, state.noise) };
-  if (checked("#near")) asked.prior = { ...state.robot, ...NEAR, ...(several.length ? { map_id: state.mapId! } : {}) };
+  const asked: Asked = { ...(several.length ? { maps: several } : { map }), scan: noisy(scan, state.noise), options: options() };
+  if (input("#near").checked) asked.prior = { ...state.robot, ...NEAR, ...(several.length ? { map_id: state.mapId! } : {}) };
   return { asked, sentTo: kept };
 }
 
@@ -69,7 +70,7 @@ export async function ask(): Promise<boolean> {
 /** Send the request soon after a change, once for many; only where this is switched on. */
 export function askSoon(): void {
   changed();
-  if (!checked("#follow") || !request()) return;
+  if (!input("#follow").checked || !request()) return;
   clearTimeout(due);
   due = window.setTimeout(() => void ask(), 60);
 }

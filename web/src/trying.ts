@@ -19,7 +19,7 @@ restore.addEventListener("click", () => {
 const [erase, build] = ["#erase", "#build"].map((id) => document.querySelector<HTMLInputElement>(id)!);
 erase.addEventListener("change", () => (build.checked &&= !erase.checked));
 build.addEventListener("change", () => (erase.checked &&= !build.checked));
-document.querySelector("#near")!.addEventListener("change", askSoon);
+for (const id of ["#near", "#on-map", "#usable-from"]) document.querySelector(id)!.addEventListener("change", askSoon);
 document.querySelector("#run")!.addEventListener("click", () => void ask());
 
 onChange(() => {

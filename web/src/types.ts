@@ -56,6 +56,14 @@ export interface CriticalWall {
   displacement: number;
 }
 
+/** Numbers next to the pose. */
+export interface Diagnostics {
+  score: number;
+  critical_wall: CriticalWall | null;
+  corrections: { scale: number; offset: number; strain: number[] } | null;
+  turn_rate: number | null; // rad/s
+}
+
 export interface Reason {
   code: string;
   message: string;
@@ -88,7 +96,7 @@ export interface Answer {
   unmatched_scan: number[]; // of a scan of one view, as `ask` puts them
   missing_map: number[];
   segments: Segment[] | Segment[][] | null;
-  diagnostics: { critical_wall: CriticalWall | null; score: number } | null;
+  diagnostics: Diagnostics | null;
   reasons: Reason[];
   warnings: Reason[];
   alternatives: Alternative[];

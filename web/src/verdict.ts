@@ -60,6 +60,13 @@ function numbers(): void {
       const walls = critical.map.map(wallOf).join(", ");
       rows.push(["critical wall", `${walls}: without it the pose may move by ${critical.displacement.toFixed(2)} m`]);
     }
+    const corrections = answer.diagnostics?.corrections;
+    if (corrections) {
+      const strain = corrections.strain.map((part) => `${(100 * part).toFixed(1)} %`).join(", ");
+      rows.push(["corrections", `scale ${corrections.scale.toFixed(4)}, offset ${(100 * corrections.offset).toFixed(1)} cm, strain ${strain}`]);
+    }
+    const rate = answer.diagnostics?.turn_rate ?? null;
+    if (rate !== null) rows.push(["turn rate", `${degrees(rate).toFixed(1)}°/s`]);
     const seen = answer.correspondences.length + answer.unmatched_scan.length;
     rows.push(["correspondences", `${answer.correspondences.length} of ${seen} scan segments`]);
     rows.push(["missing map", `${answer.missing_map.length} walls`]);

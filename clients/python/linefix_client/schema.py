@@ -44,6 +44,16 @@ class AnalysisSummaryAnswer(TypedDict):
     left_out: int
 
 
+class CorrectionsAnswer(TypedDict):
+    """
+    Errors of the map around the sensor, or of the ranges, that were estimated together with the pose.
+    """
+
+    scale: float
+    offset: float
+    strain: list[float]
+
+
 class CorrespondenceAnswer(TypedDict):
     """
     A scan segment found on a map segment.
@@ -477,10 +487,8 @@ class WarningAnswer(TypedDict):
         "map_scale",
         "common_offset",
         "map_distorted",
+        "turned",
         "last_view_only",
-        "mirrored",
-        "reversed",
-        "unit_scale",
     ]
     message: str
 
@@ -668,9 +676,11 @@ class SearchOptions(TypedDict):
     offset_tolerance: NotRequired[float | None]
     angle_tolerance: NotRequired[float | None]
     min_overlap: NotRequired[float]
+    on_map: NotRequired[float]
+    usable_from: NotRequired[float]
     estimator: NotRequired[Literal["joint", "one_step"]]
     rotation: NotRequired[Literal["wahba", "mitsuta"]]
-    include: NotRequired[list[Literal["correspondences", "alternatives", "segments", "missing_map", "causes"]]]
+    include: NotRequired[list[Literal["correspondences", "alternatives", "segments", "missing_map"]]]
 
 
 class SegmentScan(TypedDict):
@@ -1154,8 +1164,9 @@ class AssociationDiagnosticsAnswer(TypedDict):
     score: float
     runner_up: float | None
     margin: float | None
-    significance: float
     critical_wall: CriticalWallAnswer | None
+    corrections: CorrectionsAnswer | None
+    turn_rate: float | None
 
 
 class CheckAnswer(TypedDict):

@@ -10,8 +10,7 @@ from typing import TypeVar
 import numpy as np
 import pytest
 
-from association import Deadline, MapIndex
-from association.result import Reason, ReasonCode
+from association import Deadline, MapIndex, Reason, ReasonCode
 from map_quality import Change, Evidence, VisitScan
 from map_quality.update.applying import apply, kept_indices
 from map_quality.update.beams import Chunks, sees

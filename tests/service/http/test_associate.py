@@ -115,6 +115,30 @@ def test_numbers_beside_a_pose(client: httpx.Client) -> None:
         assert 0.0 <= other["reliability"] <= 1.0
 
 
+def test_the_prior_of_the_map_and_the_least_probability_decide_what_is_usable(client: httpx.Client) -> None:
+    """Of a batch, too."""
+    batch = {"map": examples.ASSOCIATE["map"], "scans": [examples.ASSOCIATE["scan"]]}
+    half, sure = ({"on_map": on_map} for on_map in (0.5, 1.0))
+    likely = [associated(client, options=options)["probability"] for options in (half, sure)]
+    assert likely[0] < likely[1]
+    for options, usable in ((half, False), (sure, True)):
+        options = {**options, "usable_from": 0.5 * sum(likely)}
+        answer = associated(client, options=options)
+        assert (answer["usable"], answer["probability"] >= options["usable_from"]) == (usable, usable)
+        assert (answer["status"], answer["reasons"] == []) == ("ok" if usable else "ambiguous", usable)
+        together = client.post("/v1/associate:batch", json={**batch, "options": options}).json()
+        assert together["results"][0]["result"]["usable"] is usable
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("on_map", 0.49), ("usable_from", 1.0), ("on_map", None), ("causes", True)]
+)
+def test_what_is_no_probability_is_named(client: httpx.Client, name: str, value: object) -> None:
+    response = client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {name: value}})
+    assert response.status_code == 422
+    assert [one["pointer"] for one in response.json()["errors"]] == [f"/options/{name}"]
+
+
 def test_an_empty_scan_is_no_match(client: httpx.Client) -> None:
     for scan in ({"segments": []}, {"points": []}, {"laser": {**laser(), "ranges": [None] * 10}}):
         answer = associated(client, scan=scan)

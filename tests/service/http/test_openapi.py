@@ -11,8 +11,7 @@ from typing import Any, get_args
 import httpx
 import pytest
 
-from association import Status, WarningCode
-from association.verdict.reasons import REASON_MESSAGES
+from association import ReasonCode, Status, WarningCode
 from map_quality import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
@@ -104,6 +103,8 @@ def parts_of(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
         ("SearchOptions", "offset_tolerance", (1e-3, 0.4)),
         ("SearchOptions", "angle_tolerance", (1e-3, 0.35)),
         ("SearchOptions", "min_overlap", (0.0, 1.0)),
+        ("SearchOptions", "on_map", (0.5, 1.0)),
+        ("SearchOptions", "usable_from", (0.5, 0.9999)),
         ("HardPriorFields", "radius", (0.0, 1e6)),
         ("HardPriorFields", "angle", (0.0, 4.0)),
     ],
@@ -179,11 +180,11 @@ def test_every_option_has_a_description(document: dict[str, Any]) -> None:
 
 def test_codes_and_statuses_are_enumerations(document: dict[str, Any]) -> None:
     schemas = document["components"]["schemas"]
-    known = {"ReasonAnswer": REASON_MESSAGES, "Problem": KINDS, "WarningAnswer": get_args(WarningCode)}
+    known = {"ReasonAnswer": get_args(ReasonCode), "Problem": KINDS, "WarningAnswer": get_args(WarningCode)}
     known |= {"FindingAnswer": get_args(FindingCode)}
     for name, codes in known.items():
         assert set(schemas[name]["properties"]["code"]["enum"]) == set(codes), name
-    assert set(schemas["AnalyzedPlaceAnswer"]["properties"]["reasons"]["items"]["enum"]) == set(REASON_MESSAGES)
+    assert set(schemas["AnalyzedPlaceAnswer"]["properties"]["reasons"]["items"]["enum"]) == set(get_args(ReasonCode))
     for name in ("FoundAnswer", "AssociateAnswer", "AnalyzedPlaceAnswer", "WithLandmarkAnswer"):
         assert set(schemas[name]["properties"]["status"]["enum"]) == set(Status), name
 

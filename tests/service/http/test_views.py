@@ -191,7 +191,11 @@ def test_the_last_view_answers_for_a_drive_that_saw_much_that_is_on_no_map(clien
         step = {"covariance": np.diag([4e-4, 4e-4, 4e-4]).tolist(), "relative_to": 4 - k}
         views.append({"segments": [*seen_from(at), *things], "pose": pose_json(HERE.inverse().compose(at)), **step})
     views.append({"segments": seen_from(HERE), "pose": EXACT})
-    alone, answer = asked(client, {"segments": seen_from(HERE)}), asked(client, {"views": views})
+    last, drive = {"segments": seen_from(HERE)}, {"views": views}
+    # The drive is less likely than its last view; only the latter is usable from between both.
+    likely = [asked(client, scan, options={"on_map": 0.5})["probability"] for scan in (last, drive)]
+    options = {"on_map": 0.5, "usable_from": min(0.5 * sum(likely), 0.9999)}
+    alone, answer = (asked(client, scan, options=options) for scan in (last, drive))
     assert alone["usable"]
     assert (answer["status"], answer["usable"], answer["reasons"]) == ("ok", True, [])
     assert "last_view_only" in [one["code"] for one in answer["warnings"]]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from association import PARTS
+from association import PARTS, AssociationOptions
 from service.schemas.parts import SearchOptions
 from service.work.inputs import association_options_of
 
@@ -18,3 +18,13 @@ from service.work.inputs import association_options_of
 def test_only_parts_that_are_included_are_worked_out(sent: dict[str, Any], parts: tuple[str, ...]) -> None:
     asked = SearchOptions.model_validate(sent, strict=False)
     assert association_options_of(asked, oriented=True).parts == parts
+
+
+def test_the_defaults_are_those_of_the_library() -> None:
+    assert association_options_of(SearchOptions(), oriented=True) == AssociationOptions()
+
+
+def test_what_decides_is_taken_over() -> None:
+    asked = SearchOptions(on_map=0.7, usable_from=0.8)
+    found = association_options_of(asked, oriented=True)
+    assert (found.on_map, found.usable_from) == (0.7, 0.8)

@@ -1,0 +1,214 @@
+"""Search a scan; where a drive is not usable, search its last view alone.
+
+A drive is a scan of several views whose steps are uncertain. Each view adds clutter, blocked lines of sight, and errors
+of odometry beyond the stated ones. The last view may fix the pose nevertheless, and the drive remains evidence for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import association
+from association import (
+    NOTHING_KNOWN,
+    AssociationOptions,
+    AssociationResult,
+    AssociationWarning,
+    Deadline,
+    KnownOfMaps,
+    MapIndex,
+    MapSet,
+    Prior,
+    Scan,
+    Views,
+)
+from registration import Beams, MeasuredSegments, Segments, wrap_angle
+
+Indices = NDArray[np.intp]
+Search = Callable[[Scan], AssociationResult]
+
+# The last view answers for a drive whose best pose is so near to its own, and so probable. Measured on 764 drives of
+# 10 m in drawn buildings, with ranges and with segments: of 47 right answers that only the last view makes usable one
+# is less probable, of 14 in other buildings five.
+AGREED_DISTANCE = 0.3  # m
+AGREED_ANGLE = math.radians(3.4)
+AGREED_PROBABILITY = 0.5
+
+LAST_VIEW_ONLY = AssociationWarning(
+    "last_view_only",
+    "The views of the drive together are not usable, the last view alone is, and both agree on the pose. The answer is "
+    "that of the last view alone: check the covariance of the steps, and whether the map shows what the drive passed.",
+)
+OF_ANSWER = frozenset(
+    ("prior_contradicted", "search_incomplete", "map_scale", "common_offset", "map_distorted", "turned")
+)  # codes of warnings that are about a search and its pose, not about the scan
+
+
+@dataclass(frozen=True, slots=True)
+class LastView:
+    """The last view of a drive, and the indices of its segments in the drive, (k,)."""
+
+    scan: Scan
+    own: Indices
+
+
+def associate(
+    index: MapIndex,
+    scan: Scan,
+    prior: Prior | None = None,
+    options: AssociationOptions | None = None,
+    deadline: Deadline | None = None,
+) -> AssociationResult:
+    """Find where in a map a scan was taken; arguments, result and exceptions are those of `association.associate`.
+
+    The answer of a drive that is not usable is that of its last view, if `search_drive` finds that usable.
+    """
+    how = options or AssociationOptions()
+    return search_drive(lambda seen: association.associate(index, seen, prior, how, deadline), scan)
+
+
+def associate_on_maps(
+    maps: MapSet,
+    scan: Scan,
+    known: KnownOfMaps = NOTHING_KNOWN,
+    options: AssociationOptions | None = None,
+    deadline: Deadline | None = None,
+) -> AssociationResult:
+    """Find on which of several maps a scan was taken: `association.associate_on_maps`, with drives as `associate`."""
+    how = options or AssociationOptions()
+    return search_drive(lambda seen: association.associate_on_maps(maps, seen, known, how, deadline), scan)
+
+
+def search_drive(search: Search, scan: Scan) -> AssociationResult:
+    """Search a scan; return the answer of the last view of a drive where the drive is not usable.
+
+    The last view consists of all views whose pose in the scan's frame is exact. Its answer is returned if it is usable
+    and the best pose of the drive agrees with it, is likely, and does not contradict the prior.
+
+    Parameters
+    ----------
+    search : callable
+        From a scan to its answer.
+    scan : Scan
+        Anything but a drive is searched once.
+
+    Returns
+    -------
+    AssociationResult
+        That of a last view has the indices of the drive's segments, and the warning `last_view_only`.
+    """
+    drive = search(scan)
+    last = last_view(scan) if not drive.usable and _supports(drive) else None
+    if last is None:
+        return drive
+    alone = search(last.scan)
+    if alone.usable and _agree(alone, drive):
+        return _of_drive(drive, alone, last.own, len(scan.measured))
+    return drive if alone.search.complete else _cut_short(drive, alone)
+
+
+def last_view(scan: Scan) -> LastView | None:
+    """Return the views of a scan whose poses are exact.
+
+    None where no view is, or all are: those are several sensors, or a drive of which no error is known.
+    """
+    views = scan.views
+    if views is None:
+        return None
+    exact: NDArray[np.bool_] = ~np.any(views.root.reshape(len(views), -1), axis=1)
+    segments, beams = exact[views.of_segment], exact[views.of_beam]
+    own = np.flatnonzero(segments)
+    if not 0 < len(own) < len(scan.measured):
+        return None
+    number = np.cumsum(exact) - 1
+    some = Views(
+        poses=tuple(pose for pose, one in zip(views.poses, exact, strict=True) if one),
+        viewpoints=views.viewpoints[exact],
+        of_segment=number[views.of_segment[segments]],
+        of_beam=number[views.of_beam[beams]],
+        root=np.zeros((3 * int(exact.sum()), 0)),
+        found=np.zeros(0),
+        spread=np.eye(0),
+    )
+    several, seen = len(some) > 1, _beams(scan.beams, beams)
+    return LastView(
+        replace(
+            scan,
+            measured=_measured(scan.measured, own),
+            viewpoint=some.viewpoint,
+            beams=seen if several or seen is None else replace(seen, origins=None),
+            views=some if several else None,
+        ),
+        own,
+    )
+
+
+def _measured(measured: MeasuredSegments, own: Indices) -> MeasuredSegments:
+    return MeasuredSegments(
+        Segments.derived(measured.segments.endpoints[own]),
+        measured.sigma[own],
+        measured.point_counts[own],
+        measured.centroids[own],
+        measured.spreads[own],
+        measured.counted,
+    )
+
+
+def _beams(beams: Beams | None, own: NDArray[np.bool_]) -> Beams | None:
+    if beams is None or beams.origins is None:
+        return None
+    return Beams(beams.angles[own], beams.ranges[own], beams.range_max, beams.origins[own])
+
+
+def _supports(drive: AssociationResult) -> bool:
+    """Return whether a drive that is not usable makes its pose likely, within the prior."""
+    contradicted = any(reason.code == "prior_contradicted" for reason in drive.reasons)
+    return not contradicted and (drive.probability or 0.0) >= AGREED_PROBABILITY
+
+
+def _agree(one: AssociationResult, other: AssociationResult) -> bool:
+    if one.pose is None or other.pose is None or one.map_id != other.map_id:
+        return False
+    away = math.hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y)
+    return away <= AGREED_DISTANCE and abs(wrap_angle(one.pose.theta - other.pose.theta)) <= AGREED_ANGLE
+
+
+def _of_drive(drive: AssociationResult, alone: AssociationResult, own: Indices, count: int) -> AssociationResult:
+    """Return the answer of a last view with the indices of the drive's `count` segments; those of others are unmatched.
+
+    Warnings about the scan of the drive are included: they may be why the drive is not usable.
+    """
+    unmatched = np.ones(count, dtype=bool)
+    unmatched[own] = False
+    unmatched[own[list(alone.unmatched_scan)]] = True
+    diagnostics = alone.diagnostics
+    if diagnostics is not None and diagnostics.critical_wall is not None:
+        wall = diagnostics.critical_wall
+        wall = replace(wall, scan=tuple(own[list(wall.scan)].tolist()))
+        diagnostics = replace(diagnostics, critical_wall=wall)
+    warnings = {one.code: one for one in alone.warnings}
+    warnings |= {one.code: one for one in drive.warnings if one.code not in OF_ANSWER}
+    return replace(
+        alone,
+        correspondences=tuple(replace(pair, scan=int(own[pair.scan])) for pair in alone.correspondences),
+        unmatched_scan=tuple(np.flatnonzero(unmatched).tolist()),
+        diagnostics=diagnostics,
+        warnings=(*warnings.values(), LAST_VIEW_ONLY),
+    )
+
+
+def _cut_short(drive: AssociationResult, alone: AssociationResult) -> AssociationResult:
+    """Return the answer of a drive whose last view was not searched to the end, and which is incomplete for it."""
+    if not drive.search.complete:
+        return drive
+    return replace(
+        drive,
+        search=drive.search.cut_short(),
+        reasons=(*(one for one in alone.reasons if one.code == "search_incomplete"), *drive.reasons),
+        warnings=(*drive.warnings, *(one for one in alone.warnings if one.code == "search_incomplete")),
+    )

@@ -1,0 +1,105 @@
+"""--on-map and --usable-from, in each command that searches."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from association import AssociationOptions
+from cli.options import UsableOptions
+from cli.ros2 import ros2 as ros2_command
+from tests.batch.logs import ROOM, SEEN, rows
+from tests.batch.logs import write_log as write_table
+from tests.map_quality.check.drawn import faces
+from tests.running import RunningService
+
+from .drives import write_log
+from .running import Linefix, refused
+
+HALF, SURE = ("--on-map", "0.5"), ("--on-map", "1")
+
+
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    (folder / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
+    (folder / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+    write_log(folder / "drive.log", 1)
+    write_table(folder / "scans.parquet", 1)
+
+
+def located(linefix: Linefix, *options: str) -> Any:
+    ended = linefix("locate", "room.json", "scan.json", "--json", *options)
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)
+
+
+def replayed(linefix: Linefix, *options: str) -> Any:
+    ended = linefix("replay", "drive.log", "--map", "floor.json", "--json", *options)
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)
+
+
+def explained(linefix: Linefix, *options: str) -> Any:
+    ended = linefix("explain", "room.json", "scan.json", "--json", *options)
+    assert ended.code == 0, ended.err
+    found = json.loads(ended.out)
+    assert found["answer"]["usable"] == found["verdict"]["usable"]
+    return found["answer"]
+
+
+def in_batch(linefix: Linefix, *options: str) -> Any:
+    ended = linefix("batch", "scans.parquet", "--maps", "room.json", "--out", "o.parquet", "--workers", "1", *options)
+    assert ended.code == 0, ended.err
+    (row,) = rows(Path("o.parquet"))
+    return row
+
+
+def between(linefix: Linefix, command: Any) -> float:
+    """Return a probability between those with the least and the greatest prior."""
+    half, sure = (command(linefix, *options)["probability"] for options in (HALF, SURE))
+    assert half < sure
+    return float(min(0.5 * (half + sure), 0.9999))
+
+
+def test_the_defaults_are_those_of_the_search() -> None:
+    search = AssociationOptions()
+    assert UsableOptions() == UsableOptions(search.on_map, search.usable_from)
+
+
+@pytest.mark.parametrize("command", [located, explained, replayed, in_batch])
+def test_both_decide_what_is_usable(linefix: Linefix, command: Any) -> None:
+    least = ("--usable-from", str(between(linefix, command)))
+    assert [command(linefix, *options, *least)["usable"] for options in (HALF, SURE)] == [False, True]
+
+
+@pytest.mark.parametrize("command", [located, replayed])
+def test_a_server_gets_them(linefix: Linefix, service: RunningService, command: Any) -> None:
+    least = ("--usable-from", str(between(linefix, command)))
+    for options in ((*HALF, *least), (*SURE, *least)):
+        here, there = command(linefix, *options), command(linefix, *options, "--server", service.url)
+        assert (here["usable"], here["probability"]) == (there["usable"], there["probability"])
+        assert here["usable"] is (SURE[1] in options)
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "value"),
+    [
+        ("locate room.json scan.json", "--on-map", "0.4"),
+        ("explain room.json scan.json", "--on-map", "1.1"),
+        ("replay drive.log --map floor.json", "--usable-from", "1"),
+        ("batch scans.parquet --maps room.json --out o.parquet", "--usable-from", "0.4"),
+        ("ros2 --map room.json", "--on-map", "0"),
+    ],
+)
+def test_what_is_out_of_range_is_refused(linefix: Linefix, command: str, option: str, value: str) -> None:
+    assert option in refused(linefix(*command.split(), option, value), 2)
+
+
+def test_ros2_has_them_by_name() -> None:
+    names = inspect.signature(ros2_command).parameters
+    assert {"on_map", "usable_from"} <= set(names)
