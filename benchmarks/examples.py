@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
@@ -19,7 +23,8 @@ from association.verdict.null import find_null
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
 from batch import Engine, Lost, Processes
-from registration import RigidTransform
+from registration import MeasuredSegments, RigidTransform, Segments
+from registration.segments import Beams
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase
 from vectorization import vectorize
@@ -38,6 +43,7 @@ SEGMENTS, RANGES = "segments", "ranges"
 STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-map scans"
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 48, 160
+NARROW = 4  # one in so many drawn scans is of a narrow field of view
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
@@ -229,11 +235,37 @@ def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bo
         for condition in conditions:
             own = in_map(condition)
             numbers = [number for _, number in part.of(range(0, HERE if own else AWAY, stride))]
-            for question in questions([world], [condition], numbers):
+            for number, question in zip(numbers, questions([world], [condition], numbers), strict=True):
+                scan = question.scans[form]
+                scan = narrow(scan) if number // stride % NARROW == 0 else scan
                 yield Case(
-                    question.scans[form], question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
+                    scan, question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
                     DRAWN if own else DRAWN_STRANGERS, condition, world, _told_by(question.case),
                 )  # fmt: skip
+
+
+def narrow(scan: Scan) -> Scan:
+    """Return what a laser with a field of view of 120 degrees shows of a scan, around its longest segment."""
+    ends = scan.measured.segments.endpoints
+    if not len(ends):
+        return scan
+    middles = 0.5 * (ends[:, :2] + ends[:, 2:]) - np.array(scan.viewpoint or (0.0, 0.0))
+    bearings = np.arctan2(middles[:, 1], middles[:, 0])
+    ahead = bearings[np.hypot(*(ends[:, 2:] - ends[:, :2]).T).argmax()]
+
+    def kept(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return np.asarray(np.cos(angles - ahead) >= math.cos(math.radians(60.0)))
+
+    beams = scan.beams
+    if beams is not None:
+        ahead_of_it = kept(beams.angles)
+        beams = Beams(beams.angles[ahead_of_it], beams.ranges[ahead_of_it], beams.range_max)
+    seen, of = kept(bearings), scan.measured
+    measured = MeasuredSegments(
+        Segments.derived(ends[seen]), of.sigma[seen], of.point_counts[seen], of.centroids[seen], of.spreads[seen],
+        of.counted,
+    )  # fmt: skip
+    return replace(scan, measured=measured, beams=beams)
 
 
 def _told_by(case: DrawnCase) -> Callable[[RigidTransform], bool]:

@@ -154,6 +154,12 @@ class _Evidence:
         places = self.begins[at] + away[:, None] * self.ways[at]
         steps = np.hypot(*np.diff(places, axis=0).T)
         apart = (steps > THINGS_APART) | (np.diff(self.sensors[at]) != 0)
+        if apart.any() and self.sensors[at[0]] == self.sensors[at[-1]]:
+            # Bearings go round: what is seen where they begin may go on where they end.
+            begin = int(np.flatnonzero(apart)[0]) + 1
+            round_apart = math.dist(places[0], places[-1]) > THINGS_APART
+            more, at, places = np.roll(more, -begin), np.roll(at, -begin), np.roll(places, -begin, axis=0)
+            apart = np.roll(np.append(apart, round_apart), -begin)[:-1]
         first = np.concatenate([[0], np.flatnonzero(apart) + 1])
         last = np.concatenate([first[1:] - 1, [len(at) - 1]])
         widths = np.hypot(*(places[last] - places[first]).T)

@@ -11,8 +11,8 @@ LOOSE_BEAMS = 3.0  # tables; standard deviations of the walls within which a bea
 TEMPERATURE = 1.5  # nats, tables; how far apart two places score that are as likely as one to e
 # The most that each thing counts, for the answer or against it: it was moved, with a probability of 1 in 8.
 OF_A_THING = 2.0  # nats, tables
-THING_WIDTH = 1.5  # m, tables; of doors, niches, cupboards; wider things count as several
-THINGS_APART = 0.6  # m, tables; what differs at places that are nearer is one thing
+THING_WIDTH = 3.0  # m, tables; of doors, niches, cupboards, closed openings; wider things count as several
+THINGS_APART = 1.0  # m, tables; what differs at places that are nearer is one thing
 AS_SCORED, MOST_AS_SCORED = 0.15, 12.0  # cross-validated; nats: with one thing the probability stays below 0.93
 LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 UNCOUNTED, COUNTED = 0.3, 0.75  # of the best value, tables; worse alternatives are found by chance, and do not count
