@@ -139,7 +139,7 @@ SCRATCH = np.dtype(
     ]
 )
 # The same for beams: their sums; the end of one; the sums of none.
-BEAM_SCRATCH = np.dtype([("sums", JOINT_SUMS), ("point", SEEN), ("nothing", JOINT_SUMS)])
+BEAM_SCRATCH = np.dtype([("sums", JOINT_SUMS), ("point", SEEN), ("line", LINE), ("nothing", JOINT_SUMS)])
 
 
 def as_records(dtype: np.dtype[Any], rows: Floats) -> Records:

@@ -122,6 +122,7 @@ def move_to_beams(beams: Records, poses: Records, place: Place, gates: Floats, s
     shape = place.grid.shape[0]
     sums = scratch[0].sums
     point = scratch[0].point
+    line = scratch[0].line
     nothing = scratch[0].nothing
     for p in range(len(poses)):
         pose = poses[p]
@@ -153,7 +154,10 @@ def move_to_beams(beams: Records, poses: Records, place: Place, gates: Floats, s
                 if nearest >= 0:
                     point.centroid_x = px
                     point.centroid_y = py
-                    joint_add(sums, walls[nearest], point, 1.0, 1.0)
+                    line.dx = walls[nearest].dx
+                    line.dy = walls[nearest].dy
+                    line.offset = walls[nearest].offset
+                    joint_add(sums, line, point, 1.0, 1.0)
             if sums.count < LEAST_POINTS:
                 break
             sums.xx += SPRING
