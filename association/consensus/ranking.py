@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from registration.layout import JOINT_SUMS, Floats, Records
+from registration.layout import Floats, Records
 
 from ..context import SearchContext
 from ..deadline import CancelledError
-from ..layout import ESTIMATE, MATCH, RULE, SET_SCORE, record
+from ..layout import MATCH, RULE, SET_SCORE, record
 from ..options import MapsPrior
 from ..tables import ScoreRules
 from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, FEW_KEPT, INSIDE
@@ -144,13 +144,3 @@ def _map_priors(context: SearchContext, estimates: Records) -> Floats | float:
     """Return the logarithm of the prior probability of each pose's map, nats."""
     prior = context.prior
     return prior.of_maps[context.maps_at(estimates)] if isinstance(prior, MapsPrior) else 0.0
-
-
-def empty_sums() -> Records:
-    """Return the sums of no pair."""
-    return np.zeros(1, JOINT_SUMS)
-
-
-def estimate_record(x: float, y: float, theta: float) -> Records:
-    """Return a pose, metres and radians in the index frame, as (1,) of `ESTIMATE`."""
-    return record(ESTIMATE, x=x, y=y, theta=theta)

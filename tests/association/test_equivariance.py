@@ -58,7 +58,7 @@ def turn_of(by: RigidTransform) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def assert_same_verdict(one: AssociationResult, other: AssociationResult, probability: float = 1e-6) -> None:
+def assert_same_verdict(one: AssociationResult, other: AssociationResult, probability: float = 1e-5) -> None:
     assert (other.status, other.usable) == (one.status, one.usable)
     assert (other.probability is None) == (one.probability is None)
     if one.probability is not None and other.probability is not None:

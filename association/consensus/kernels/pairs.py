@@ -263,7 +263,7 @@ def solve_pose(sums: Record, angles: Record, parallel: float, pose: Record, solu
     sums.x1 -= SPRING * x
     sums.y1 -= SPRING * y
     sums.one += SPRING * (x * x + y * y)
-    theta, tx, ty, cost, _ = joint_solve(sums, pose.theta, False)
+    theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
     joint_information(sums, theta, solution)
     near = abs(wrap(theta - pose.theta)) <= MAX_TURN and (tx - x) ** 2 + (ty - y) ** 2 <= MAX_STEP**2
     regular = invert3(solution, pose)
@@ -271,12 +271,12 @@ def solve_pose(sums: Record, angles: Record, parallel: float, pose: Record, solu
         pose.theta = theta
         pose.x = tx
         pose.y = ty
-    solution.chi_square = joint_cost(sums, pose.theta, pose.x, pose.y) if not near else cost
     sums.xx -= SPRING
     sums.yy -= SPRING
     sums.x1 += SPRING * x
     sums.y1 += SPRING * y
     sums.one -= SPRING * (x * x + y * y)
+    solution.chi_square = joint_cost(sums, pose.theta, pose.x, pose.y)
     if not regular:
         solution.chi_square = math.inf
         return False
