@@ -19,8 +19,6 @@ from .growth import PAIRS, SIZES, growth
 from .imports import imports
 from .localization import localization
 from .lookalikes import lookalikes
-from .mistakes import mistakes
-from .parts import parts
 from .peers import peers, versions
 from .plan import plan
 from .queries import DATA, data_found
@@ -28,7 +26,6 @@ from .ranges import ranges
 from .replicas import replicas
 from .request import request
 from .ros2 import ros2
-from .sensitivity import sensitivity
 from .smoothness import smoothness
 from .starts import starts
 from .sums import sums
@@ -89,19 +86,8 @@ def _floors(quick: int) -> list[Row]:
     return rows
 
 
-def _mistakes(quick: int) -> list[Row]:
-    rows = mistakes(quick)
-    print_rows("Time for causes", rows)
-    return rows
-
-
 def _adversarial(quick: int) -> list[Row]:
     return adversarial(max(1, 5 // quick))
-
-
-def _parts(quick: int) -> list[Row]:
-    parts(quick)
-    return []
 
 
 def _peers(quick: int) -> list[Row]:
@@ -125,8 +111,6 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "ranges": _ranges,
     "analyze": _analyze,
     "adversarial": _adversarial,
-    "parts": _parts,
-    "mistakes": _mistakes,
     "floors": _floors,
     "grids": grids,
     "peers": _peers,
@@ -137,7 +121,6 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "batch": batch,
     "views": views,
     "replicas": replicas,
-    "sensitivity": sensitivity,
     "smoothness": smoothness,
     "plan": plan,
     "ros2": ros2,

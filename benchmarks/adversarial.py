@@ -120,5 +120,5 @@ def scan_of(ends: Ends, *, with_beams: bool) -> Scan:
 def overrun(index: MapIndex, scan: Scan) -> float:
     """Return by how many seconds a search goes on behind its deadline."""
     began = time.monotonic()
-    associate(index, scan, None, AssociationOptions(causes=True), Deadline(began + DEADLINE))
+    associate(index, scan, None, AssociationOptions(), Deadline(began + DEADLINE))
     return max(0.0, time.monotonic() - began - DEADLINE)

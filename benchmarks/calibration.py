@@ -174,7 +174,14 @@ def _most_likely(answers: Answers, raw: Floats, bounds: list[tuple[float, float]
 
     start = np.zeros(2 * k)
     options = {"maxiter": 2000, "maxfun": 5000}
-    w = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[*bounds, *bounds], options=options).x
+    w = minimize(
+        loss,
+        start,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[*bounds, *bounds],
+        options=options,  # type: ignore[call-overload]
+    ).x
     halves = []
     for half in np.split(w, 2):
         half = half / scale
@@ -246,9 +253,10 @@ def report(form: str, examples: Sequence[Example], answers: Answers, by: dict[fl
         print_table(f"Usable scans as {form}, on_map {on_map:g}", ("usable from", *GROUPS, *AWAY), cells)
     p, here = by[1.0], ~answers.away & answers.fixed
     order = np.flatnonzero(here)[np.argsort(p[here], kind="stable")]
-    rows = []
-    for some in np.array_split(order, BINS):
-        rows.append((f"{len(some)}", f"{p[some].mean():.3f}", f"{answers.right[some].mean():.3f}"))
+    rows = [
+        (f"{len(some)}", f"{p[some].mean():.3f}", f"{answers.right[some].mean():.3f}")
+        for some in np.array_split(order, BINS)
+    ]
     print_table(f"Probability, scans as {form} in their map, on_map 1", ("answers", "stated", "right"), rows)
     usable = (by[0.9] >= 0.95) & answers.fixed
     return {
@@ -263,7 +271,7 @@ def as_document(model: Model) -> dict[str, Any]:
     """Do the opposite of `association.verdict.model.as_model`."""
 
     def odds(one: Odds) -> dict[str, list[float]]:
-        numbers = {"constant": (one.constant,)}
+        numbers: dict[str, tuple[float, ...]] = {"constant": (one.constant,)}
         numbers |= {name: (c.slope, *(v for bend in c.bends for v in bend)) for name, c in one.curves.items()}
         return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 

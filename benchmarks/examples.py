@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Deadline, MapIndex, Scan
+from association import Deadline, MapIndex, Scan, turned_round
 from association.context import SearchContext
 from association.explanations import explain_scan
 from association.verdict.alternatives import compare
@@ -43,6 +43,7 @@ SEGMENTS, RANGES = "segments", "ranges"
 STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-map scans"
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 48, 160
+REVERSED = "reversed"  # scans whose segments have the other direction
 NARROW = 4  # one in so many drawn scans is of a narrow field of view
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
@@ -237,11 +238,19 @@ def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bo
             numbers = [number for _, number in part.of(range(0, HERE if own else AWAY, stride))]
             for number, question in zip(numbers, questions([world], [condition], numbers), strict=True):
                 scan = question.scans[form]
-                scan = narrow(scan) if number // stride % NARROW == 0 else scan
+                told: Callable[[RigidTransform], bool] | None = _told_by(question.case)
+                if number // stride % NARROW == 0:
+                    # What few walls show fits elsewhere, too: that is what their probability is about.
+                    scan, told = narrow(scan), told if "sister" in condition else None
                 yield Case(
                     scan, question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
-                    DRAWN if own else DRAWN_STRANGERS, condition, world, _told_by(question.case),
+                    DRAWN if own else DRAWN_STRANGERS, condition, world, told,
                 )  # fmt: skip
+                if own and number // stride % NARROW == 1:
+                    yield Case(
+                        turned_round(scan), question.index, None, DRAWN_DISTANCE, DRAWN_ANGLE, DRAWN_STRANGERS,
+                        REVERSED, world,
+                    )  # fmt: skip
 
 
 def narrow(scan: Scan) -> Scan:

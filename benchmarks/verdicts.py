@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 
@@ -75,7 +75,7 @@ class Scene:
 
     def answer(self) -> AssociationResult:
         """Search it."""
-        options = replace(AssociationOptions(), max_alternatives=5, causes=True)
+        options = AssociationOptions(max_alternatives=5)
         return associate(MapIndex.build(Segments.from_array(self.walls)), self.scan, self.prior, options)
 
 

@@ -12,7 +12,6 @@ SHORT_BRIDGE, LONG_BRIDGE = 2.5, 3.5  # m, tables
 FLAT_STEP = 0.03  # m, tables; between two walls on which a segment lies, up to where both count fully
 FLAT_GATE = 0.9  # of a gate, tables; a line farther off gains less, and nothing at the gate
 OVERLAP_TAPER = 0.05  # beyond the least overlap, tables; up to there a match gains less, and nothing at the least
-LEAST_COUNT = 1e-9  # rounding; of matches, to divide by
 WHOLE_SCORE = 2.0  # nats, tables; a match that scores less is a match in part
 MOST_BRIDGED = 2000  # neighbours on their chains that the walls under one scan segment have, measured
 
@@ -35,7 +34,6 @@ PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at
 
 # --- Estimation: the pose with the error of the map's walls -----------------------------------------------------------
 
-VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
 
 # The walls' own error as assumed before any wall is observed, and how many walls that counts as. Fitted.
 USUAL_WALL_ERROR = 0.02  # m

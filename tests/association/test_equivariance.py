@@ -99,7 +99,8 @@ def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransfor
     """Compare a scan in the sensor's frame with the same data in a frame in which the sensor is at `mount`."""
     index = index_of(walls)
     here, there = answer_of(index, scan), answer_of(index, (mounted if as_view else in_frame)(scan, mount))
-    assert_same_verdict(here, there)
+    # The spring that holds open directions while poses are refined refers to the origin.
+    assert_same_verdict(here, there, 1e-3)
     if not leads(here):
         return
     assert same_pose(pose_in(there).compose(mount), pose_in(here), 1e-6, 1e-6)

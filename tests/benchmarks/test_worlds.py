@@ -27,7 +27,7 @@ ANSWER = WorldOutcome(
     world="museum", condition="clean", number=0, held_out=True, form="ranges", truth=[0.0, 0.0, 0.0],
     pose=[0.1, 0.0, 0.0], status="ok", usable=True, reasons=[], probability=0.99, distance=0.1, angle=0.0, read=1.0,
     covariance=[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], nees=3.0, walls=7, matched=9, missing=0, scan_segments=9,
-    map_segments=100, inlier_fraction=0.9, score=100.0, runner_up=None, margin=None, significance=1e-9, chi2=20.0,
+    map_segments=100, inlier_fraction=0.9, score=100.0, runner_up=None, margin=None, chi2=20.0,
     reliability=0.5, dof=18, alternatives=0, complete=True, milliseconds=1.0,
 )  # fmt: skip
 WRONG = replace(ANSWER, pose=[5.0, 0.0, 0.0], distance=5.0, read=0.5, nees=900.0)
