@@ -30,7 +30,7 @@ SUITES = {
     "registration/kernels/": Suite(
         tuple(
             f"tests/registration/test_{name}.py"
-            for name in ("kernels", "pair_kernels", "degenerate", "observability", "joint", "one_step")
+            for name in ("kernels", "pairs", "degenerate", "observability", "joint", "one_step")
         ),
         compiled=False,
     ),
