@@ -44,7 +44,7 @@ STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-m
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 48, 160
 REVERSED = "reversed"  # scans whose segments have the other direction
-NARROW = 4  # one in so many drawn scans is of a narrow field of view
+VIEWS = (360.0, 120.0, 360.0, 60.0)  # degrees; fields of view of the drawn scans, in turn
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
@@ -239,22 +239,23 @@ def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bo
             for number, question in zip(numbers, questions([world], [condition], numbers), strict=True):
                 scan = question.scans[form]
                 told: Callable[[RigidTransform], bool] | None = _told_by(question.case)
-                if number // stride % NARROW == 0:
+                kind = number // stride % len(VIEWS)
+                if VIEWS[kind] < 360.0:
                     # What few walls show fits elsewhere, too: that is what their probability is about.
-                    scan, told = narrow(scan), told if "sister" in condition else None
+                    scan, told = narrow(scan, VIEWS[kind]), told if "sister" in condition else None
                 yield Case(
                     scan, question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
                     DRAWN if own else DRAWN_STRANGERS, condition, world, told,
                 )  # fmt: skip
-                if own and number // stride % NARROW == 1:
+                if own and kind == 0:
                     yield Case(
                         turned_round(scan), question.index, None, DRAWN_DISTANCE, DRAWN_ANGLE, DRAWN_STRANGERS,
                         REVERSED, world,
                     )  # fmt: skip
 
 
-def narrow(scan: Scan) -> Scan:
-    """Return what a laser with a field of view of 120 degrees shows of a scan, around its longest segment."""
+def narrow(scan: Scan, view: float) -> Scan:
+    """Return what a laser with a field of view of some degrees shows of a scan, around its longest segment."""
     ends = scan.measured.segments.endpoints
     if not len(ends):
         return scan
@@ -263,7 +264,7 @@ def narrow(scan: Scan) -> Scan:
     ahead = bearings[np.hypot(*(ends[:, 2:] - ends[:, :2]).T).argmax()]
 
     def kept(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return np.asarray(np.cos(angles - ahead) >= math.cos(math.radians(60.0)))
+        return np.asarray(np.cos(angles - ahead) >= math.cos(math.radians(0.5 * view)))
 
     beams = scan.beams
     if beams is not None:

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from registration.layout import Floats, Records
 from registration.values import value
@@ -97,16 +100,12 @@ class _Evidence:
     values : (k, m) nats
     distances : (k, m) metres from the sensor, where the thing is that a value speaks of
     begins, ways : (m, 2) from where each place is seen, and its direction; in the scan frame
-    order : (m,) by sensor and bearing
-    sensors : (m,)
     """
 
     values: Floats
     distances: Floats
     begins: Floats
     ways: Floats
-    order: Indices
-    sensors: Indices
 
     @classmethod
     def of(cls, context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> _Evidence:
@@ -139,32 +138,26 @@ class _Evidence:
             values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
         begins = np.stack([beams.rows["x"], beams.rows["y"]], axis=1)
         ways = np.stack([beams.rows["dx"], beams.rows["dy"]], axis=1)
-        order = np.lexsort((np.arctan2(ways[:, 1], ways[:, 0]), beams.sensor))
-        return cls(values, distances, begins, ways, order, beams.sensor)
+        return cls(values, distances, begins, ways)
 
     def gap(self, one: int, other: int) -> float:
         """Return by how much one explanation has more evidence than another, each thing within its limit, nats."""
-        more = (self.values[one] - self.values[other])[self.order]
+        more = self.values[one] - self.values[other]
         differs = np.flatnonzero(np.abs(more) > LEAST_OF_BEAM)
         if not len(differs):
             return 0.0
-        more, at = more[differs], self.order[differs]
+        more = more[differs]
         # A thing is where the map shows it to the explanation that it speaks against.
-        away = np.where(more > 0.0, self.distances[other, at], self.distances[one, at])
-        places = self.begins[at] + away[:, None] * self.ways[at]
-        steps = np.hypot(*np.diff(places, axis=0).T)
-        apart = (steps > THINGS_APART) | (np.diff(self.sensors[at]) != 0)
-        if apart.any() and self.sensors[at[0]] == self.sensors[at[-1]]:
-            # Bearings go round: what is seen where they begin may go on where they end.
-            begin = int(np.flatnonzero(apart)[0]) + 1
-            round_apart = math.dist(places[0], places[-1]) > THINGS_APART
-            more, at, places = np.roll(more, -begin), np.roll(at, -begin), np.roll(places, -begin, axis=0)
-            apart = np.roll(np.append(apart, round_apart), -begin)[:-1]
-        first = np.concatenate([[0], np.flatnonzero(apart) + 1])
-        last = np.concatenate([first[1:] - 1, [len(at) - 1]])
-        widths = np.hypot(*(places[last] - places[first]).T)
-        limits = OF_A_THING * np.maximum(1.0, widths / THING_WIDTH)
-        return float(np.clip(np.add.reduceat(more, first), -limits, limits).sum())
+        away = np.where(more > 0.0, self.distances[other, differs], self.distances[one, differs])
+        places = self.begins[differs] + away[:, None] * self.ways[differs]
+        first, second = cKDTree(places).query_pairs(THINGS_APART, output_type="ndarray").T
+        near = coo_array((np.ones(len(first)), (first, second)), shape=(len(places), len(places)))
+        count, thing = connected_components(near, directed=False)
+        low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+        np.minimum.at(low, thing, places)
+        np.maximum.at(high, thing, places)
+        limits = OF_A_THING * np.maximum(1.0, np.hypot(*(high - low).T) / THING_WIDTH)
+        return float(np.clip(np.bincount(thing, more, count), -limits, limits).sum())
 
 
 def _of_lines(context: SearchContext, matches: Records, rays: Indices) -> Floats:
