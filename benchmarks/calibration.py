@@ -41,7 +41,7 @@ Flags = NDArray[np.bool_]
 
 FORMS = (SEGMENTS, RANGES)
 BENDS = (0.2, 0.5, 0.8, 0.95)  # quantiles of a feature at which its curve may bend
-RIDGE = 10.0  # on slopes of standardised pieces, in units of one answer
+RIDGE = 1.0  # on slopes of standardised pieces, in units of one answer
 LEAST_BESIDE = 0.02  # fraction of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.01  # and of what the values come to in all that lies between two
 REAL = 3.0  # a scan of a real plan or log counts as that many of drawn buildings
@@ -100,6 +100,9 @@ class Answers:
         return Answers(**{field.name: getattr(self, field.name)[mask] for field in fields(self)})
 
 
+OF_THIS_MAP = ("solitude",)  # that no other place is similar says nothing of scans that were taken elsewhere
+
+
 def features_of(form: str) -> tuple[str, ...]:
     """Return the features that a model may have: those of beams with ranges only."""
     return tuple(name for name, role in ROLES.items() if not (form == SEGMENTS and role.needs_beams))
@@ -128,12 +131,15 @@ def fit(answers: Answers, names: Sequence[str]) -> Model:
     answers = answers.where(answers.told)
     bends = {name: knots(answers.features[:, Features._fields.index(name)]) for name in names}
     columns, bounds = [np.ones((len(answers.right), 1))], [(-np.inf, np.inf)]
+    elsewhere = bounds.copy()
     for name in names:
         values = answers.features[:, Features._fields.index(name)]
         columns.append(pieces(values, bends[name]))
         sign = ROLES[name].sign
-        bounds += [(0.0 if sign == FOR else -np.inf, 0.0 if sign == AGAINST else np.inf)] * (len(bends[name]) + 1)
-    w = _most_likely(answers, np.hstack(columns), bounds)
+        own = [(0.0 if sign == FOR else -np.inf, 0.0 if sign == AGAINST else np.inf)] * (len(bends[name]) + 1)
+        bounds += own
+        elsewhere += [(0.0, 0.0)] * len(own) if name in OF_THIS_MAP else own
+    w = _most_likely(answers, np.hstack(columns), [*bounds, *elsewhere])
     odds = []
     for half in np.split(w, 2):
         curves, at = {}, 1
@@ -179,7 +185,7 @@ def _most_likely(answers: Answers, raw: Floats, bounds: list[tuple[float, float]
         start,
         jac=True,
         method="L-BFGS-B",
-        bounds=[*bounds, *bounds],
+        bounds=bounds,
         options=options,  # type: ignore[call-overload]
     ).x
     halves = []

@@ -136,6 +136,8 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     status = _status(explained, probability, findings, vetoes, usable_from)
     contradicted = any(veto.reason == "prior_contradicted" for veto in vetoes)
     usable = status is Status.OK and not vetoes
+    if status is Status.NO_MATCH:
+        probability = 0.0
     verdict = Verdict(
         status=status,
         probability=None if status is Status.DEGENERATE else min(probability, CONTRADICTED if contradicted else 1.0),
