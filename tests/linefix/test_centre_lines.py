@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
+
 import linefix
 from formats import ImportedMap, ImportOptions
 from tests.map_quality.check.drawn import centre_lines, sampled
