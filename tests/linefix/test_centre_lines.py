@@ -26,7 +26,7 @@ def usable(map: ImportedMap) -> int:
     return count
 
 
-@pytest.mark.xfail(strict=False, reason="the models of the smaller core call fewer scans usable")
+@pytest.mark.xfail(strict=True, reason="2 of 12 scans are usable, not 4")
 def test_scans_are_usable_without_a_word(tmp_path: Path) -> None:
     path = tmp_path / "plan.csv"
     path.write_text("".join(",".join(map(str, line)) + "\n" for line in centre_lines().tolist()))

@@ -95,7 +95,7 @@ def gathered(*names: str, moved: bool = True, told: OdometryHistory | None = Non
     return locate(linefix.index_map(ROOM), looks), missing
 
 
-@pytest.mark.xfail(strict=False, reason="one scanner alone is usable with the present models")
+@pytest.mark.xfail(strict=True, reason="one scanner alone is usable")
 def test_odometry_says_how_the_robot_moved_between_them() -> None:
     told = OdometryHistory()
     for nanosec, at in ((0, HERE), (40_000_000, linefix.RigidTransform(0.12, 0.01, 0.07)), (90_000_000, DRIVEN)):
@@ -108,7 +108,7 @@ def test_odometry_says_how_the_robot_moved_between_them() -> None:
     assert math.hypot(found.pose.x - MAP_FROM_BASE.x, found.pose.y - MAP_FROM_BASE.y) < 0.03
 
 
-@pytest.mark.xfail(strict=False, reason="one scanner alone is usable with the present models")
+@pytest.mark.xfail(strict=True, reason="one scanner alone is usable")
 def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
     found, missing = gathered("front", "back")
     assert missing == ['no odometry between the newest scan and that of "back", which is left out']

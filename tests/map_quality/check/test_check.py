@@ -81,7 +81,7 @@ def test_one_the_wrong_way_round() -> None:
     assert checked(walls).advice.oriented is None
 
 
-@pytest.mark.xfail(strict=False, reason="the models of the smaller core call fewer scans usable")
+@pytest.mark.xfail(strict=True, reason="looks_alike is found as well")
 def test_lines_without_direction() -> None:
     result = checked(centre_lines())
     assert [one.code for one in result.findings] == ["mixed_directions"]

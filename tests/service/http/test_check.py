@@ -77,7 +77,7 @@ def test_findings_name_segments(client: httpx.Client) -> None:
     assert (len(short["segments"]), short["count"]) == (1000, 1500)
 
 
-@pytest.mark.xfail(strict=False, reason="the models of the smaller core call fewer scans usable")
+@pytest.mark.xfail(strict=True, reason="looks_alike is found as well")
 def test_lines_along_the_middle_of_walls_and_what_to_do_about_them(client: httpx.Client) -> None:
     """Without a word next to nothing in such a drawing was usable."""
     put(client, centre_lines())
