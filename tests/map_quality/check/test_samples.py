@@ -168,8 +168,10 @@ def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None
     assert report.usable == sum(asked)
 
 
-@pytest.mark.xfail(strict=True, reason="a scale is found that is not there")
-@pytest.mark.parametrize("seed", [1, 2, 3])
+FALSE_SCALE = pytest.mark.xfail(strict=True, reason="a scale is found that is not there")
+
+
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=FALSE_SCALE), pytest.param(2, marks=FALSE_SCALE), 3])
 def test_scans_of_another_building_say_nothing_of_this_one(seed: int) -> None:
     """They fit a little better mirrored, without directions, or shrunk to one room: all by chance."""
     report = told(maze(seed))
