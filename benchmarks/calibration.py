@@ -100,9 +100,6 @@ class Answers:
         return Answers(**{field.name: getattr(self, field.name)[mask] for field in fields(self)})
 
 
-OF_THIS_MAP = ("solitude",)  # that no other place is similar says nothing of scans that were taken elsewhere
-
-
 def features_of(form: str) -> tuple[str, ...]:
     """Return the features that a model may have: those of beams with ranges only."""
     return tuple(name for name, role in ROLES.items() if not (form == SEGMENTS and role.needs_beams))
@@ -131,15 +128,13 @@ def fit(answers: Answers, names: Sequence[str]) -> Model:
     answers = answers.where(answers.told)
     bends = {name: knots(answers.features[:, Features._fields.index(name)]) for name in names}
     columns, bounds = [np.ones((len(answers.right), 1))], [(-np.inf, np.inf)]
-    elsewhere = bounds.copy()
     for name in names:
         values = answers.features[:, Features._fields.index(name)]
         columns.append(pieces(values, bends[name]))
         sign = ROLES[name].sign
         own = [(0.0 if sign == FOR else -np.inf, 0.0 if sign == AGAINST else np.inf)] * (len(bends[name]) + 1)
         bounds += own
-        elsewhere += [(0.0, 0.0)] * len(own) if name in OF_THIS_MAP else own
-    w = _most_likely(answers, np.hstack(columns), [*bounds, *elsewhere])
+    w = _most_likely(answers, np.hstack(columns), bounds * 2)
     odds = []
     for half in np.split(w, 2):
         curves, at = {}, 1

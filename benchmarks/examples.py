@@ -44,7 +44,8 @@ STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-m
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 48, 160
 REVERSED = "reversed"  # scans whose segments have the other direction
-VIEWS = (360.0, 120.0, 360.0, 60.0)  # degrees; fields of view of the drawn scans, in turn
+VIEWS = (360.0, 120.0, 360.0, 45.0)  # degrees; fields of view of the drawn scans, in turn
+ROOM_SIZE = 4.0  # m; of every other four drawn maps, what lies so near to one place is the whole map
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
@@ -239,19 +240,33 @@ def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bo
             for number, question in zip(numbers, questions([world], [condition], numbers), strict=True):
                 scan = question.scans[form]
                 told: Callable[[RigidTransform], bool] | None = _told_by(question.case)
-                kind = number // stride % len(VIEWS)
+                turn, kind = divmod(number // stride, len(VIEWS))
+                index = small_map(question.case) if turn % 2 else question.index
                 if VIEWS[kind] < 360.0:
                     # What few walls show fits elsewhere, too: that is what their probability is about.
                     scan, told = narrow(scan, VIEWS[kind]), told if "sister" in condition else None
                 yield Case(
-                    scan, question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
+                    scan, index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
                     DRAWN if own else DRAWN_STRANGERS, condition, world, told,
                 )  # fmt: skip
                 if own and kind == 0:
                     yield Case(
-                        turned_round(scan), question.index, None, DRAWN_DISTANCE, DRAWN_ANGLE, DRAWN_STRANGERS,
+                        turned_round(scan), index, None, DRAWN_DISTANCE, DRAWN_ANGLE, DRAWN_STRANGERS,
                         REVERSED, world,
                     )  # fmt: skip
+
+
+def small_map(case: DrawnCase) -> MapIndex:
+    """Return the map of a few rooms: around the truth, or around some wall where there is none.
+
+    That no other place is similar says less there.
+    """
+    ends = case.map.endpoints
+    begin, along = ends[:, :2], ends[:, 2:] - ends[:, :2]
+    at = begin[case.number % len(ends)] if case.truth is None else np.array([case.truth.x, case.truth.y])
+    part = np.clip(((at - begin) * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+    distance = np.hypot(*(begin + part[:, None] * along - at).T)
+    return MapIndex.build(Segments.from_array(ends[distance < max(ROOM_SIZE, 1.01 * float(distance.min()))]))
 
 
 def narrow(scan: Scan, view: float) -> Scan:

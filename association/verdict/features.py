@@ -28,7 +28,6 @@ from .alternatives import Comparison
 from .null import NO_NULL, Null
 from .tuning import (
     CROWD_TEMPERATURE,
-    LEAST_CROWD,
     LEAST_MISFIT,
     LIKE_WALLS,
     MAX_GAP,
@@ -70,7 +69,8 @@ class Features(NamedTuple):
     Attributes
     ----------
     solitude : float
-        Minus the logarithm of the evidence of all alternatives over its own, at a high temperature.
+        Minus the logarithm of the evidence of all alternatives over its own, at a high temperature, nats; at most that
+        of the places that the other walls of the map make: on a small map it says little that there is no other one.
     deviation : float
         Standard deviation of the sensor's place along its weakest direction without the wall that fixes it most, m.
     inlier_fraction : float
@@ -122,9 +122,11 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     offsets = best.matches["offset"] ** 2 / lines["plain_variance"]
     misfit = float(best.parts @ offsets) / max(1e-9, float(best.parts.sum()))
     crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.gaps) / CROWD_TEMPERATURE)
+    walls = float(estimate.leverages.own.sum())
+    places = max(1.0, len(context.index.walls.rows) - walls) / max(1.0, walls)
     agreement, blocked, farther, nearer = _of_beams(context, best)
     features = Features(
-        solitude=-math.log(float(crowd.sum()) + math.exp(LEAST_CROWD)),
+        solitude=-math.log(max(float(crowd.sum()), 1.0 / places)),
         deviation=min(MOST_DEVIATION, max(estimate.weakest, float(estimate.leverages.deviations.max(initial=0.0)))),
         inlier_fraction=best.fraction(lines),
         unmatched=math.sqrt(min(MOST_UNMATCHED, unmatched / per_view)),
@@ -133,7 +135,7 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
         farther=math.sqrt(farther),
         nearer=math.sqrt(nearer),
         misfit=math.log(min(MOST_MISFIT, max(LEAST_MISFIT, misfit))),
-        walls=math.sqrt(float(estimate.leverages.own.sum())),
+        walls=math.sqrt(walls),
         null_gap=0.0,
     )
     return with_null(Described(features, comparison, NO_NULL), best, NO_NULL)

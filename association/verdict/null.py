@@ -20,7 +20,7 @@ from ..scan.scan import mirrored
 from ..scan.scan_lines import ScanLines
 from ..search.search import Effort, allowed_by, search
 from ..tuning import FEW_KEPT, RAYS
-from .tuning import NULL_ALLOWED, NULL_ENOUGH, NULL_FRACTION, SYMMETRIC, UNLIKE_SYMMETRY
+from .tuning import BEYOND_SYMMETRY, NULL_ALLOWED, NULL_ENOUGH, NULL_FRACTION, SYMMETRIC, UNLIKE_SYMMETRY
 
 
 @value(frozen=True, slots=True)
@@ -41,12 +41,18 @@ class Null:
     def ratio(self, best: float) -> float:
         """Return the score over that of the answer, at least `NULL_FRACTION`, less where the place is symmetric.
 
-        A place with a mirror axis shows the mirrored scan as well: that is no chance.
+        A place with a mirror axis shows the mirrored scan as well as the scan: that is no chance. But not better.
         """
         if not best > 0.0:
             return NULL_ENOUGH
-        symmetric = min(1.0, max(0.0, (self.symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
-        return NULL_FRACTION + max(0.0, self.score / best - NULL_FRACTION) * (1.0 - symmetric)
+        ratio = self.score / best
+        symmetric = _between(UNLIKE_SYMMETRY, SYMMETRIC, self.symmetry) * (1.0 - _between(1.0, BEYOND_SYMMETRY, ratio))
+        return NULL_FRACTION + max(0.0, ratio - NULL_FRACTION) * (1.0 - symmetric)
+
+
+def _between(none: float, full: float, value: float) -> float:
+    """Return how far a value is from none to full, 0 to 1."""
+    return min(1.0, max(0.0, (value - none) / (full - none)))
 
 
 NO_NULL = Null(0.0, 0.0)

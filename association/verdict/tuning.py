@@ -8,12 +8,12 @@ COMPARED = 12  # alternatives, tables
 # Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least, and
 LOOSE_FACTOR = 4.0  # tables; times as much as they seem to be: of many similar places the one that fits best shows less
 LOOSE_BEAMS = 3.0  # tables; standard deviations of the walls within which a beam reads one then
-TEMPERATURE = 1.5  # nats, tables; how far apart two places score that are as likely as one to e
-# The most that each thing counts, for the answer or against it: it was moved, with a probability of 1 in 8.
-OF_A_THING = 2.0  # nats, tables
-THING_WIDTH = 3.0  # m, tables; of doors, niches, cupboards, closed openings; wider things count as several
+TEMPERATURE = 1.75  # nats, fitted; how far apart two places score that are as likely as one to e
+# The most that each thing counts, for the answer or against it: it was moved.
+OF_A_THING = 2.75  # nats, fitted
+THING_WIDTH = 3.0  # m, fitted; of doors, niches, cupboards, closed openings; wider things count as several
 THINGS_APART = 1.0  # m, tables; what differs at places that are nearer is one thing
-AS_SCORED, MOST_AS_SCORED = 0.15, 12.0  # cross-validated; nats: with one thing the probability stays below 0.93
+AS_SCORED, MOST_AS_SCORED = 0.15, 12.0  # cross-validated; nats: with one thing the probability stays below 0.94
 LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 UNCOUNTED, COUNTED = 0.3, 0.75  # of the best value, tables; worse alternatives are found by chance, and do not count
 
@@ -24,12 +24,12 @@ NULL_ENOUGH = 1.1  # likewise; a null above it
 MOST_NULL = 1.2  # tables; likewise
 NULL_ALLOWED = 0.01  # tables; probability of having missed a better one: it is one feature among others
 UNLIKE_SYMMETRY, SYMMETRIC = 0.7, 0.95  # tables; fractions between which a place comes to count as symmetric
+BEYOND_SYMMETRY = 1.1  # of the answer's score, tables; symmetry explains a null up to the answer, and none above that
 
 # --- Features ---------------------------------------------------------------------------------------------------------
 
 MAX_GAP = 60.0  # nats, tables
 CROWD_TEMPERATURE = 4.0  # nats, tables
-LEAST_CROWD = -12.0
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 MOST_DEVIATION = 1.0  # m, tables
 LIKE_WALLS = (0.8, 1.6)  # m, tables; scan lines of that length begin to count as walls, and count in full
