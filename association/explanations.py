@@ -13,6 +13,7 @@ from .consensus.acceptance import Accepted, accept, register_accepted
 from .consensus.consensus_set import ConsensusSet
 from .consensus.estimator import Estimate, estimate
 from .consensus.ranking import rank
+from .consensus.tuning import USUAL_WALL_ERROR
 from .context import SearchContext
 from .result import SearchReport
 from .scan.scan import corrected_scan
@@ -66,6 +67,11 @@ class Explanations:
     search: SearchReport
     scale: float = 1.0
     turn: float = 0.0
+
+    @property
+    def wall_sigma(self) -> float:
+        """The standard deviation of the walls' own errors, metres."""
+        return USUAL_WALL_ERROR if self.answer is None else self.answer.estimate.wall_sigma
 
     @property
     def others(self) -> Iterator[ConsensusSet]:

@@ -26,6 +26,10 @@ def fields(*groups: tuple[type, str]) -> np.dtype[Any]:
     return np.dtype([(name, kind) for kind, names in groups for name in names.split()])
 
 
+# A scan line on a wall, as the estimator takes it: centroid and direction in the scan frame, left normal and offset of
+# the wall, when it was seen from -0.5 to 0.5 of the sweep, and how that changes along it, 1/m.
+OBSERVATION = fields((_F, "centroid_x centroid_y dx dy normal_x normal_y offset time pace"))
+
 # A point or a direction, and both ends of a segment.
 POINT = fields((_F, "x y"))
 ENDS = fields((_F, "x1 y1 x2 y2"))

@@ -9,13 +9,13 @@ import numpy as np
 
 from registration import Ambiguity
 
-from .consensus.acceptance import accept, correspondences
+from .consensus.acceptance import accept, correspondences, register_accepted
 from .consensus.beams import cast, passed_walls
 from .consensus.consensus_set import ConsensusSet
 from .consensus.measures import score_at_one_step
 from .consensus.tuning import BLOCKING_RAYS
 from .context import SearchContext
-from .explanations import Answer, Explanations, answer_of
+from .explanations import Answer, Explanations
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -165,7 +165,8 @@ def _alternatives(
         return ()
     shown = others[: context.options.max_alternatives]
     probabilities = probabilities_of_others(verdict, shown)
-    return tuple(_alternative(context, explanations, *of_it) for of_it in zip(shown, probabilities, strict=True))
+    sigma = explanations.wall_sigma
+    return tuple(_alternative(context, one, sigma, p) for one, p in zip(shown, probabilities, strict=True))
 
 
 def probabilities_of_others(verdict: Verdict, others: Sequence[ConsensusSet]) -> list[float | None]:
@@ -182,14 +183,18 @@ def probabilities_of_others(verdict: Verdict, others: Sequence[ConsensusSet]) ->
 
 
 def _alternative(
-    context: SearchContext, explanations: Explanations, other: ConsensusSet, probability: float | None
+    context: SearchContext, other: ConsensusSet, wall_sigma: float, probability: float | None
 ) -> Alternative:
-    """Return another explanation, estimated like the answer."""
-    answer = answer_of(context, other, scaled=explanations.scale != 1.0)
-    diagnostics = None if answer is None else answer.registered.diagnostics
+    """Return another explanation, registered by its pairs with the walls' errors of the answer."""
+    accepted = accept(context, other, other.pose)
+    registered = register_accepted(context, other, accepted, wall_sigma, None) if len(accepted.pairs) else None
+    pose, covariance = context.in_map(other.pose), None
+    if registered is not None and registered.pose is not None and not registered.degenerate and not other.free:
+        pose, covariance = registered.pose, registered.covariance
+    diagnostics = None if registered is None else registered.diagnostics
     return Alternative(
-        pose=context.in_map(other.pose) if answer is None else answer.pose,
-        covariance=None if answer is None or answer.estimate.degenerate else answer.covariance,
+        pose=pose,
+        covariance=covariance,
         score=_score(context, other),
         ambiguity=Ambiguity(0.0, 0.0) if diagnostics is None else diagnostics.ambiguity,
         reliability=0.0 if diagnostics is None else diagnostics.reliability,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from functools import lru_cache
 
 import numpy as np
@@ -59,12 +60,12 @@ class _Chain:
     """
 
     direction: Floats
-    pieces: Indices
-    walls: Indices
-    lows: Floats
-    highs: Floats
-    reach: Floats
-    gaps: Floats
+    pieces: list[int]
+    walls: list[int]
+    lows: list[float]
+    highs: list[float]
+    reach: list[float]
+    gaps: list[float]
 
     @classmethod
     def of(cls, index: MapIndex, wall: int) -> _Chain:
@@ -75,7 +76,7 @@ class _Chain:
             walls.append(w)
             w = int(rows[w]["after"])
         items = [pieces.items[pieces.starts[w] : pieces.starts[w + 1]] for w in walls]
-        own, of_wall = np.concatenate(items).astype(np.intp), np.repeat(walls, [len(one) for one in items])
+        own, of_wall = np.concatenate(items), np.repeat(walls, [len(one) for one in items])
         ends = pieces.ends[own]
         one = ends["x1"] * direction[0] + ends["y1"] * direction[1]
         other = ends["x2"] * direction[0] + ends["y2"] * direction[1]
@@ -84,35 +85,32 @@ class _Chain:
         lows, highs = lows[order], highs[order]
         reach = np.maximum.accumulate(highs)
         gaps = np.cumsum(np.maximum(0.0, np.concatenate([[0.0], lows[1:] - reach[:-1]])))
-        return cls(direction, own[order], of_wall[order], lows, highs, reach, gaps)
+        columns = (own[order], of_wall[order], lows, highs, reach, gaps)
+        return cls(direction, *(column.tolist() for column in columns))
 
     def bare_up_to(self, x: float) -> float:
         """Return the length without pieces from the first of them to an abscissa, negative before it, metres."""
-        k = int(np.searchsorted(self.lows, x, side="right"))
-        if k == 0:
-            return float(x - self.lows[0])
-        return float(self.gaps[k - 1] + max(0.0, x - self.reach[k - 1]))
+        k = bisect_right(self.lows, x)
+        return self.gaps[k - 1] + max(0.0, x - self.reach[k - 1]) if k else x - self.lows[0]
 
     def lay(self, low: float, high: float, own: int) -> tuple[int, float, tuple[int, ...]]:
         """Return the piece that a segment between two abscissae lies on most, its overlap, and the other pieces.
 
         One that covers over half of it and is of its own wall comes first; of equal ones the first of the map.
         """
-        end = int(np.searchsorted(self.lows, high, side="right"))
-        begin = max(int(np.searchsorted(self.reach, low, side="right")), end - MOST_UNDER)
+        end = bisect_right(self.lows, high)
+        begin = max(bisect_right(self.reach, low), end - MOST_UNDER)
         if begin >= end:  # it lies beside all of them: on the nearest
             begin, end = max(0, min(begin, len(self.lows) - 1) - 1), min(len(self.lows), max(end, 1) + 1)
-        some = slice(begin, end)
-        overlaps = np.minimum(self.highs[some], high) - np.maximum(self.lows[some], low)
-        on_own = (overlaps > 0.5 * (high - low)) & (self.walls[some] == own)
-        most = int(np.lexsort((self.pieces[some], -overlaps, ~on_own))[0])
+        overlaps = {k: min(self.highs[k], high) - max(self.lows[k], low) for k in range(begin, end)}
+        half = 0.5 * (high - low)
+        most = min(overlaps, key=lambda k: (overlaps[k] <= half or self.walls[k] != own, -overlaps[k], self.pieces[k]))
         covered = 0.0
         if overlaps[most] > 0.0:
             bare = self.bare_up_to(high) - self.bare_up_to(low)
             covered = max(0.0, 1.0 - bare / max(high - low, MIN_EXTENT))
-        others = np.flatnonzero(overlaps > 0.0)
-        others = others[others != most][:MAX_OTHERS]
-        return int(self.pieces[some][most]), covered, tuple(map(int, self.pieces[some][others]))
+        others = [self.pieces[k] for k, overlap in overlaps.items() if overlap > 0.0 and k != most]
+        return self.pieces[most], covered, tuple(others[:MAX_OTHERS])
 
 
 def accept(context: SearchContext, best: ConsensusSet, pose: RigidTransform) -> Accepted:
@@ -136,11 +134,11 @@ def accept(context: SearchContext, best: ConsensusSet, pose: RigidTransform) -> 
     along = np.sort(ends[..., 0] * rows["dx"][:, None] + ends[..., 1] * rows["dy"][:, None], axis=1)
     covered = np.minimum(along[:, 1], rows["end"]) - np.maximum(along[:, 0], rows["begin"])
     overlaps = np.clip(covered / np.maximum(along[:, 1] - along[:, 0], MIN_EXTENT), 0.0, 1.0)
-    chains: dict[int, _Chain] = {}
+    chains = index.chains_of_pieces
     for k in np.flatnonzero(~single).tolist():
         wall = int(walls[k])
         key = int(index.pieces.firsts[wall])
-        chain = chains.get(key) or chains.setdefault(key, _Chain.of(index, wall))
+        chain: _Chain = chains.get(key) or chains.setdefault(key, _Chain.of(index, wall))
         low, high = sorted((ends[k] @ chain.direction).tolist())
         pieces[k], overlaps[k], more = chain.lay(low, high, wall)
         others[k] = tuple(other % index.directed for other in more)

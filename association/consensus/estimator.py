@@ -19,11 +19,12 @@ import numpy as np
 
 from registration import RigidTransform, wrap_angle
 from registration.kernels import MAX_DEVIATION
-from registration.layout import Floats
+from registration.layout import Floats, Records
 from registration.values import value
 
 from ..context import SearchContext
 from .consensus_set import ConsensusSet
+from .kernels.linearize import COLUMNS, OFFSET, STRAIN, TURN, linearize
 from .observations import Indices, Observations, observations_of
 from .tuning import (
     COMMON_WALL_ERROR,
@@ -38,6 +39,8 @@ from .tuning import (
     ROUGH_FRACTION,
     SCALE_DEVIATION,
     SHOWN_CHI_SQUARE,
+    SMALL_CHANGE,
+    SMALL_STEP,
     SPRING,
     STRAIN_DEVIATION,
     TURN_DEVIATION,
@@ -46,9 +49,7 @@ from .tuning import (
     USUAL_WALLS,
 )
 
-J = np.array([[0.0, -1.0], [1.0, 0.0]])
-OFFSET, STRAIN, TURN = 3, slice(4, 7), 7  # unknowns after the sensor's place and the heading
-COLUMNS = 8
+STRAINS = slice(STRAIN, STRAIN + 3)
 ROUNDING = 1e-13
 
 
@@ -167,7 +168,7 @@ def _columns(context: SearchContext, seen: Observations) -> Indices:
     """Return the columns beyond the pose that a scan may show."""
     if seen.views is not None or context.options.estimator != "joint":
         return np.zeros(0, np.intp)
-    first = OFFSET if context.scan.viewpoint is not None else STRAIN.start  # no rays, no offset along them
+    first = OFFSET if context.scan.viewpoint is not None else STRAIN  # no rays, no offset along them
     return np.arange(first, COLUMNS if seen.timed else TURN)
 
 
@@ -175,11 +176,14 @@ class _Model:
     """The normal equations of some unknowns, and their solution."""
 
     def __init__(self, seen: Observations, known: float | None, start: RigidTransform, columns: Indices) -> None:
-        self.seen, self.known, self.start, self.prior = seen, known, start, _prior(known)
+        self.seen, self.known, self.start = seen, known, start
         self.root = np.zeros((0, 0)) if seen.views is None else seen.views.root
         self.started = np.zeros(0) if seen.views is None else seen.views.found
         self.size = COLUMNS + self.root.shape[1]
         self.active = np.concatenate([np.arange(3), columns, np.arange(COLUMNS, self.size)]).astype(np.intp)
+        self.taken = np.append(self.active, self.size)  # with the residuals
+        self.columns = np.arange(3, 3 + len(columns))  # their places among the active ones
+        self.information = self._prior_information()
         at = start.apply(seen.sensor[None])[0]
         self.begin = np.concatenate([at, [start.theta], np.zeros(COLUMNS - 3), self.started])
         self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if known is None else known
@@ -212,14 +216,16 @@ class _Model:
         return out
 
     def solve(self) -> None:
-        """Take the steps of Gauss-Newton."""
+        """Take the steps of Gauss-Newton, until they are small."""
         for _ in range(ESTIMATION_ROUNDS):
             normal, gradient, by_wall = self._normal(self.variance)
             self.covariance = _inverse(normal)
-            step = -self.covariance @ gradient
+            step, before = -self.covariance @ gradient, self.variance
             self.x[self.active] += step
             if self.known is None:
                 self.variance = self._shown_variance(by_wall, step)
+            if np.abs(step).max() < SMALL_STEP and abs(self.variance - before) < SMALL_CHANGE * before:
+                break
         away = math.hypot(*(self.x[:2] - self.begin[:2])) > MAX_STEP
         if away or abs(wrap_angle(self.x[2] - self.begin[2])) > MAX_TURN or not np.isfinite(self.x).all():
             self.x, self.variance = self.begin.copy(), USUAL_WALL_ERROR**2 if self.known is None else self.known
@@ -227,94 +233,80 @@ class _Model:
 
     def shows_columns(self) -> bool:
         """Return whether the columns differ from 0 together, by a chi-square test, as the residuals scatter."""
-        own = np.flatnonzero((self.active >= 3) & (self.active < COLUMNS))
+        own = slice(3, 3 + len(self.columns))
         x = self.x[self.active[own]]
-        differs = float(x @ np.linalg.solve(self.covariance[np.ix_(own, own)], x))
-        return differs > SHOWN_CHI_SQUARE[len(own)] * max(1.0, self._scatter())
+        differs = float(x @ np.linalg.solve(self.covariance[own, own], x))
+        return differs > SHOWN_CHI_SQUARE[len(x)] * max(1.0, self._scatter())
 
     def _scatter(self) -> float:
         """Return how much more the residuals scatter than their variances say: chi-square per degree of freedom."""
-        (residuals, slopes, _, _), weights, angular = self._weighted(self.variance)
+        (a, b), weights, angular = self._weighted(self.variance)
+        residuals, slopes = a[:, -1], b[:, -1]
         left = self.of_wall @ (weights * residuals)
         information = self.walls / self.variance + np.diag(self.of_wall @ weights)
         chi_square = weights @ residuals**2 + angular @ slopes**2 - left @ np.linalg.solve(information, left)
         return max(0.0, float(chi_square)) / max(1, 2 * len(residuals) - len(self.active))
 
-    def _rows(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return the residuals of centroids and directions, (n,), and their derivatives, (n, active)."""
-        seen, x = self.seen, self.x
-        centroids, directions, of_views = self._by_views()
-        c, s = math.cos(x[2]), math.sin(x[2])
-        rotation = np.array([[c, -s], [s, c]])
-        strain = np.array([[x[4], x[6]], [x[6], x[5]]])
-        turns = x[TURN] * seen.times
-        ct, st = np.cos(turns)[:, None], np.sin(turns)[:, None]
-        away = centroids - seen.sensor
-        away = ct * away + st * (away @ J.T)
-        along = ct * directions + st * (directions @ J.T) + (x[TURN] * seen.paces)[:, None] * (away @ J.T)
-        q, d = away @ rotation.T, along @ rotation.T
-        z, e = q + q @ strain, d + d @ strain
-        n, reach = seen.normals, np.maximum(1e-6, np.hypot(z[:, 0], z[:, 1]))
-        incidence = (n * z).sum(axis=1) / reach
-        residuals = (n * (z + x[:2])).sum(axis=1) + x[OFFSET] * incidence - seen.offsets
-        slopes = (n * e).sum(axis=1)
-        nothing = np.zeros(len(seen))
-        by_turn = (n * (q @ J.T)).sum(axis=1)
-        columns = [
-            n[:, 0], n[:, 1], (n * (z @ J.T)).sum(axis=1), incidence,
-            n[:, 0] * q[:, 0], n[:, 1] * q[:, 1], n[:, 0] * q[:, 1] + n[:, 1] * q[:, 0], by_turn * seen.times,
-        ]  # fmt: skip
-        of_slopes = [
-            nothing, nothing, (n * (e @ J.T)).sum(axis=1), nothing,
-            n[:, 0] * d[:, 0], n[:, 1] * d[:, 1], n[:, 0] * d[:, 1] + n[:, 1] * d[:, 0],
-            (n * (d @ J.T)).sum(axis=1) * seen.times + by_turn * seen.paces,
-        ]  # fmt: skip
-        a, b = np.stack(columns, axis=1), np.stack(of_slopes, axis=1)
-        if seen.views is not None:
-            by_view = self.root.reshape(len(seen.views), 3, -1)[seen.view]
-            normal = n @ rotation
-            levers = np.stack([normal[:, 0], normal[:, 1], (normal * (of_views @ J.T)).sum(axis=1)], axis=1)
-            a = np.hstack([a, np.einsum("ni,nij->nj", levers, by_view)])
-            b = np.hstack([b, (normal * (directions @ J.T)).sum(axis=1)[:, None] * by_view[:, 2]])
-        return residuals, slopes, a[:, self.active], b[:, self.active]
-
-    def _by_views(self) -> tuple[Floats, Floats, Floats]:
-        """Return centroids and directions with the views where they are found, and from the view's origin, (n, 2)."""
+    def _rows(self) -> tuple[Floats, Floats]:
+        """Return the derivatives of centroids and directions by the active unknowns, and the residuals, (n, k + 1)."""
         seen = self.seen
+        a, b = np.empty((2, len(seen), COLUMNS + 1))
         if seen.views is None:
-            return seen.centroids, seen.directions, seen.centroids
+            linearize(seen.lines, seen.sensor, self.x, a, b)
+            return a[:, self.taken], b[:, self.taken]
+        lines, levers, turns = self._by_views()
+        linearize(lines, seen.sensor, self.x, a, b)
+        by_view = self.root.reshape(len(seen.views), 3, -1)[seen.view]
+        a = np.hstack([a[:, :-1], np.einsum("ni,nij->nj", levers, by_view), a[:, -1:]])
+        b = np.hstack([b[:, :-1], turns[:, None] * by_view[:, 2], b[:, -1:]])
+        return a[:, self.taken], b[:, self.taken]
+
+    def _by_views(self) -> tuple[Records, Floats, Floats]:
+        """Return the lines with the views where they are found, and their derivatives by a step of the view."""
+        seen = self.seen
+        assert seen.views is not None
         shifts = (self.root @ (self.x[COLUMNS:] - self.started)).reshape(-1, 3)[seen.view]
         origins = np.array([(pose.x, pose.y) for pose in seen.views.poses])[seen.view]
-        c, s = np.cos(shifts[:, 2:]), np.sin(shifts[:, 2:])
-        away = seen.centroids - origins
-        away = c * away + s * (away @ J.T)
-        return origins + shifts[:, :2] + away, c * seen.directions + s * (seen.directions @ J.T), away
+        lines = seen.lines.copy()
+        c, s = np.cos(shifts[:, 2]), np.sin(shifts[:, 2])
+        x, y = lines["centroid_x"] - origins[:, 0], lines["centroid_y"] - origins[:, 1]
+        x, y = c * x - s * y, s * x + c * y
+        lines["centroid_x"], lines["centroid_y"] = origins[:, 0] + shifts[:, 0] + x, origins[:, 1] + shifts[:, 1] + y
+        lines["dx"], lines["dy"] = (
+            c * lines["dx"] - s * lines["dy"],
+            s * lines["dx"] + c * lines["dy"],
+        )
+        cosine, sine = math.cos(self.x[2]), math.sin(self.x[2])
+        nx = cosine * lines["normal_x"] + sine * lines["normal_y"]
+        ny = cosine * lines["normal_y"] - sine * lines["normal_x"]
+        levers = np.stack([nx, ny, ny * x - nx * y], axis=1)
+        return lines, levers, ny * lines["dx"] - nx * lines["dy"]
 
-    def _weighted(self, variance: float) -> tuple[tuple[Floats, ...], Floats, Floats]:
+    def _weighted(self, variance: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
         weights = 1.0 / (self.seen.variances + ROUGH_FRACTION * variance)
         return self._rows(), weights, weights * self.seen.spreads
 
     def _normal(self, variance: float) -> tuple[Floats, Floats, Floats]:
-        """Return the normal matrix, the gradient, and by wall the sums of weights, rows and residuals, (m, 2 + k)."""
-        (residuals, slopes, a, b), weights, angular = self._weighted(variance)
-        normal = (a.T * weights) @ a + (b.T * angular) @ b
-        gradient = a.T @ (weights * residuals) + b.T @ (angular * slopes)
-        by_wall = (self.of_wall * weights) @ np.column_stack([np.ones(len(a)), residuals, a])
+        """Return the normal matrix, the gradient, and by wall the sums of weights, rows and residuals, (m, k + 2)."""
+        (a, b), weights, angular = self._weighted(variance)
+        both = (a.T * weights) @ a + (b.T * angular) @ b
+        by_wall = (self.of_wall * weights) @ np.column_stack([np.ones(len(a)), a])
         if variance > LEAST_KNOWN_VARIANCE:
             information = self.walls / variance
             information[np.diag_indices(len(information))] += by_wall[:, 0]
-            solved = np.linalg.solve(information, by_wall[:, 1:])
-            normal -= by_wall[:, 2:].T @ solved[:, 1:]
-            gradient -= by_wall[:, 2:].T @ solved[:, 0]
-        self._add_priors(normal, gradient)
+            both -= by_wall[:, 1:].T @ np.linalg.solve(information, by_wall[:, 1:])
+        normal, gradient = both[:-1, :-1], both[:-1, -1]
+        normal += self.information
+        gradient[3:] += self.information[3:, 3:] @ self.x[self.active[3:]]
         return normal, gradient, by_wall
 
-    def _add_priors(self, normal: Floats, gradient: Floats) -> None:
-        own = np.flatnonzero((self.active >= 3) & (self.active < COLUMNS))
-        information = np.diag(np.where(self.active < 3, SPRING, 1.0))
-        information[np.ix_(own, own)] = self.prior[np.ix_(self.active[own] - 3, self.active[own] - 3)]
-        normal += information
-        gradient[3:] += information[3:, 3:] @ self.x[self.active[3:]]
+    def _prior_information(self) -> Floats:
+        """Return the information on the active unknowns before anything is seen; a weak spring holds the pose."""
+        out = np.eye(len(self.active))
+        out[:3, :3] *= SPRING
+        at = self.active[self.columns] - 3
+        out[np.ix_(self.columns, self.columns)] = _prior(self.known)[np.ix_(at, at)]
+        return out
 
     def _shown_variance(self, by_wall: Floats, step: Floats) -> float:
         """Return the variance of the walls' own errors that their residuals show, shrunk where walls are few.
@@ -323,8 +315,8 @@ class _Model:
         that are farthest off match nothing.
         """
         weights = by_wall[:, 0]
-        rows = by_wall[:, 2:] / weights[:, None]
-        means = by_wall[:, 1] / weights + rows @ step
+        rows = by_wall[:, 1:-1] / weights[:, None]
+        means = by_wall[:, -1] / weights + rows @ step
         spreads = ((rows @ self.covariance) * rows).sum(axis=1)
         free = np.maximum(0.0, 1.0 - spreads / (self.variance + 1.0 / weights))
         found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float(self.own @ (means**2 - free / weights))
@@ -354,7 +346,7 @@ class _Model:
             leverages=self._leverages(weakest),
             with_columns=shown,
             offset=(float(full.x[OFFSET]), float(full.deviations[OFFSET])),
-            strain=(full.x[STRAIN].copy(), full.deviations[STRAIN]),
+            strain=(full.x[STRAINS].copy(), full.deviations[STRAINS]),
             turn=(float(full.x[TURN]), float(full.deviations[TURN])),
             found=x[COLUMNS:].copy(),
             spread=self.covariance[views, views].copy(),
@@ -363,9 +355,9 @@ class _Model:
     def _leverages(self, weakest: float) -> Leverages:
         """Return what the solution would be without each wall, and the walls tied to it as far as they are one."""
         seen, m = self.seen, len(self.seen.walls)
-        (residuals, slopes, a, b), weights, angular = self._weighted(self.variance)
+        (a, b), weights, angular = self._weighted(self.variance)
         p = len(self.active) - self.root.shape[1]
-        a, b = a[:, :p], b[:, :p]
+        residuals, slopes, a, b = a[:, -1], b[:, -1], a[:, :p], b[:, :p]
         of_wall = self.of_wall @ weights
         by_wall, left = (self.of_wall * weights) @ a, self.of_wall @ (weights * residuals)
         squares = (weights[:, None] * a)[:, :, None] * a[:, None, :]
@@ -380,12 +372,9 @@ class _Model:
         correlation = np.where(tied, np.exp(-np.abs(ties[:, None] - ties)), np.eye(m))
         kept = np.vstack([1.0 - correlation**2, np.ones(m)])
         normal, gradient = np.einsum("kw,wij->kij", kept, parts), kept @ gradients
-        prior = np.zeros((p, p)), np.zeros(p)
-        active, self.active = self.active, self.active[:p]
-        self._add_priors(*prior)
-        self.active = active
-        covariances = np.linalg.inv(normal + prior[0])
-        steps = -np.einsum("kij,kj->ki", covariances, gradient + prior[1])
+        gradient[:, 3:] += self.information[3:p, 3:p] @ self.x[self.active[3:p]]
+        covariances = np.linalg.inv(normal + self.information[:p, :p])
+        steps = -np.einsum("kij,kj->ki", covariances, gradient)
         moves = steps[:-1, :2] - steps[-1, :2]
         displacements = np.minimum(np.hypot(*moves.T), FREE_DEVIATION)
         values, vectors = np.linalg.eigh(covariances[:-1, :2, :2])

@@ -11,6 +11,7 @@ from registration.layout import Floats, Records
 from registration.values import value
 
 from ..context import SearchContext
+from ..layout import OBSERVATION
 from ..scan.scan import Views
 from ..tuning import ROUGHNESS
 from .tuning import LEAST_KNOWN_VARIANCE
@@ -28,18 +29,9 @@ class Observations:
         The scan line.
     wall : int
         Number of the wall among `walls`.
-    normals : (n, 2) float64
-        Left normal of the wall.
-    offsets : float64
-        Of the line under the scan line, metres.
-    centroids, directions : (n, 2) float64
-        In the scan frame.
+    lines : (n,) of `OBSERVATION`
     spreads, variances : float64
         Second moment of the points along the line; variance of its offset by the scan's sigma, m^2.
-    times : float64
-        When a line was seen, from -0.5 to 0.5 of the sweep of the laser; 0 of a scan whose order is not known.
-    paces : float64
-        How fast that changes along the line, 1/m.
     view : int
     walls : (m,)
         The walls of the map that are matched, each once, in the order of their ties.
@@ -53,14 +45,9 @@ class Observations:
 
     row: Indices
     wall: Indices
-    normals: Floats
-    offsets: Floats
-    centroids: Floats
-    directions: Floats
+    lines: Records
     spreads: Floats
     variances: Floats
-    times: Floats
-    paces: Floats
     view: Indices
     walls: Indices
     ties: Floats
@@ -73,7 +60,7 @@ class Observations:
     @property
     def timed(self) -> bool:
         """Return whether it is known in which order lines were seen."""
-        return bool(self.times.any())
+        return bool(self.lines["time"].any())
 
 
 def observations_of(context: SearchContext, matches: Records) -> Observations | None:
@@ -96,40 +83,35 @@ def observations_of(context: SearchContext, matches: Records) -> Observations | 
     place = np.zeros(int(walls.max()) + 1, np.intp)
     place[walls] = np.arange(len(walls))
     on = context.index.walls.rows[of_line]
-    sensor = np.array(context.sensor)
-    centroids = np.stack([seen["centroid_x"], seen["centroid_y"]], axis=1)
-    directions = np.stack([seen["dx"], seen["dy"]], axis=1)
-    times, paces = _times(context, centroids - sensor, directions)
+    lines = np.zeros(len(row), OBSERVATION)
+    for name in ("centroid_x", "centroid_y", "dx", "dy"):
+        lines[name] = seen[name]
+    lines["normal_x"], lines["normal_y"], lines["offset"] = -on["dy"], on["dx"], on["offset"] + matches["shift"][row]
+    _set_times(context, lines)
     return Observations(
         row=row,
         wall=place[of_line],
-        normals=np.stack([-on["dy"], on["dx"]], axis=1),
-        offsets=on["offset"] + matches["shift"][row],
-        centroids=centroids,
-        directions=directions,
+        lines=lines,
         spreads=seen["spread"],
         variances=variances,
-        times=times,
-        paces=paces,
         view=view,
         walls=walls,
         ties=context.index.ties[walls],
-        sensor=sensor,
+        sensor=np.array(context.sensor),
         views=views,
     )
 
 
-def _times(context: SearchContext, away: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """Return when lines were seen, by their bearings from the first beam on, and how that changes along them."""
+def _set_times(context: SearchContext, lines: Records) -> None:
+    """Set when lines were seen, by their bearings from the first beam on, and how that changes along them."""
     scan = context.scan
-    nothing = np.zeros(len(away))
     if scan.beams is None or scan.views is not None or not scan.ordered or len(scan.beams.angles) < 2:
-        return nothing, nothing
+        return
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
     sweep = last - first
     if scan.still or not abs(sweep) > 0.0:
-        return nothing, nothing
-    bearings = math.copysign(1.0, sweep) * (np.arctan2(away[:, 1], away[:, 0]) - first) % math.tau
-    squares = np.maximum(1e-6, (away**2).sum(axis=1))
-    turns = (away[:, 0] * directions[:, 1] - away[:, 1] * directions[:, 0]) / squares
-    return bearings / abs(sweep) - 0.5, turns / sweep
+        return
+    x, y = lines["centroid_x"] - context.sensor[0], lines["centroid_y"] - context.sensor[1]
+    bearings = math.copysign(1.0, sweep) * (np.arctan2(y, x) - first) % math.tau
+    lines["time"] = bearings / abs(sweep) - 0.5
+    lines["pace"] = (x * lines["dy"] - y * lines["dx"]) / np.maximum(1e-6, x * x + y * y) / sweep

@@ -42,7 +42,8 @@ UNSEEN_ERROR = 1.15  # fitted; variance of walls' errors over that of those whic
 LEAST_KNOWN_VARIANCE = 1e-12  # m^2, rounding; of walls whose error the caller knows
 LEAST_WALL_ERROR = 0.003  # m, tables
 ROUGH_FRACTION = 0.1  # of a wall's variance, tables; the part that differs along it
-ESTIMATION_ROUNDS = 4  # tables
+ESTIMATION_ROUNDS = 4  # tables; fewer where the step, m or rad, and the change of the walls' variance are small
+SMALL_STEP, SMALL_CHANGE = 1e-4, 0.05  # tables
 FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 

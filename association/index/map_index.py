@@ -165,6 +165,11 @@ class MapIndex:
         return self
 
     @cached_property
+    def chains_of_pieces(self) -> dict[int, Any]:
+        """What acceptance has put together of the pieces of linked walls, by the first wall."""
+        return {}
+
+    @cached_property
     def undirected(self) -> MapIndex:
         """The same map with every segment in both directions; itself where it was built so."""
         return self._undirected(None)
