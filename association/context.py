@@ -30,7 +30,7 @@ from .layout import (
 )
 from .options import AssociationOptions, HardPrior, MapsPrior, Prior, SoftPrior
 from .scan.alignment import aligned
-from .scan.beams import BeamSet, beams_of_ranges, rays_to_lines, rays_to_nothing, together
+from .scan.beams import BeamSet, beams_of_ranges, rays_to_lines
 from .scan.scan import Scan
 from .scan.scan_lines import ScanLines, gates
 from .tables import Question, ScoreWork
@@ -143,19 +143,32 @@ class SearchContext:
 
     @cached_property
     def beams(self) -> BeamSet:
-        """The beams that are evidence: those of the ranges, or the rays to lines and to where none is."""
+        """The beams that are evidence: those of the ranges, or the rays to lines."""
         ranges, views = self.scan.beams, self.scan.views
         if ranges is not None:
             place = self.scan.viewpoint or (0.0, 0.0)
             return beams_of_ranges(ranges, place, None if views is None else views.of_beam, self._view_weights)
-        to_lines = self.rays_to_lines
-        empty = rays_to_nothing(self.lines.sightings, self.viewpoints, self._view_weights, to_lines.reach)
-        return together(to_lines, empty)
+        return self.rays_to_lines
 
     @property
     def sensor(self) -> tuple[float, float]:
-        """The sensor's place, metres in the scan frame: the centre of what does not depend on the frame."""
-        return self.scan.viewpoint or self.middle
+        """The sensor's place, else the middle of the lines, metres in the scan frame: the centre of all that is judged.
+
+        Not the origin of the scan frame, which may lie anywhere.
+        """
+        return float(self.lines.model["sensor_x"][0]), float(self.lines.model["sensor_y"][0])
+
+    def at_sensor(self, poses: Records) -> Records:
+        """Return poses, (k,) of `ESTIMATE`, as those of the sensor in place of the scan's origin."""
+        (x, y), c, s = self.sensor, np.cos(poses["theta"]), np.sin(poses["theta"])
+        x, y = c * x - s * y, s * x + c * y
+        out, xt, yt, tt = poses.copy(), poses["xt"], poses["yt"], poses["tt"]
+        out["x"], out["y"] = poses["x"] + x, poses["y"] + y
+        out["xx"] += y * (y * tt - 2.0 * xt)
+        out["yy"] += x * (x * tt + 2.0 * yt)
+        out["xy"] += x * xt - y * yt - x * y * tt
+        out["xt"], out["yt"] = xt - y * tt, yt + x * tt
+        return out
 
     @property
     def can_look(self) -> bool:
@@ -183,20 +196,11 @@ class SearchContext:
         terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes())
         return Question(self.lines.rows, np.frombuffer(bytearray(terms), TERMS))
 
-    @property
-    def middle(self) -> tuple[float, float]:
-        """Mean of the midpoints of the scan's lines, metres in the scan frame."""
-        rows = self.lines.rows
-        return (float(rows["x"].mean()), float(rows["y"].mean())) if len(rows) else (0.0, 0.0)
-
     def maps_at(self, poses: Records) -> Integers:
-        """Return the map of each pose (k,), (k,): that nearest to the middle of the scan; 0 where there is one.
-
-        Not to the origin of the scan frame, which may lie anywhere.
-        """
+        """Return the map of each pose (k,), (k,): that nearest to the sensor; 0 where there is one."""
         if not isinstance(self.index, JointIndex) or not len(poses):
             return np.zeros(len(poses), np.intp)
-        x, y = self.middle
+        x, y = self.sensor
         c, s = np.cos(poses["theta"]), np.sin(poses["theta"])
         return self.index.map_at(np.stack([c * x - s * y + poses["x"], s * x + c * y + poses["y"]], axis=1))
 

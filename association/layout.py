@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import JOINT_SUMS, LINE, POSE, SEEN, SYMMETRIC3, Floats, Records
+from registration.layout import JOINT_SUMS, LINE, POSE, SYMMETRIC3, Floats, Records
 from registration.layout import record as record
 
 Integers: TypeAlias = NDArray[np.integer[Any]]
@@ -69,12 +69,8 @@ SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid
 MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift gain score"))
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
-# A scored consensus set, nats: its score, and score and prior together; the terms of the score, which is gain -
-# chi_square / 2 - log_determinant. Whether its walls are parallel by their reliability; whether it lies in the window
-# of a hard prior. Its sums, walls' own errors eliminated.
-SET_SCORE = np.dtype(
-    [*fields((_F, "score value gain chi_square log_determinant"), (_I, "parallel inside")).descr, ("sums", JOINT_SUMS)]
-)
+# A scored consensus set, nats: its score, and score and prior together; whether it lies in the window of a hard prior.
+SET_SCORE = fields((_F, "score value"), (_I, "inside"))
 # The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its
 # elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. Other evidence of the wall's error than
 # these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. A flag for a wall that is listed.
@@ -85,8 +81,8 @@ GRID_SHAPE = fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 # least fraction of the length on walls.
 GATES = fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
 # The model that scores a consensus set: variance of a wall's own error, m^2; how far a pose is free before it is fixed,
-# as standard deviations of position (m) and heading (rad).
-MODEL = fields((_F, "wall_variance free_distance free_angle"))
+# as standard deviations of position (m) and heading (rad); the sensor's place in the scan frame, m.
+MODEL = fields((_F, "wall_variance free_distance free_angle sensor_x sensor_y"))
 # The prior: kind; the pose; radius and angle of a window; information of a Gaussian.
 PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
 NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
@@ -142,8 +138,6 @@ SCRATCH = np.dtype(
         ("solution", SOLUTION),
     ]
 )
-# The same for beams: their sums; the end of one; the sums of none.
-BEAM_SCRATCH = np.dtype([("sums", JOINT_SUMS), ("point", SEEN), ("line", LINE), ("nothing", JOINT_SUMS)])
 
 
 def as_records(dtype: np.dtype[Any], rows: Floats) -> Records:

@@ -12,7 +12,6 @@ from registration import Ambiguity
 from .consensus.acceptance import accept, correspondences, register_accepted
 from .consensus.beams import cast, passed_walls
 from .consensus.consensus_set import ConsensusSet
-from .consensus.measures import score_at_one_step
 from .consensus.tuning import BLOCKING_RAYS
 from .context import SearchContext
 from .explanations import Answer, Explanations
@@ -92,7 +91,7 @@ def _diagnostics(
     return AssociationDiagnostics(
         registration=answer.registered.diagnostics,
         inlier_fraction=best.fraction(context.lines.rows),
-        score=_score(context, best),
+        score=best.score,
         runner_up=runner_up,
         margin=margin,
         critical_wall=_critical_wall(context, answer),
@@ -120,10 +119,6 @@ def turn_rate_of(context: SearchContext, explanations: Explanations, answer: Ans
     """Return the rate of that rotation, rad/s; None where it is not shown, or the duration of the scan not known."""
     turn, seconds = turn_of(explanations, answer), context.scan.sweep_s
     return turn / seconds if turn and seconds else None
-
-
-def _score(context: SearchContext, one: ConsensusSet) -> float:
-    return one.score if context.options.estimator == "joint" else score_at_one_step(one)
 
 
 def _critical_wall(context: SearchContext, answer: Answer) -> CriticalWall | None:
@@ -195,7 +190,7 @@ def _alternative(
     return Alternative(
         pose=pose,
         covariance=covariance,
-        score=_score(context, other),
+        score=other.score,
         ambiguity=Ambiguity(0.0, 0.0) if diagnostics is None else diagnostics.ambiguity,
         reliability=0.0 if diagnostics is None else diagnostics.reliability,
         inlier_fraction=other.fraction(context.lines.rows),

@@ -74,7 +74,6 @@ MOST_RAYS = 1000  # from one pose, about
 EMPTY_CELL = 4  # walls, measured; cost of going to the next cell
 LATE_CROWD = 500.0  # measured; walls on the list that a place on a wall has, from which rays are left out then
 MOST_BEAMS = 180  # tables; of a laser; neighbouring beams say the same
-RAYS = 120  # tables
 FAR = 25.0  # m, tables; farther walls are looked for only as far as one and a half times the scan reaches
 FARTHER = 1.5
 

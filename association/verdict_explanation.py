@@ -80,13 +80,10 @@ class ExplainedNull:
         Nats; 0 where none was found.
     fraction : float
         Of the answer's score.
-    symmetry : float
-        Fraction of directions in which the map shows the same from the answer, and mirrored from the null's pose.
     """
 
     score: float
     fraction: float
-    symmetry: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,5 +224,5 @@ def _explained(context: SearchContext, verdict: Verdict) -> VerdictExplanation:
                 strict=True,
             )
         ),
-        null=ExplainedNull(null.score, null.score / best, null.symmetry) if verdict.searched_null else None,
+        null=ExplainedNull(null, null / best) if verdict.searched_null else None,
     )

@@ -85,10 +85,7 @@ def _print_null(null: Json | None) -> None:
     if not null["score"]:
         print("\nNull score: the mirrored scan fits nowhere")
         return
-    print(
-        f"\nNull score: {null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score; "
-        f"symmetry of the map {null['symmetry']:.2f}"
-    )
+    print(f"\nNull score: {null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score")
 
 
 def _print_probabilities(one: Json) -> None:

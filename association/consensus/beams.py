@@ -7,13 +7,12 @@ import numpy as np
 from registration.layout import Floats, Records
 
 from ..context import SearchContext
-from ..layout import BEAM_SCRATCH, SHOWN, Flags, Integers, record
+from ..layout import SHOWN, Flags, Integers
 from ..scan.beams import BeamSet
 from ..tuning import MOST_LOOKED_AT
 from .consensus_set import BeamEvidence
-from .kernels.rays import cast_beams, move_to_beams
+from .kernels.rays import cast_beams
 from .tuning import (
-    BEAM_GATES,
     BEAMS_PASSED,
     BEAMS_READ,
     BLOCKED,
@@ -26,8 +25,6 @@ from .tuning import (
     SURE_LENGTH,
     WALL_BEHIND,
 )
-
-GATES = np.array(BEAM_GATES)
 
 
 def cast(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
@@ -118,10 +115,3 @@ def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, mat
     lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
     rays = np.minimum(1.0, to_matched / BLOCKING_RAYS) + np.minimum(1.0, to_clutter / BLOCKING_RAYS)
     return np.bincount(poses, BLOCKED * lengths * rays, len(table)).astype(np.float64)
-
-
-def moved_to_beams(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
-    """Return poses, (k,) of `ESTIMATE`, moved to where the ends of the beams lie on walls."""
-    moved = poses.copy()
-    move_to_beams(beams.rows, moved, context.index.tables.place, GATES, record(BEAM_SCRATCH))
-    return moved

@@ -50,9 +50,6 @@ class ConsensusSet:
         True unless it lies outside the window of a hard prior.
     by_pairs : float
         The score of the pairs alone: gains less half of the chi-square, less the log-determinant.
-    chi_square : float
-    sums : (1,) of `JOINT_SUMS`
-        Walls' own errors eliminated.
     matches : (n,) of `MATCH`
     parts : (n,)
         How much of each match there is, 0 to 1: one that scores little counts in part.
@@ -64,8 +61,6 @@ class ConsensusSet:
     posterior: float
     inside: bool
     by_pairs: float
-    chi_square: float
-    sums: Records
     matches: Records
     parts: Floats
     evidence: BeamEvidence

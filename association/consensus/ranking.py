@@ -12,7 +12,7 @@ from ..layout import MATCH, RULE, SET_SCORE, record
 from ..options import MapsPrior
 from ..tables import ScoreRules
 from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, FEW_KEPT, INSIDE
-from .beams import at_pose, cast, evidence_of, moved_to_beams, penalty_of_sight, score_of_beams
+from .beams import at_pose, cast, evidence_of, penalty_of_sight, score_of_beams
 from .consensus_set import BeamEvidence, ConsensusSet
 from .kernels.distinct import pick_distinct
 from .kernels.scoring import score_poses
@@ -23,7 +23,6 @@ from .tuning import (
     FEW_BEAMS,
     FIRST_RANKED,
     LATE_FINALISTS,
-    PASSED_SLACK,
     RANKED_AT_ONCE,
     SAME_FAMILY,
     START_ANGLE_VARIANCE,
@@ -37,10 +36,16 @@ def score(context: SearchContext, estimates: Records) -> tuple[Records, Records]
     k, n = len(estimates), len(context.lines.rows)
     scores, matches = np.zeros(k, SET_SCORE), np.zeros((k, n), MATCH)
     matches["wall"] = -1
-    for name in ("xy", "xt", "yt"):
-        estimates[name] = 0.0
-    estimates["xx"] = estimates["yy"] = START_VARIANCE
-    estimates["tt"] = START_ANGLE_VARIANCE
+    # Of the sensor's place; the pose is that of the scan's origin.
+    (x, y), t = context.sensor, START_ANGLE_VARIANCE
+    c, s = np.cos(estimates["theta"]), np.sin(estimates["theta"])
+    x, y = c * x - s * y, s * x + c * y
+    estimates["xx"], estimates["xy"], estimates["yy"] = (
+        START_VARIANCE + t * y * y,
+        -t * x * y,
+        START_VARIANCE + t * x * x,
+    )
+    estimates["xt"], estimates["yt"], estimates["tt"] = t * y, -t * x, t
     rules = ScoreRules(record(RULE), context.parallel)
     step = max(2, int(RANKED_AT_ONCE / (max(1, n) * max(1.0, context.index.crowd))))
     for begin in range(0, k, step):
@@ -61,8 +66,7 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
     """Rank the poses of a search, (k,) of `ESTIMATE`, as scored consensus sets.
 
     1. Refine and score each by its pairs.
-    2. Score by the beams: those of the ranges, of which the best poses are moved to where the beams fit; or the lines
-       of sight of segments.
+    2. Score by the beams: those of the ranges, or the lines of sight of segments.
     3. Keep distinct ones, those within a hard prior's window first, the best first.
     """
     estimates = poses.copy()
@@ -81,9 +85,10 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
     if context.window is not None:
         ranked += np.where((scores["inside"] > 0) & (totals > 0.0), INSIDE, 0.0)
     most = max(FEW_KEPT, context.options.max_alternatives + 1, context.index.least_kept)
-    order = pick_distinct(estimates, ranked, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION)
+    order = pick_distinct(
+        context.at_sensor(estimates), ranked, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
+    )
     parts = np.where(matches["wall"] >= 0, np.minimum(1.0, matches["score"] / WHOLE_SCORE), 0.0)
-    sums = np.ascontiguousarray(scores["sums"])
     return [
         ConsensusSet(
             estimate=estimates[k : k + 1],
@@ -91,8 +96,6 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
             posterior=float(posteriors[k]),
             inside=bool(scores["inside"][k]),
             by_pairs=float(scores["score"][k]),
-            chi_square=float(scores["chi_square"][k]),
-            sums=sums[k : k + 1],
             matches=matches[k],
             parts=parts[k],
             evidence=at_pose(evidence, k),
@@ -104,7 +107,7 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
 def _with_ranges(
     context: SearchContext, estimates: Records, scores: Records, matches: Records
 ) -> tuple[Records, Records, Records, BeamEvidence, Floats]:
-    """Return the finalists by a few beams, moved to where all beams fit if they then read more, with their terms."""
+    """Return the finalists by a few beams, with the terms of all beams."""
     finalists = LATE_FINALISTS if context.deadline.passed else BEAM_FINALISTS
     beams, prior = context.beams, scores["value"] - scores["score"]
     first = np.argsort(-scores["value"], kind="stable")[:FIRST_RANKED]
@@ -114,16 +117,8 @@ def _with_ranges(
     if context.window is not None:
         by_few += np.where(scores["inside"] > 0, INSIDE, 0.0)
     best = first[np.argsort(-by_few[first], kind="stable")[:finalists]]
-    there = estimates[best]
-    moved = moved_to_beams(context, beams, there)
-    here, new = (evidence_of(context, beams, cast(context, beams, at)) for at in (there, moved))
-    better = new.read.sum(axis=1) > here.read.sum(axis=1)
-    better &= new.passed.mean(axis=1) <= here.passed.mean(axis=1) + PASSED_SLACK
-    there[better] = moved[better]
-    for name in ("shown", "across", "read", "passed"):
-        getattr(here, name)[better] = getattr(new, name)[better]
-    again, matched = score(context, there)
-    return there, again, matched, here, np.where(again["score"] > 0.0, score_of_beams(beams, here), 0.0)
+    evidence = evidence_of(context, beams, cast(context, beams, estimates[best]))
+    return estimates[best], scores[best], matches[best], evidence, score_of_beams(beams, evidence)
 
 
 def _with_sight(

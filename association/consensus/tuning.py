@@ -72,10 +72,6 @@ BEAMS_PASSED = 0.5 * BEAMS_READ  # nats, tables; against one at which all beams 
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
 CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
 LEAST_INCIDENCE = 0.15  # cosine, tables; nearer to grazing the pose decides too much
-LEAST_POINTS = 10  # tables; for the beams to move a pose
-BEAM_GATES = (0.35, 0.25, 0.15, 0.15)  # m, tables; of the rounds in which they do
-PASSED_SLACK = 0.01  # tables; fraction of beams that may pass more where a pose was moved
-FARTHER_BY = 0.05  # m, tables; across the wall that the map shows; a beam that reads farther by more, or
 WALL_BEHIND = 30.0  # m, geometry; so far behind a reading a wall is looked for then
 SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have been people or carts
 

@@ -12,8 +12,8 @@ from registration.layout import Floats, Records
 from registration.values import value
 
 from ..layout import BEAM
-from ..tuning import FAR, FARTHER, MAX_RAYS, MOST_BEAMS, RAY_SPACING, RAYS
-from .tuning import BLIND_FRACTION, END_MARGIN
+from ..tuning import FAR, FARTHER, MAX_RAYS, MOST_BEAMS, RAY_SPACING
+from .tuning import END_MARGIN
 
 Indices = NDArray[np.intp]
 
@@ -79,43 +79,6 @@ def rays_to_lines(seen: Records, viewpoints: Floats, weights: Floats) -> BeamSet
     rows = _rows(begins, way / np.maximum(ranges, 1e-12)[:, None], ranges)
     farthest = float((ranges + 0.5 * one["length"]).max(initial=0.0))
     return BeamSet(rows, one["row"], one["sensor"], weights[one["sensor"]], max(FAR, FARTHER * farthest))
-
-
-def rays_to_nothing(seen: Records, viewpoints: Floats, weights: Floats, reach: float) -> BeamSet:
-    """Return rays in the directions in which a view shows nothing, but for the widest gap, if that is wide.
-
-    A wide gap may be out of the sensor's view.
-    """
-    angles = 2.0 * math.pi * (np.arange(RAYS) + 0.5) / RAYS
-    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    begins, ways, sensors = [], [], []
-    for v in np.unique(seen["sensor"]).tolist():
-        own = seen[seen["sensor"] == v]
-        if np.isnan(viewpoints[v, 0]):
-            continue
-        mx, my = own["x"] - viewpoints[v, 0], own["y"] - viewpoints[v, 1]
-        dx, dy = directions[:, :1], directions[:, 1:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            across = dx * own["dy"] - dy * own["dx"]
-            away = (mx * own["dy"] - my * own["dx"]) / across
-            along = (mx * dy - my * dx) / across
-            shown = ((away > 0.0) & (np.abs(along) <= 0.5 * own["length"])).any(axis=1)
-        if not shown.any():
-            continue
-        places = np.flatnonzero(shown)
-        gaps = np.diff(places, append=places[0] + RAYS)
-        widest = int(gaps.argmax())
-        if gaps[widest] > BLIND_FRACTION * RAYS:
-            shown[(places[widest] + np.arange(1, gaps[widest])) % RAYS] = True
-        empty = directions[~shown]
-        begins.append(np.broadcast_to(viewpoints[v], empty.shape))
-        ways.append(empty)
-        sensors.append(np.full(len(empty), v))
-    if not begins:
-        begins, ways, sensors = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0, np.intp)]
-    sensor = np.concatenate(sensors)
-    rows = _rows(np.concatenate(begins), np.concatenate(ways), np.full(len(sensor), np.inf))
-    return BeamSet(rows, np.full(len(sensor), -1), sensor, weights[sensor], reach)
 
 
 def together(one: BeamSet, other: BeamSet) -> BeamSet:

@@ -80,20 +80,30 @@ class ScanLines:
         if scan.views is None:
             given = _given(measured) if given is None else given
             row_of, lines = join_lines(given, JOINTS, measured.counted, options.oriented)
+            model = _with_sensor(model, scan, lines)
             rows, seen = describe_lines(lines, variances, model)
             return cls(row_of, rows, model, seen, given)
         part_of, parts, views = parts_of(measured, scan.views, directed=options.oriented)
         line_row, lines = _joined_views(parts, scan.views, directed=options.oriented)
+        model = _with_sensor(model, scan, lines)
         rows, _ = describe_lines(lines, variances, model)
         return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))
 
     def mirrored(self) -> ScanLines:
         """Return those of the scan with left and right exchanged, which has to be of one view."""
-        rows, seen = self.rows.copy(), self.sightings.copy()
-        for values in (rows["dx"], rows["y"], rows["centroid_y"], seen["dx"], seen["y"]):
+        rows, seen, model = self.rows.copy(), self.sightings.copy(), self.model.copy()
+        for values in (rows["dx"], rows["y"], rows["centroid_y"], seen["dx"], seen["y"], model["sensor_y"]):
             np.negative(values, out=values)
         np.arctan2(rows["dy"], rows["dx"], out=rows["angle"])
-        return ScanLines(self.row_of, rows, self.model, seen)
+        return ScanLines(self.row_of, rows, model, seen)
+
+
+def _with_sensor(model: Records, scan: Scan, lines: Records) -> Records:
+    """Return a model with the sensor's place, or the middle of the lines where that is not known."""
+    model = model.copy()
+    middle = (float(lines["x"].mean()), float(lines["y"].mean())) if len(lines) else (0.0, 0.0)
+    model["sensor_x"], model["sensor_y"] = scan.viewpoint or middle
+    return model
 
 
 def _given(measured: MeasuredSegments) -> Records:

@@ -57,4 +57,3 @@ OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie
 # --- Beams of segments ------------------------------------------------------------------------------------------------
 
 END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
-BLIND_FRACTION = 0.25  # of the circle, tables; a wider gap without any segment is out of the sensor's view

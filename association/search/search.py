@@ -136,13 +136,12 @@ def search(context: SearchContext, effort: Effort | None = None) -> Candidates:
 class _BestPoses:
     """The best poses so far, at most one within a distance and an angle."""
 
-    def __init__(self, effort: Effort, distance: float, best_value: float, *, within: bool) -> None:
-        self._kept, self._distance = effort.kept, distance
+    def __init__(self, context: SearchContext, effort: Effort, distance: float, best_value: float) -> None:
+        self._context, self._kept, self._distance = context, effort.kept, distance
         self._poses, self._values = np.empty(PRUNED * effort.kept, ESTIMATE), np.empty(PRUNED * effort.kept)
         self._held = 0
-        self.rule = record(
-            RULE, kept_fraction=effort.kept_fraction, best_value=best_value, least_value=0.0, within=within
-        )
+        within = context.window is not None
+        self.rule = record(RULE, kept_fraction=effort.kept_fraction, best_value=best_value, within=within)
 
     @property
     def best_value(self) -> float:
@@ -163,7 +162,8 @@ class _BestPoses:
     def _prune(self) -> None:
         held = np.flatnonzero(self._values[: self._held] >= self.rule["kept_fraction"][0] * self.best_value)
         poses, values = self._poses[held], self._values[held]
-        chosen = pick_distinct(poses, values, self._kept, self._distance, DISTINCT_ANGLE, 0.0, 0.0)
+        places = self._context.at_sensor(poses)
+        chosen = pick_distinct(places, values, self._kept, self._distance, DISTINCT_ANGLE, 0.0, 0.0)
         self._held = len(chosen)
         self._poses[: self._held], self._values[: self._held] = poses[chosen], values[chosen]
         if self._held == self._kept:
@@ -192,14 +192,13 @@ class _Search:
     def run(self) -> Candidates:
         """Search bases, then parallel lines."""
         context, effort = self.context, self.effort
-        within = context.window is not None
-        best = _BestPoses(effort, DISTINCT_DISTANCE, effort.known, within=within)
+        best = _BestPoses(context, effort, DISTINCT_DISTANCE, effort.known)
         rule = StoppingRule(self.scan, self.lines, drawn=context.options.sampling == "random")
         exhausted = self._search_bases(best, rule)
         spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
         if context.window is not None:
             spacing = min(spacing, context.window.radius)
-        slides = _BestPoses(effort, SLIDE_DISTINCT * spacing, best.best_value, within=within)
+        slides = _BestPoses(context, effort, SLIDE_DISTINCT * spacing, best.best_value)
         if self.complete:
             self._search_parallel(slides, spacing)
         if context.deadline.cancelled:

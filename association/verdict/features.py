@@ -15,7 +15,6 @@ from ..consensus.estimator import Estimate
 from ..consensus.tuning import (
     AGREEING,
     AGREEING_FRACTION,
-    FARTHER_BY,
     MISSING_LENGTH,
     MISSING_RANGE,
     MISSING_SINE,
@@ -25,7 +24,6 @@ from ..consensus.tuning import (
 from ..context import SearchContext
 from ..result import ReasonCode
 from .alternatives import Comparison
-from .null import NO_NULL, Null
 from .tuning import (
     CROWD_TEMPERATURE,
     LEAST_MISFIT,
@@ -35,6 +33,8 @@ from .tuning import (
     MOST_MISFIT,
     MOST_NULL,
     MOST_UNMATCHED,
+    NULL_ENOUGH,
+    NULL_FRACTION,
 )
 
 FOR, AGAINST, EITHER = 1, -1, 0
@@ -51,11 +51,9 @@ class Role(NamedTuple):
 ROLES: Mapping[str, Role] = {
     "solitude": Role("similar_place", FOR),
     "deviation": Role("single_wall", AGAINST),
-    "inlier_fraction": Role("map_mismatch", FOR),
     "unmatched": Role("map_mismatch", AGAINST),
-    "agreement": Role("map_mismatch", FOR),
+    "agreement": Role("map_mismatch", FOR, needs_beams=True),
     "blocked": Role("map_mismatch", AGAINST),
-    "farther": Role("map_mismatch", AGAINST, needs_beams=True),
     "nearer": Role("map_mismatch", AGAINST, needs_beams=True),
     "misfit": Role("map_mismatch", EITHER),
     "walls": Role("insufficient_evidence", FOR),
@@ -73,16 +71,14 @@ class Features(NamedTuple):
         of the places that the other walls of the map make: on a small map it says little that there is no other one.
     deviation : float
         Standard deviation of the sensor's place along its weakest direction without the wall that fixes it most, m.
-    inlier_fraction : float
-        Fraction of the scan's length that is matched.
     unmatched : float
         Root of the length of unmatched lines that are as long as walls, m^0.5.
     agreement : float
         Fraction of the beams with evidence that show what the map does.
     blocked : float
         Root of the penalty of walls that were passed, nats^0.5; of ranges the root of the fraction of beams.
-    farther, nearer : float
-        Roots of the fractions of beams that read farther, and nearer, than the map shows.
+    nearer : float
+        Root of the fraction of beams that read nearer than the map shows.
     misfit : float
         Logarithm of the mean squared offset over what the scan's sigmas alone expect.
     walls : float
@@ -93,11 +89,9 @@ class Features(NamedTuple):
 
     solitude: float
     deviation: float
-    inlier_fraction: float
     unmatched: float
     agreement: float
     blocked: float
-    farther: float
     nearer: float
     misfit: float
     walls: float
@@ -106,11 +100,11 @@ class Features(NamedTuple):
 
 @value(frozen=True, slots=True)
 class Described:
-    """An answer as the verdict describes it: its features, its comparison with others, and the null score."""
+    """An answer as the verdict describes it: its features, its comparison with others, and the null score, nats."""
 
     features: Features
     comparison: Comparison
-    null: Null
+    null: float
 
 
 def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, comparison: Comparison) -> Described:
@@ -123,27 +117,25 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     misfit = float(best.parts @ offsets) / max(1e-9, float(best.parts.sum()))
     crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.gaps) / CROWD_TEMPERATURE)
     walls = float(estimate.leverages.own.sum())
-    places = max(1.0, len(context.index.walls.rows) - walls) / max(1.0, walls)
-    agreement, blocked, farther, nearer = _of_beams(context, best)
+    places = max(1.0, (len(context.index.walls.rows) - walls) / max(1.0, walls))
+    agreement, blocked, nearer = _of_beams(context, best)
     features = Features(
         solitude=-math.log(max(float(crowd.sum()), 1.0 / places)),
         deviation=min(MOST_DEVIATION, max(estimate.weakest, float(estimate.leverages.deviations.max(initial=0.0)))),
-        inlier_fraction=best.fraction(lines),
         unmatched=math.sqrt(min(MOST_UNMATCHED, unmatched / per_view)),
         agreement=agreement,
         blocked=math.sqrt(blocked / (1.0 if context.with_beams else per_view)),
-        farther=math.sqrt(farther),
         nearer=math.sqrt(nearer),
         misfit=math.log(min(MOST_MISFIT, max(LEAST_MISFIT, misfit))),
         walls=math.sqrt(walls),
         null_gap=0.0,
     )
-    return with_null(Described(features, comparison, NO_NULL), best, NO_NULL)
+    return with_null(Described(features, comparison, 0.0), best, 0.0)
 
 
-def with_null(described: Described, best: ConsensusSet, null: Null) -> Described:
+def with_null(described: Described, best: ConsensusSet, null: float) -> Described:
     """Return the same with a null score."""
-    ratio = min(MOST_NULL, null.ratio(best.score))
+    ratio = min(MOST_NULL, max(NULL_FRACTION, null / best.score)) if best.score > 0.0 else NULL_ENOUGH
     gap = (1.0 - ratio) * best.score
     root = math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
     return Described(described.features._replace(null_gap=root), described.comparison, null)
@@ -155,11 +147,13 @@ def _views(context: SearchContext) -> float:
     return float(views.weights.sum()) if views is not None and views.uncertain else 1.0
 
 
-def _of_beams(context: SearchContext, best: ConsensusSet) -> tuple[float, float, float, float]:
-    """Return the agreement of the view with the map's, and how far beams pass, read farther, and nearer."""
+def _of_beams(context: SearchContext, best: ConsensusSet) -> tuple[float, float, float]:
+    """Return the agreement of the view with the map's, and how far beams pass, and read nearer."""
     beams, seen = context.beams, best.evidence
     if not len(beams) or not context.can_look:
-        return NEUTRAL, 0.0, 0.0, 0.0
+        return NEUTRAL, 0.0, 0.0
+    if not context.with_beams:
+        return NEUTRAL, best.by_pairs - best.score, 0.0
     weights, ranges, shown = beams.weights, beams.rows["range"], seen.shown
     hits = shown["wall"] >= 0
     tolerance = AGREEING + AGREEING_FRACTION * np.where(np.isfinite(ranges), ranges, 0.0)
@@ -171,10 +165,6 @@ def _of_beams(context: SearchContext, best: ConsensusSet) -> tuple[float, float,
     evident = float(weights @ (agree | against))
     agreement = float(weights @ agree) / evident if evident > 0.0 else NEUTRAL
     total = max(1e-9, float(weights.sum()))
-    if not context.with_beams:
-        return agreement, best.by_pairs - best.score, 0.0, 0.0
-    on_walls = hits & (shown["wall"] < len(context.index.walls.rows))
     with np.errstate(invalid="ignore"):
-        farther = float(weights @ (on_walls & (seen.across > FARTHER_BY))) / total
         nearer = float(weights @ (seen.across < -NEAR)) / total
-    return agreement, float(weights @ seen.passed) / total, farther, nearer
+    return agreement, float(weights @ seen.passed) / total, nearer

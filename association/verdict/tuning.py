@@ -23,8 +23,6 @@ NULL_FRACTION = 0.7  # of the answer's score, tables; a null below it says no mo
 NULL_ENOUGH = 1.1  # likewise; a null above it
 MOST_NULL = 1.2  # tables; likewise
 NULL_ALLOWED = 0.01  # tables; probability of having missed a better one: it is one feature among others
-UNLIKE_SYMMETRY, SYMMETRIC = 0.7, 0.95  # tables; fractions between which a place comes to count as symmetric
-BEYOND_SYMMETRY = 1.1  # of the answer's score, tables; symmetry explains a null up to the answer, and none above that
 
 # --- Features ---------------------------------------------------------------------------------------------------------
 

@@ -58,7 +58,7 @@ def turn_of(by: RigidTransform) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def assert_same_verdict(one: AssociationResult, other: AssociationResult, probability: float = 1e-5) -> None:
+def assert_same_verdict(one: AssociationResult, other: AssociationResult, probability: float = 1e-6) -> None:
     assert (other.status, other.usable) == (one.status, one.usable)
     assert (other.probability is None) == (one.probability is None)
     if one.probability is not None and other.probability is not None:
@@ -99,8 +99,7 @@ def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransfor
     """Compare a scan in the sensor's frame with the same data in a frame in which the sensor is at `mount`."""
     index = index_of(walls)
     here, there = answer_of(index, scan), answer_of(index, (mounted if as_view else in_frame)(scan, mount))
-    # The spring that holds open directions while poses are refined refers to the origin.
-    assert_same_verdict(here, there, 3e-3)
+    assert_same_verdict(here, there)
     if not leads(here):
         return
     assert same_pose(pose_in(there).compose(mount), pose_in(here), 1e-6, 1e-6)

@@ -249,33 +249,48 @@ def copy_sums(one: Record, other: Record) -> None:
 
 
 @kernel
-def solve_pose(sums: Record, angles: Record, parallel: float, pose: Record, solution: Record) -> bool:
+def hold_sensor(sums: Record, x: float, y: float, at_x: float, at_y: float, weight: float) -> None:
+    """Add a spring that holds the sensor, (x, y) in the scan frame, at a place of the map; or take it away."""
+    square = weight * (x * x + y * y)
+    sums.cc += square
+    sums.ss += square
+    sums.cx += weight * x
+    sums.cy += weight * y
+    sums.sx -= weight * y
+    sums.sy += weight * x
+    sums.c1 -= weight * (x * at_x + y * at_y)
+    sums.s1 += weight * (y * at_x - x * at_y)
+    sums.xx += weight
+    sums.yy += weight
+    sums.x1 -= weight * at_x
+    sums.y1 -= weight * at_y
+    sums.one += weight * (at_x * at_x + at_y * at_y)
+
+
+@kernel
+def solve_pose(sums: Record, angles: Record, parallel: float, model: Record, pose: Record, solution: Record) -> bool:
     """Move a pose to the least chi-square of the sums, and write its covariance; return False where that is far.
 
-    `solution` gets the information and the chi-square. A weak spring holds the pose along directions that no pair
+    `solution` gets the information and the chi-square. A weak spring holds the sensor along directions that no pair
     fixes. Where the reliability of the set, Eq. (28) by the information of its angles, is what noise makes of parallel
     walls (`parallel`: their chi-square), the pose stays where it was along these walls.
     """
-    x = pose.x
-    y = pose.y
-    sums.xx += SPRING
-    sums.yy += SPRING
-    sums.x1 -= SPRING * x
-    sums.y1 -= SPRING * y
-    sums.one += SPRING * (x * x + y * y)
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    at_x = c * model.sensor_x - s * model.sensor_y + pose.x
+    at_y = s * model.sensor_x + c * model.sensor_y + pose.y
+    hold_sensor(sums, model.sensor_x, model.sensor_y, at_x, at_y, SPRING)
     theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
     joint_information(sums, theta, solution)
-    near = abs(wrap(theta - pose.theta)) <= MAX_TURN and (tx - x) ** 2 + (ty - y) ** 2 <= MAX_STEP**2
+    moved_x = math.cos(theta) * model.sensor_x - math.sin(theta) * model.sensor_y + tx - at_x
+    moved_y = math.sin(theta) * model.sensor_x + math.cos(theta) * model.sensor_y + ty - at_y
+    near = abs(wrap(theta - pose.theta)) <= MAX_TURN and moved_x**2 + moved_y**2 <= MAX_STEP**2
     regular = invert3(solution, pose)
     if near and regular:
         pose.theta = theta
         pose.x = tx
         pose.y = ty
-    sums.xx -= SPRING
-    sums.yy -= SPRING
-    sums.x1 += SPRING * x
-    sums.y1 += SPRING * y
-    sums.one -= SPRING * (x * x + y * y)
+    hold_sensor(sums, model.sensor_x, model.sensor_y, at_x, at_y, -SPRING)
     solution.chi_square = joint_cost(sums, pose.theta, pose.x, pose.y)
     if not regular:
         solution.chi_square = math.inf
@@ -288,7 +303,7 @@ def solve_pose(sums: Record, angles: Record, parallel: float, pose: Record, solu
         across = 0.5 * math.atan2(2.0 * sums.xy, sums.xx - sums.yy)
         ux = -math.sin(across)
         uy = math.cos(across)
-        shift = (pose.x - x) * ux + (pose.y - y) * uy
+        shift = moved_x * ux + moved_y * uy if near else 0.0
         pose.x -= shift * ux
         pose.y -= shift * uy
         pose.xx += FREE_DEVIATION * FREE_DEVIATION * ux * ux

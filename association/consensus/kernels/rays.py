@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 from compiled import kernel
-from registration.kernels import joint_add, joint_solve
-from registration.layout import Floats, Records
+from registration.layout import Records
 
 from ...tables import Place
-from ..tuning import LEAST_POINTS, NEAR, SPRING
-from .pairs import copy_sums
 
 
 @kernel
@@ -100,71 +97,3 @@ def cast_beams(beams: Records, reach: float, behind: float, poses: Records, plac
                     row += step_y
                     next_y += pace_y
             out.distance = best
-
-
-@kernel
-def move_to_beams(beams: Records, poses: Records, place: Place, gates: Floats, scratch: Records) -> None:
-    """Move poses to where the ends of the beams lie on the walls nearest to them, within each of the gates, metres.
-
-    Parameters
-    ----------
-    beams : (m,) of `BEAM`
-    poses : (k,) of `ESTIMATE`
-        Changed, their covariances not.
-    place : Place
-    gates : (r,)
-        Of the rounds.
-    scratch : (1,) of `BEAM_SCRATCH`
-    """
-    walls = place.walls
-    starts = place.grid.starts
-    items = place.grid.items
-    shape = place.grid.shape[0]
-    sums = scratch[0].sums
-    point = scratch[0].point
-    line = scratch[0].line
-    nothing = scratch[0].nothing
-    for p in range(len(poses)):
-        pose = poses[p]
-        for r in range(len(gates)):
-            copy_sums(nothing, sums)
-            c = math.cos(pose.theta)
-            s = math.sin(pose.theta)
-            for b in range(len(beams)):
-                if math.isinf(beams[b].range):
-                    continue
-                px = beams[b].x + beams[b].range * beams[b].dx
-                py = beams[b].y + beams[b].range * beams[b].dy
-                x = c * px - s * py + pose.x
-                y = s * px + c * py + pose.y
-                fx = (x - shape.x0) / shape.cell
-                fy = (y - shape.y0) / shape.cell
-                if not (fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows):
-                    continue
-                here = int(fy) * shape.columns + int(fx)
-                nearest = -1
-                least = gates[r]
-                for k in range(starts[here], starts[here + 1]):
-                    wall = walls[items[k]]
-                    along = wall.dx * x + wall.dy * y
-                    off = abs(wall.dx * y - wall.dy * x - wall.offset)
-                    if off < least and wall.begin - NEAR <= along <= wall.end + NEAR:
-                        least = off
-                        nearest = items[k]
-                if nearest >= 0:
-                    point.centroid_x = px
-                    point.centroid_y = py
-                    line.dx = walls[nearest].dx
-                    line.dy = walls[nearest].dy
-                    line.offset = walls[nearest].offset
-                    joint_add(sums, line, point, 1.0, 1.0)
-            if sums.count < LEAST_POINTS:
-                break
-            sums.xx += SPRING
-            sums.yy += SPRING
-            sums.x1 -= SPRING * pose.x
-            sums.y1 -= SPRING * pose.y
-            theta, x, y, _, _ = joint_solve(sums, pose.theta, False)
-            pose.theta = theta
-            pose.x = x
-            pose.y = y

@@ -200,7 +200,7 @@ def describe_lines(lines: Records, variances: Records, model: Records) -> tuple[
         one.plain_variance = max(LEAST_VARIANCE, line.variance + beyond + line.common_offset)
         # The freedom that the line alone takes from a pose, see `log_determinant`: no set with it takes less.
         weight = one.weight / (1.0 + one.weight * walls.wall_variance)
-        lever = line.dx * line.centroid_x + line.dy * line.centroid_y
+        lever = line.dx * (line.centroid_x - walls.sensor_x) + line.dy * (line.centroid_y - walls.sensor_y)
         xx = 1.0 + weight * walls.free_distance * walls.free_distance
         xt = weight * lever * walls.free_distance * walls.free_angle
         tt = weight * lever * lever + one.weight * line.spread

@@ -88,5 +88,5 @@ def log_determinant(information: Floats, model: Record) -> float:
 def model_of(wall_variance: float, free_distance: float, free_angle: float) -> Records:
     """Return these, (1,) of `MODEL`."""
     model = np.zeros(1, MODEL)
-    model[0] = wall_variance, free_distance, free_angle
+    model[0] = wall_variance, free_distance, free_angle, 0.0, 0.0
     return model

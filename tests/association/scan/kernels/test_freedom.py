@@ -25,6 +25,6 @@ def test_log_determinant(seed: int) -> None:
         root = rng.normal(size=(3, rank)) * 10.0 ** rng.uniform(-1.0, 3.0)
         matrix = root @ root.T
         information = record(SYMMETRIC3, **dict(zip(UPPER, matrix[np.triu_indices(3)], strict=True)))
-        got = freedom.log_determinant(information[0], model[0])
+        got = freedom.log_determinant(information[0], model[0], 1.0, 0.0)
         assert got == pytest.approx(twin.log_determinant(matrix, model[0]), abs=1e-7)
         assert rank > 0 or got == 0.0
