@@ -127,7 +127,7 @@ class SearchContext:
 
     @cached_property
     def viewpoints(self) -> Floats:
-        """Where the sensors stood, (v, 2) metres in the scan frame; nan where a view is not from one place."""
+        """The places of the sensors, (v, 2) metres in the scan frame; nan where a view is not from one place."""
         if self.scan.views is not None:
             return self.scan.views.viewpoints
         return np.array([self.scan.viewpoint or (np.nan, np.nan)])

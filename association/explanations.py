@@ -134,7 +134,7 @@ def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
 def answer_of(context: SearchContext, best: ConsensusSet, *, scaled: bool) -> Answer | None:
     """Estimate the pose of the best explanation; None without pairs.
 
-    Where nothing but the pose was solved for, it is where the pairs register.
+    If nothing but the pose was solved for, it is that at which the pairs register.
     """
     found = estimate(context, best, scaled=scaled)
     if found is None:

@@ -89,7 +89,7 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # The terms by which a pose is judged.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any
-# set takes at least which reaches that. Whether poses outside the window of a hard prior are dropped.
+# set takes at least which reaches that. A flag: poses outside the window of a hard prior are dropped.
 RULE = fields((_F, "kept_fraction best_value least_value least_freedom"), (_I, "within"))
 # A base: two scan lines that fix a pose, of which the first slides along chains; its merit, the logarithm of the lesser
 # gain, to a power, over the cost of its search.
@@ -100,7 +100,7 @@ HYPOTHESIS = np.dtype([*POSE.descr, *fields((_F, "cosine sine lever_x lever_y an
 # A scan line at a pose: midpoint, direction, half of its length, m; its gates of offset (m) and angle (rad), and the
 # cosine of the latter.
 POSED_LINE = fields((_F, "x y dx dy half gate angle_gate least_cosine"))
-# What a wall and its neighbours along its chain cover of a posed line: offset of the line from the wall; abscissae from
+# The cover of a posed line by a wall and its neighbours on its chain: offset of the line from the wall; abscissae from
 # its midpoint between which the wall covers it; metres that count as covered, and that are; sums over these of the
 # walls' steps from the wall, and of their squares. Of the neighbours in one direction: how far they reach; how much
 # what comes counts; the same sums, and at their best.
@@ -123,7 +123,7 @@ ANGLE_SUMS = fields((_F, "xx xy yy"))
 VARIANCES = fields((_F, "map common least_offset least_angle"))
 # A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
 BEAM = fields((_F, "x y dx dy range"))
-# What the map shows a beam: the distance to the first wall; that wall, or -1; the cosine of incidence.
+# The view of a beam on the map: the distance to the first wall; that wall, or -1; the cosine of incidence.
 SHOWN = fields((_F, "distance incidence"), (_I, "wall"))
 # Records that kernels write to while they look at one pose. A record that a kernel takes from an array of its own would
 # outlive the array, whose last use ends it: hence these come from outside.

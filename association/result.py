@@ -147,8 +147,8 @@ class AssociationDiagnostics:
     critical_wall : CriticalWall or None
         None where the pose stays within `CRITICAL_DISPLACEMENT` metres without any one wall.
     corrections : Corrections or None
-        What the pose was estimated together with; None where that is the pose alone. `registration.register` with the
-        accepted pairs then gives the pose without them.
+        None where the pose was estimated alone. Else `registration.register` with the accepted pairs gives the pose
+        without them.
     turn_rate : float or None
         Rate at which the sensor turned during the scan, as the walls show it, rad/s; None where it was sent (`twist`),
         or shows no rotation.

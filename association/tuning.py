@@ -81,7 +81,7 @@ FARTHER = 1.5
 
 LEAST_OFF_WALLS = 0.01  # m, tables; walls of maps that are declared with less are not compared with walls farther off
 MOST_SEARCHES = 3  # tables; with factors and rotations
-SUGGESTED = 1.5  # deviations, tables; a scale or a rotation by so much is worth another search
+SUGGESTED = 1.5  # deviations, tables; the scan is searched again with a scale or a rotation that differs by so much
 LEAST_FACTOR, MOST_FACTOR = 0.004, 0.08  # tables; a scan is searched again with a factor that is so far from one
 DOUBTING_DEVIATIONS = 3.0  # geometry; a distortion beyond them is reported
 LEAST_TURN = math.radians(0.6)  # tables; likewise, if its sensor turned by more during the scan

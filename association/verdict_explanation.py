@@ -59,7 +59,7 @@ class WeighedAlternative:
     gap : float
         Nats of evidence by which the answer is better, thing by thing.
     counted : float
-        How far it counts, 0 to 1.
+        Degree to which it counts, 0 to 1.
     weight : float
         Its probability over that of the answer.
     """

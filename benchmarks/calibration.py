@@ -11,7 +11,7 @@ without fault.
 The report of an answer comes from a fit without its building, its log or its world; the coefficients come from all of
 these. The drawn worlds that ``python -m benchmarks worlds`` reports on are never fitted on.
 
-``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]]``
+``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]] [--held-out]``
 """
 
 from __future__ import annotations
@@ -302,7 +302,14 @@ def main() -> None:
         metavar="FILE",
         help="write the models with their manifest; by default to the file that the verdict reads",
     )
+    parser.add_argument("--held-out", action="store_true", help="fit nothing: report on the drawn worlds kept for it")
     args = parser.parse_args()
+    if args.held_out:
+        for form in (args.form,) if args.form else FORMS:
+            examples = collected(args.keep, form, args.stride, kept_for_report=True)
+            answers = Answers.of(examples)
+            report(form, examples, answers, {one: probability(MODELS[form], answers, one) for one in ON_MAPS})
+        return
     models, usual, data, metrics = dict(MODELS), USUAL, {}, {}
     for form in (args.form,) if args.form else FORMS:
         examples = collected(args.keep, form, args.stride)

@@ -240,16 +240,17 @@ def world_cases(form: str, stride: int, part: Part = ALL, *, kept_for_report: bo
             for number, question in zip(numbers, questions([world], [condition], numbers), strict=True):
                 scan = question.scans[form]
                 told: Callable[[RigidTransform], bool] | None = _told_by(question.case)
-                turn, kind = divmod(number // stride, len(VIEWS))
+                # Scans for the report are as a caller would send them.
+                turn, kind = (0, 0) if kept_for_report else divmod(number // stride, len(VIEWS))
                 index = small_map(question.case) if turn % 2 else question.index
                 if VIEWS[kind] < 360.0:
-                    # What few walls show fits elsewhere, too: that is what their probability is about.
+                    # A view of few walls fits elsewhere, too: their probability has to count with it.
                     scan, told = narrow(scan, VIEWS[kind]), told if "sister" in condition else None
                 yield Case(
                     scan, index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
                     DRAWN if own else DRAWN_STRANGERS, condition, world, told,
                 )  # fmt: skip
-                if own and kind == 0:
+                if own and kind == 0 and not kept_for_report:
                     yield Case(
                         turned_round(scan), index, None, DRAWN_DISTANCE, DRAWN_ANGLE, DRAWN_STRANGERS,
                         REVERSED, world,

@@ -37,7 +37,7 @@ class Matched:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """What the correspondences of scans show of the scale and of an error that all walls or ranges share.
+    """Scale, and the error that all walls or ranges share, by the correspondences of scans.
 
     Attributes
     ----------

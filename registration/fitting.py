@@ -70,7 +70,7 @@ class Problem:
     phi, psi : (5, n), (2, n)
         Factors of the joint sums, see `joint_factors`.
     terms : (18, n)
-        What each pair of weight 1 adds to the joint sums.
+        Terms that each pair of weight 1 adds to the joint sums.
     angle : float
         Wahba's, radians.
     unique : bool

@@ -1,4 +1,4 @@
-"""What a set of pairs leaves free, and the limit up to which lines count as parallel, by noise alone."""
+"""Freedom that a set of pairs leaves, and the limit up to which lines count as parallel, by noise alone."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _most_parallel(count: int) -> Floats:
 
 
 class Free(Enum):
-    """What is free: nothing; one direction of the translation; the same as all lines are parallel; the rotation."""
+    """Free are: nothing; one direction of the translation; the same as all lines are parallel; the rotation."""
 
     NOTHING = 0
     DIRECTION = 1
@@ -88,7 +88,7 @@ def freedom(pairs: Correspondences, used: Floats, noise: tuple[Floats, Floats] |
         return Freedom(Free.NOTHING)
     f = information if noise[1] is used else information_of(noise[1], theta)
     (xx, xy, xt), (_, yy, yt), (_, _, tt) = f.tolist()
-    # What is known of the translation when the rotation is not known.
+    # The translation, as far as it is known without the rotation.
     least, _, x, y = eigen2(xx - xt * xt / tt, xy - xt * yt / tt, yy - yt * yt / tt)
     if least >= MAX_DEVIATION**-2:
         return Freedom(Free.NOTHING)

@@ -24,7 +24,7 @@ def rotation(theta: float) -> Floats:
 def pair_rows(
     map_segments: Segments, scan: MeasuredSegments, pairs: Sequence[tuple[int, int]] | NDArray[np.intp]
 ) -> list[tuple[Floats | float, ...]]:
-    """What is known of each pair, in the order of the attributes of `Correspondences`."""
+    """Data of each pair, in the order of the attributes of `Correspondences`."""
     rows: list[tuple[Floats | float, ...]] = []
     for i, j in pairs:
         m, s = map_segments, scan.segments

@@ -100,7 +100,7 @@ class _Chain:
         """
         end = bisect_right(self.lows, high)
         begin = max(bisect_right(self.reach, low), end - MOST_UNDER)
-        if begin >= end:  # it lies beside all of them: on the nearest
+        if begin >= end:  # beside all of them: the nearest one
             begin, end = max(0, min(begin, len(self.lows) - 1) - 1), min(len(self.lows), max(end, 1) + 1)
         overlaps = {k: min(self.highs[k], high) - max(self.lows[k], low) for k in range(begin, end)}
         half = 0.5 * (high - low)
@@ -156,7 +156,7 @@ def register_accepted(
 
     Pairs on the same wall, or on tied walls, see the same error of it. So each has the weight ``w / (1 + s^2 W)``: w is
     its own information, ``1 / sigma^2`` times its points, W that of all pairs on its wall, and s the wall's standard
-    deviation. What another segment of the same line shows already is not counted again.
+    deviation. Evidence that another segment of the same line has already is not counted again.
     """
     index, options, measured = context.index, context.options, context.scan.measured
     sigma = wall_sigma if index.sigma is None else index.sigma

@@ -15,7 +15,7 @@ from registration.values import value
 
 @value(frozen=True, slots=True)
 class BeamEvidence:
-    """What the beams say at a pose, (m,) each.
+    """The evidence of the beams at a pose, (m,) each.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class BeamEvidence:
         By how much a beam reads farther than the map shows, metres across the wall; nan where the map shows no wall, or
         the beam nothing.
     read, passed : float64
-        How far a beam reads the wall that it should, and how far it passed through it, 0 to 1.
+        Degree to which a beam reads the wall that it should, and to which it passed through it, 0 to 1.
     """
 
     shown: Records
@@ -52,7 +52,7 @@ class ConsensusSet:
         The score of the pairs alone: gains less half of the chi-square, less the log-determinant.
     matches : (n,) of `MATCH`
     parts : (n,)
-        How much of each match there is, 0 to 1: one that scores little counts in part.
+        Weight of each match, 0 to 1: one that scores little counts in part.
     evidence : BeamEvidence
     """
 

@@ -69,13 +69,13 @@ def _prior(known: float | None) -> Floats:
 
 @value(frozen=True, slots=True)
 class Leverages:
-    """What the pose would be without each of the walls, (m,) each, the sensor's place.
+    """The pose without each of the walls, (m,) each, at the sensor's place.
 
     Attributes
     ----------
     walls : int
     own : float64
-        How far a wall counts as one of its own, next to those that it is tied to, 0 to 1.
+        Degree to which a wall counts as one of its own, next to those that it is tied to, 0 to 1.
     displacements : float64
         By how much the place would move, metres.
     deviations : float64
@@ -144,8 +144,8 @@ def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool = False
 
     1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is
        known.
-    2. Where the columns together do not differ from 0, and the scan was not put to scale, solve without them: always
-       on, they widen the deviations on exact maps by a third.
+    2. If the columns together do not differ from 0, and the scan was not put to scale, solve without them: always on,
+       they widen the deviations on exact maps by a third.
     3. Leave out each wall in turn.
     """
     seen = observations_of(context, best.matches)

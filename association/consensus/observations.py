@@ -36,7 +36,7 @@ class Observations:
     walls : (m,)
         The walls of the map that are matched, each once, in the order of their ties.
     ties : (m,)
-        Where in its group of linked walls each is, as of `Place.ties`.
+        Place of each in its group of linked walls, as of `Place.ties`.
     sensor : (2,)
         The sensor's place in the scan frame.
     views : Views or None

@@ -166,7 +166,7 @@ class MapIndex:
 
     @cached_property
     def chains_of_pieces(self) -> dict[int, Any]:
-        """What acceptance has put together of the pieces of linked walls, by the first wall."""
+        """The pieces of linked walls that acceptance has put together, by the first wall."""
         return {}
 
     @cached_property

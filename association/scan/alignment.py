@@ -171,7 +171,7 @@ class _Pairs:
 
     @property
     def errors(self) -> Indices:
-        """Where x, y, theta of both views are among those of all, (k, 6)."""
+        """The places of x, y, theta of both views among those of all, (k, 6)."""
         return (3 * self.views[:, :, None] + np.arange(3)).reshape(-1, 6)
 
     def taken(self, chosen: Indices | Flags) -> _Pairs:

@@ -33,7 +33,7 @@ class BeamSet:
     weights : (m,)
         Less than 1 where several views are from one place.
     reach : float
-        How far a beam may see, metres.
+        Range of a beam, metres.
     """
 
     rows: Records

@@ -48,7 +48,7 @@ class Comparison:
     gaps : float64
         By how much the evidence is greater than that of each other, nats.
     counted : float64
-        How far each counts, 0 to 1: fully where the search cannot have missed one as good.
+        Weight of each, 0 to 1: 1 where the search cannot have missed one as good.
     """
 
     others: tuple[ConsensusSet, ...]
@@ -93,7 +93,7 @@ def compare(
 
 @value(frozen=True, slots=True)
 class _Evidence:
-    """What each explanation scores at each place in view.
+    """The score of each explanation at each place in view.
 
     Attributes
     ----------

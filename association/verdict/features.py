@@ -49,7 +49,7 @@ class Role(NamedTuple):
 
 
 ROLES: Mapping[str, Role] = {
-    "solitude": Role("similar_place", FOR),
+    "uniqueness": Role("similar_place", FOR),
     "deviation": Role("single_wall", AGAINST),
     "unmatched": Role("map_mismatch", AGAINST),
     "agreement": Role("map_mismatch", FOR, needs_beams=True),
@@ -66,7 +66,7 @@ class Features(NamedTuple):
 
     Attributes
     ----------
-    solitude : float
+    uniqueness : float
         Minus the logarithm of the evidence of all alternatives over its own, at a high temperature, nats; at most that
         of the places that the other walls of the map make: on a small map it says little that there is no other one.
     deviation : float
@@ -87,7 +87,7 @@ class Features(NamedTuple):
         Root of the answer's score less that of the mirrored scan, nats^0.5.
     """
 
-    solitude: float
+    uniqueness: float
     deviation: float
     unmatched: float
     agreement: float
@@ -120,7 +120,7 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     places = max(1.0, (len(context.index.walls.rows) - walls) / max(1.0, walls))
     agreement, blocked, nearer = _of_beams(context, best)
     features = Features(
-        solitude=-math.log(max(float(crowd.sum()), 1.0 / places)),
+        uniqueness=-math.log(max(float(crowd.sum()), 1.0 / places)),
         deviation=min(MOST_DEVIATION, max(estimate.weakest, float(estimate.leverages.deviations.max(initial=0.0)))),
         unmatched=math.sqrt(min(MOST_UNMATCHED, unmatched / per_view)),
         agreement=agreement,

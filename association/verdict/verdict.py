@@ -45,7 +45,7 @@ class Verdict:
     by_model : float
         The probability by the model alone, before the alternatives are counted.
     explained : float
-        Whether the scan explains this place or a similar one, with even odds of being elsewhere.
+        Probability that the scan is of this place or a similar one, with even odds of being elsewhere.
     score : float
         Of the answer, nats.
     searched_null : bool
@@ -176,7 +176,7 @@ def _as_if_alone_and_fixed(described: Described) -> Features:
 
     These questions are separate: whether the scan is of this map, where on it, and whether it fixes the position there.
     """
-    return described.features._replace(solitude=USUAL.solitude, deviation=USUAL.deviation)
+    return described.features._replace(uniqueness=USUAL.uniqueness, deviation=USUAL.deviation)
 
 
 def _status(

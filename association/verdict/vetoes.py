@@ -23,7 +23,7 @@ class Findings:
     score, score_elsewhere : float
         Of the answer, and the best of the other explanations, also outside the prior's window, nats.
     prior : float
-        What a soft prior says of the pose, nats.
+        Log-density of a soft prior at the pose over its maximum, nats.
     outside_window : bool
         True if the pose lies outside the window of a hard prior.
     unobservable : bool

@@ -81,7 +81,7 @@ def conclude(
 
 @dataclass(frozen=True, slots=True)
 class _Fits:
-    """How well all samples fit under each hypothesis; `present` is that of the map as it is."""
+    """Fit of all samples under each hypothesis; `present` is that of the map as it is."""
 
     samples: Sequence[Sample]
     present: Hypothesis

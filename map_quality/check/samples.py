@@ -29,7 +29,7 @@ UNDONE: Mapping[Mistake | None, Callable[[Scan], Scan]] = {
     "mirrored": mirrored,
     "reversed": turned_round,
 }
-"""How a scan is changed to undo each mistake."""
+"""The change of a scan that undoes each mistake."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The factor between the lengths of a map and of its sample scans: a unit that was taken for another, or a wrong scale.
 
-Where most scans are usable, their correspondences show the factor. Otherwise the map is divided by each factor of a
+If most scans are usable, their correspondences show the factor. Otherwise the map is divided by each factor of a
 ladder, and some scans are searched in it. The factor with the highest sum of scores is refined in the same way.
 """
 
@@ -70,7 +70,7 @@ class Scale:
     factor, deviation : float
         The factor and its standard deviation.
     agreeing : int
-        Number of scans that have this factor, each by itself.
+        Number of scans of which each alone has this factor.
     usable : int
         Number of scans that are usable when map and scans are to scale.
     """

@@ -105,7 +105,7 @@ class _Hits:
     def of(cls, ends: Floats, low: Floats, high: Floats, origins: Floats, rays: Floats) -> _Hits:
         """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`.
 
-        Where too many segments are near, rays meet none.
+        If too many segments are near, rays meet none.
         """
         found = cls(np.full(len(rays), np.inf), np.zeros(len(rays), dtype=np.intp), np.zeros(len(rays), dtype=bool))
         for limit in (*NEAR_FOLLOWED, FOLLOWED):

@@ -173,7 +173,7 @@ def test_a_cupboard_that_is_new_does_not_make_the_equal_room_usable() -> None:
 
 
 def test_one_thing_more_or_less_leaves_other_rooms_usable() -> None:
-    """Where no other place is similar: a box that the map lacks, and one that is gone."""
+    """If no other place is similar: a box that the map lacks, and one that is gone."""
     usable = 0
     for k in range(20):
         room, at = drawn_room(np.random.default_rng([4, k]))

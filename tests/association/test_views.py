@@ -295,7 +295,7 @@ def test_where_the_frame_of_a_drive_begins_does_not_matter() -> None:
     there = [view_at(pose()), view_at(way, covariance=STEP)]
     one, other = (answer_of(INDEX, assemble(views)) for views in (there, there[::-1]))
     assert (one.status, one.usable) == (other.status, other.usable)
-    # How well the place is fixed is judged where the sensor was last, or first.
+    # The deviation of the place is that where the sensor was last, or first.
     assert one.probability == pytest.approx(other.probability, abs=1e-3)
     assert same_pose(pose_in(one), pose_in(other), 1e-6, 1e-6)
 

@@ -272,7 +272,7 @@ def solve_pose(sums: Record, angles: Record, parallel: float, model: Record, pos
     """Move a pose to the least chi-square of the sums, and write its covariance; return False where that is far.
 
     `solution` gets the information and the chi-square. A weak spring holds the sensor along directions that no pair
-    fixes. Where the reliability of the set, Eq. (28) by the information of its angles, is what noise makes of parallel
+    fixes. If the reliability of the set, Eq. (28) by the information of its angles, is what noise makes of parallel
     walls (`parallel`: their chi-square), the pose stays where it was along these walls.
     """
     c = math.cos(pose.theta)

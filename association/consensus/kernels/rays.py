@@ -19,7 +19,7 @@ def cast_beams(beams: Records, reach: float, behind: float, poses: Records, plac
     beams : (m,) of `BEAM`
         In the scan frame.
     reach : float
-        How far a beam is followed, metres; and up to
+        Distance up to which a beam is followed, metres; and up to
     behind : float
         metres behind its reading.
     poses : (k,) with the fields of `POSE`

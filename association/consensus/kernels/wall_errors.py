@@ -82,7 +82,7 @@ def eliminate(
 
 @kernel
 def infer(wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, pose: Record) -> None:
-    """Write for each listed wall the evidence of its error by other walls, at a pose; by itself, the prior's."""
+    """Write for each listed wall the evidence of its error by other walls, at a pose."""
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     weight = 1.0 / variance

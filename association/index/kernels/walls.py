@@ -24,7 +24,7 @@ def fade(value: float, whole: float, apart: float) -> float:
 def tie_walls(walls: Records, order: Integers, group: Integers, apart: float) -> Floats:
     """Return where in its group each wall is, (m,), as of `Place.ties`; in `order` they are group by group, by begin.
 
-    Each is tied to that of the walls before it to which it is tied best. How much two walls are one falls with the gap
+    Each is tied to that of the walls before it to which it is tied best. Their correlation falls with the gap
     between them and with the step, up to `apart`, metres. The step is the farthest that the shorter one is off the line
     of the other, so that walls that bend are not one either.
     """

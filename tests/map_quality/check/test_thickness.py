@@ -41,7 +41,7 @@ def test_nothing_where_walls_are_right() -> None:
     ("walls", "code"), [(reversed_ends(faces() * MIRROR), "mirrored"), (two_faces(0.4), "thickness")]
 )
 def test_which_of_the_two_it_is(walls: Floats, code: str) -> None:
-    """What is mirrored fits badly whatever its walls are; what is too thick fits badly mirrored, too."""
+    """A mirrored map fits badly whatever its walls are; one that is too thick fits badly mirrored, too."""
     index, scans = index_of(walls), [scan for _, scan in sampled()]
     samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
     report = conclude(index, scans, samples, Deadline(), oriented=True)
