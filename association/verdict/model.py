@@ -65,14 +65,24 @@ class Model:
         ``1 / odds = exp(-a) + exp(-b) k`` with the log odds a against another pose and b against another place; k is
         the ratio of the prior odds of another place to those in the data of the fit.
         """
+        return -math.log(max(sum(self._against(features, on_map)), 1e-300))
+
+    def _against(self, features: Features, on_map: float) -> tuple[float, float]:
+        """Return the odds of another pose, and of another place, against an answer."""
         prior = (1.0 - on_map) / on_map * self.on_map / (1.0 - self.on_map)
-        against = math.exp(-min(500.0, max(-500.0, self.wrong.at(features))))
-        against += prior * math.exp(-min(500.0, max(-500.0, self.elsewhere.at(features))))
-        return -math.log(max(against, 1e-300))
+        wrong, elsewhere = (
+            math.exp(-min(500.0, max(-500.0, odds.at(features)))) for odds in (self.wrong, self.elsewhere)
+        )
+        return wrong, prior * elsewhere
 
     def probability(self, features: Features, on_map: float) -> float:
         """Return the probability that an answer is right, before its alternatives are counted."""
-        return 1.0 / (1.0 + math.exp(-min(500.0, max(-500.0, self.log_odds(features, on_map)))))
+        return 1.0 / (1.0 + sum(self._against(features, on_map)))
+
+    def elsewhere_probability(self, features: Features, on_map: float) -> float:
+        """Return the probability that a scan was taken elsewhere."""
+        wrong, elsewhere = self._against(features, on_map)
+        return elsewhere / (1.0 + wrong + elsewhere)
 
 
 def as_odds(document: Mapping[str, list[float]]) -> Odds:

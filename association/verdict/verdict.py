@@ -12,8 +12,8 @@ from ..context import SearchContext
 from ..explanations import Answer, Explanations
 from ..result import Reason, ReasonCode, Status
 from .alternatives import Comparison, compare
-from .features import Described, Features, describe, with_null
-from .model import MODELS, USUAL, Model
+from .features import Described, describe, with_null
+from .model import MODELS, Model
 from .null import find_null
 from .reasons import reasons_of, weighed_reasons
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY
@@ -132,7 +132,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
             outside_window=window is not None and not window.contains(pose),
         )
     )
-    explained = model.probability(_as_if_alone_and_fixed(described), NEUTRAL)
+    explained = 1.0 - model.elsewhere_probability(described.features, NEUTRAL)
     status = _status(explained, probability, findings, vetoes, usable_from)
     contradicted = any(veto.reason == "prior_contradicted" for veto in vetoes)
     usable = status is Status.OK and not vetoes
@@ -169,14 +169,6 @@ def findings_of(explanations: Explanations, answer: Answer) -> Findings:
 def _best(explanations: Explanations) -> float:
     """Return the best score of the other explanations, also outside the prior's window, nats."""
     return max((other.score for other in explanations.others), default=-math.inf)
-
-
-def _as_if_alone_and_fixed(described: Described) -> Features:
-    """Return features as if the position was as well fixed as usual, and no other place was similar.
-
-    These questions are separate: whether the scan is of this map, where on it, and whether it fixes the position there.
-    """
-    return described.features._replace(uniqueness=USUAL.uniqueness, deviation=USUAL.deviation)
 
 
 def _status(

@@ -190,7 +190,7 @@ class Analysis:
         return found
 
     def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
-        return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented), deadline)
+        return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented, on_map=1.0), deadline)
 
     def _knows_after(
         self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None

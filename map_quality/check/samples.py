@@ -124,7 +124,7 @@ def try_sample(
     """
     if not oriented:
         index.undirected_by(deadline)  # the search takes it from there
-    result = associate(index, scan, None, AssociationOptions(oriented=oriented), deadline)
+    result = associate(index, scan, None, AssociationOptions(oriented=oriented, on_map=1.0), deadline)
     trials = {Hypothesis(oriented, index.sigma): Trial.of(result)}
     for one in hypotheses(oriented, index.sigma):
         if not deadline.passed:
@@ -148,5 +148,5 @@ def hypotheses(oriented: bool, sigma: float | None) -> Iterator[Hypothesis]:
 
 def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> Trial:
     place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)
-    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=one.oriented)
+    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=one.oriented, on_map=1.0)
     return Trial.of(associate(place, UNDONE[one.mistake](scan), None, options, deadline))

@@ -125,6 +125,7 @@ class _Scaled:
             confidence=CONFIDENCE,
             oriented=self.oriented,
             offset_tolerance=LAX_TOLERANCE if lax else None,
+            on_map=1.0,
         )
         scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
         return [associate(self.index, scan, None, options, self.deadline) for scan in scans]

@@ -43,7 +43,7 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
         None where most scans agree on none, or no time was left to see.
     """
     some = scans[:: -(-len(scans) // MOST_SCANS)] if scans else []
-    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=oriented)
+    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=oriented, on_map=1.0)
     try:
         place = replace(index if oriented else index.undirected_by(deadline), sigma=THICKNESS_SIGMA)
     except IndexingEndedError:

@@ -153,7 +153,7 @@ def test_points_in_order_are_not_doubted(viewpoint: Viewpoint) -> None:
 
 
 def test_the_answer_warns_of_points_in_no_order() -> None:
-    points, _ = seen()
+    points, _ = seen(x=5.5, y=2.0, theta=3.1)
     for scan_points, codes in ((points, []), (np.random.default_rng(7).permutation(points), ["points_not_in_order"])):
         answer = linefix.locate(HALL, scan_points)
         assert [warning.code for warning in answer.warnings if warning.code == "points_not_in_order"] == codes

@@ -193,8 +193,8 @@ def test_the_last_view_answers_for_a_drive_that_saw_much_that_is_on_no_map(clien
     views.append({"segments": seen_from(HERE), "pose": EXACT})
     last, drive = {"segments": seen_from(HERE)}, {"views": views}
     # The drive is less likely than its last view; only the latter is usable from between both.
-    likely = [asked(client, scan, options={"on_map": 0.5})["probability"] for scan in (last, drive)]
-    options = {"on_map": 0.5, "usable_from": min(0.5 * sum(likely), 0.9999)}
+    likely = [asked(client, scan)["probability"] for scan in (last, drive)]
+    options = {"usable_from": min(0.5 * sum(likely), 0.9999)}
     alone, answer = (asked(client, scan, options=options) for scan in (last, drive))
     assert alone["usable"]
     assert (answer["status"], answer["usable"], answer["reasons"]) == ("ok", True, [])
