@@ -35,7 +35,7 @@ def message_of(result: AssociationResult) -> str:
     if any(reason.code == "similar_place" for reason in result.reasons) and others:
         many = "1 other pose fits" if len(others) == 1 else f"{len(others)} other poses fit"
         return f"{many} the scan about as well{_where(result, others)}. The scan alone does not decide between them."
-    return f"The most likely pose has a probability of {chance}, which is not reliable: see `reasons`."
+    return f"The most likely pose has a probability of {chance}, which is not enough: see `reasons`."
 
 
 def _where(result: AssociationResult, others: Sequence[Alternative]) -> str:

@@ -57,11 +57,11 @@ def draw_cases() -> tuple[Segments, list[Case]]:
     rooms = np.vstack([_room(left) for left in lefts])
     building = Segments.from_array(np.vstack([walls[~is_end], _bridge(start, end, lefts), rooms]))
 
-    office = RigidTransform(floor.poses[4].x - 0.6, floor.poses[4].y + 0.5, 0.6)
+    place = RigidTransform(floor.poses[3].x - 0.6, floor.poses[3].y + 0.5, 0.6)
     room = RigidTransform(lefts[1] + 2.4, HIGH + OFFICES.wall + 0.55 * ROOM_DEPTH, 1.9)
     bridge = RigidTransform(start + 0.36 * BRIDGE, 0.5 * (LOW + HIGH) + 0.2, -0.15)
     furniture = [
-        _furniture(floor.segments.endpoints, office, BOXES_IN_OFFICES, rng),
+        _furniture(floor.segments.endpoints, place, BOXES_IN_OFFICES, rng),
         _furniture(rooms, room, BOXES_IN_ROOMS, rng),
     ]
     furnished = Segments.from_array(np.vstack([building.endpoints, *furniture]))
@@ -71,7 +71,7 @@ def draw_cases() -> tuple[Segments, list[Case]]:
         return scan(walls, pose, SCANNER, rng)
 
     return building, [
-        Case("an office like no other", "ok", office, seen(furnished, office)),
+        Case("a place like no other", "ok", place, seen(furnished, place)),
         Case("one of three equal rooms", "ambiguous", room, seen(furnished, room)),
         Case("a plain corridor", "degenerate", bridge, seen(furnished, bridge)),
         Case("another building", "no_match", None, seen(elsewhere.segments, elsewhere.poses[3])),

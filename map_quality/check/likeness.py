@@ -50,7 +50,10 @@ def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> 
         searched = index if oriented else index.undirected_by(deadline)
     except IndexingEndedError:
         return Likeness(0, (), ())
-    segments, options = index.segments.take(np.arange(index.directed)), AssociationOptions(oriented=oriented, on_map=1.0)
+    segments, options = (
+        index.segments.take(np.arange(index.directed)),
+        AssociationOptions(oriented=oriented, on_map=1.0),
+    )
     looked, found, hits = 0, [], set[int]()
     for number, pose in enumerate(_places(index, segments)):
         if deadline.passed:
