@@ -67,6 +67,7 @@ def test_the_legend_has_what_is_drawn_and_nothing_else(page: Page) -> None:
     *first, estimate = legend(page)
     assert first == drawn
     assert re.fullmatch(r"estimated pose with 3 sigma(, drawn \d+ times larger)?", estimate)
+    shown(page, "rooms", "ambiguous")
     page.get_by_role("button", name="Next pose").click()
     assert legend(page) == ["wall", "true pose", "alternative"]
     shown(page, "office", "usable")
