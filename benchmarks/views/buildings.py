@@ -12,7 +12,6 @@ from simulation import FAMILIES, draw_case, scan
 from simulation.errors import SimulationError
 
 from ..drawn import SCANNER
-from ..lookalikes import draw_pose, scenes
 from ..outcomes import progress
 from ..table import Row, at_most, mean
 from .drives import could_be_told, drive, look, way_back, world_looks
@@ -88,9 +87,6 @@ def lookalike_drives(quick: int) -> list[Row]:
 def _places(quick: int) -> Iterator[tuple[Segments, RigidTransform]]:
     """Draw places in worlds that repeat themselves, in some of which a drive shows which one it is."""
     count = max(1, 20 // quick)
-    for scene in scenes():
-        for number in range(count):
-            yield scene.segments, draw_pose(scene, np.random.default_rng([number, 17]))
     for world in ALIKE:
         for number in range(5 * count):
             case = draw_case(world, "clean", number)

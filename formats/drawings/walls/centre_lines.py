@@ -19,7 +19,7 @@ FACE_APART = (0.03, 0.6)  # m; how far the other face of a wall lies
 FEW_FACES = 0.15  # of the length; that has a second face next to it if walls are drawn by their centre lines
 MOST_MEET = 0.5  # of the length; of lines that take part in a T or a crossing there
 THINNEST, THICKEST = 0.03, 1.5  # m; a width that a wall may have, and no pen
-# Between partitions and outer walls. `python -m benchmarks imports` measures the result for 0.1 to 0.3 m.
+# Between partitions and outer walls; measured for walls of 0.1 to 0.3 m.
 USUAL = 0.2  # m
 AT_ONCE = 200  # lines that are compared with all others at a time; memory
 PARALLEL = math.sin(math.radians(3.0))
