@@ -77,7 +77,7 @@ ENV PATH=/opt/linefix/bin:$PATH \
     LINEFIX_PORT=8000 \
     LINEFIX_DATA_DIR=/data
 # Once through as at a start: leaves the bytecode of what is used of Python itself, which its slim image comes without.
-RUN python -c "import service.process.server, service.process.worker, service.app; from service.work.warmup import warm_up; warm_up()"
+RUN python -c "import uvicorn.protocols.http.h11_impl, uvloop, service.serving, service.app; from service.work.warmup import warm_up; warm_up()"
 ENV PYTHONDONTWRITEBYTECODE=1
 USER linefix
 WORKDIR /data

@@ -43,18 +43,14 @@ ROUNDS = 15
 CALLS = 100  # of one part in a row
 BESIDE_MS, CLIENT_MS = 0.7, 1.3  # goals: of the processor, and as a client sees it
 BARE = """
-import sys
-from granian import Granian
+import sys, uvicorn
 ANSWER = b'{"status":"ok"}'
 HEADERS = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(ANSWER))]
 async def answer(scope, receive, send):
     await send({"type": "http.response.start", "status": 200, "headers": HEADERS})
     await send({"type": "http.response.body", "body": ANSWER})
-def load():
-    return answer
-how = dict(interface="asginl", http="1", loop="uvloop", websockets=False, log_enabled=False)
-server = Granian("bare", port=int(sys.argv[1]), **how)
-server.serve(target_loader=load, wrap_loader=False)
+how = dict(loop="uvloop", http="h11", ws="none", lifespan="off", log_level="error", access_log=False)
+uvicorn.run(answer, port=int(sys.argv[1]), proxy_headers=False, **how)
 """
 
 

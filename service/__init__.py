@@ -4,8 +4,7 @@ Each room imports only from those below it; import-linter holds them to that (`p
 
 ::
 
-    serving                starts the service
-    process/               the process that serves: server, workers, how it ends
+    serving                starts the service, and drains it before it ends
     app                    puts the parts of one application together
     http/                  routes, problems, bodies, the log of requests
     work/                  one request's work in a thread: models to the libraries, results to JSON
@@ -15,5 +14,5 @@ Each room imports only from those below it; import-linter holds them to that (`p
     parsing/               from the bytes of a body to a checked request, large ones in another process
     schemas/, telemetry/   models of requests and answers, their limits; counts and the log
     page/                  the files of the page at /, built
-    database_location, memory, part, threads, version
+    database_location, memory, thread_pool, version
 """

@@ -48,7 +48,6 @@ from .maps.errors import StoreError
 from .maps.lookup import MapLookup
 from .parsing.errors import ParserEndedError
 from .parsing.parser_process import ParserProcess
-from .part import WHOLE, Part
 from .settings import Settings
 from .telemetry.metrics import Metrics, RefusalTally
 from .telemetry.traces import traces_of_environment
@@ -69,18 +68,16 @@ PROGRESS_SECONDS = 5.0  # between two log lines with the progress of compiling
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
-def create_app(settings: Settings, part: Part = WHOLE, started: Started | None = None) -> FastAPI:
+def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
     """Return an application that has not started anything yet.
 
     Parameters
     ----------
     settings : Settings
-    part : Part
-        Which of several processes this is.
     started : callable, optional
         Called with the application's parts, in its event loop, when it starts.
     """
-    services = _services(settings, part)
+    services = _services(settings)
     app = FastAPI(
         title="Linefix",
         version=VERSION,
@@ -89,7 +86,7 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started | None =
         redoc_url=None,
         redirect_slashes=False,
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
-        lifespan=partial(_lifespan, services=services, part=part, started=started),
+        lifespan=partial(_lifespan, services=services, started=started),
     )
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
@@ -120,14 +117,14 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started | None =
     return app
 
 
-def _services(settings: Settings, part: Part) -> Services:
-    """Put the parts together; of several processes each has its share."""
+def _services(settings: Settings) -> Services:
+    """Put the parts together; of several workers each has its share."""
     metrics = Metrics()
-    gate = Gate(part.share(settings.searches), part.share(settings.queue))
-    indexing = Gate(part.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE, 0)
-    budget = _budget(settings, part, settings.max_bodies_bytes)
-    store = MapStore(settings.url, may_make=part.is_first, most_bytes=settings.max_stored_bytes)
-    cache = IndexCache(part.share(settings.cache_bytes), metrics)
+    gate = Gate(settings.share(settings.searches), settings.share(settings.queue))
+    indexing = Gate(settings.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE, 0)
+    budget = _budget(settings, settings.max_bodies_bytes)
+    store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
+    cache = IndexCache(settings.share(settings.cache_bytes), metrics)
     parser = ParserProcess()
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
@@ -152,17 +149,17 @@ def _services(settings: Settings, part: Part) -> Services:
         parsing_apart=Gate(1, settings.max_connections, "parsing-apart", long_per_slot=0),
         indexing=indexing,
         keyring=keyring,
-        answers=_budget(settings, part, settings.max_answers_bytes),
+        answers=_budget(settings, settings.max_answers_bytes),
         bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout_s, guarded=settings.guarded),
         parser=parser,
         store=store,
         probe=StoreProbe(store),
         lookup=lookup,
-        documents=_budget(settings, part, settings.max_answers_bytes),
+        documents=_budget(settings, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
         importing=Gate(1, settings.max_connections, "importing", long_per_slot=0),
         import_bounds=Bounds(
-            max(LEAST_IMPORT_BYTES, part.share(settings.max_import_bytes)),
+            max(LEAST_IMPORT_BYTES, settings.share(settings.max_import_bytes)),
             settings.max_body_bytes,
             settings.max_map_segments,
         ),
@@ -185,15 +182,13 @@ def _keyring(settings: Settings) -> Keyring:
     return Keyring(settings.keys, file, Tokens(settings.issuer))
 
 
-def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
-    """Return what one of several processes may hold; the largest body always fits."""
-    return ByteBudget(max(settings.max_body_bytes, part.share(most)), least_share=settings.max_body_bytes)
+def _budget(settings: Settings, most: int) -> ByteBudget:
+    """Return what one of several workers may hold; the largest body always fits."""
+    return ByteBudget(max(settings.max_body_bytes, settings.share(most)), least_share=settings.max_body_bytes)
 
 
 @asynccontextmanager
-async def _lifespan(
-    app: FastAPI, services: Services, part: Part, started: Started | None
-) -> AsyncIterator[dict[str, Services]]:
+async def _lifespan(app: FastAPI, services: Services, started: Started | None) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
     following = [
@@ -202,7 +197,7 @@ async def _lifespan(
     ]
     if started is not None:
         started(services)
-    if part.opens_late:
+    if services.settings.workers > 1:  # a request must not come to one of them that has to refuse it
         await getting_ready
     try:
         yield {KEY: services}

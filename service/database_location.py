@@ -1,6 +1,6 @@
 """Location of the stored maps: the database that an operator names, and the file of an SQLite database.
 
-Light to import: the supervisor of the workers uses it, too.
+Light to import: the process that starts the workers uses it, too.
 """
 
 from __future__ import annotations

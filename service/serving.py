@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import gc
-import logging
-import logging.config
+import math
 import os
+import signal
 import sys
+import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from fastapi import FastAPI
+
+    from .http.services import Services
     from .settings import Settings
 
-logger = logging.getLogger("linefix")
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # Failures of a disk that can be repaired while the service runs and reports that it is not ready.
 AILING_DISK = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
 # Read by compiled.cache and by `cli`, which are not loaded here for these names.
+MAX_HEAD = 32_768  # bytes that are kept of a head, of trailers, of a chunk's extension
+GRACE = 6  # s after which a closing server cancels what still runs; a second earlier the application cancels searches
+HANG = 30  # s without an answer after which one of several workers is replaced
+# For which a search thread waits for Python's global lock while the event loop is busy, each time that it returns from
+# a kernel; by default it is 5 ms.
+SWITCH_SECONDS = 0.001
+GARBAGE = (20_000, 10, 10)  # few objects of a request are cyclic; by default Python looks after each 700 objects
+COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client: the folder of the counts that workers share
 NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
 
 
@@ -51,24 +64,84 @@ def unknown_settings() -> list[str]:
 
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
-    from .process.server import serve as serve_settings
+    import uvicorn
+
     from .telemetry.logs import log_config
 
     wrong = cannot_keep_maps(settings)
     if wrong is not None:
         print(f"linefix: {wrong}; name another directory with --data-dir, or LINEFIX_DATA_DIR", file=sys.stderr)
         return 1
-    logging.config.dictConfig(log_config(settings.log_level))
-    try:
-        return serve_settings(settings)
-    except OSError as error:
-        logger.error(
-            "cannot listen on %s port %d: %s; choose another port with --port, or another address with --host",
-            settings.host,
-            settings.port,
-            error.strerror,
-        )
-        return 1
+    # Before and after the server's own handlers, which it sets in `uvicorn.run` and then raises the signal again.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
+    with ExitStack() as stack:
+        if settings.workers > 1:
+            os.environ[COUNTS] = stack.enter_context(tempfile.TemporaryDirectory(prefix="linefix-workers-"))
+        settings.export()
+        try:
+            uvicorn.run(
+                f"{__name__}:application",
+                factory=True,
+                host=settings.host,
+                port=settings.port,
+                workers=settings.workers,
+                loop="uvloop",
+                http="h11",
+                h11_max_incomplete_event_size=MAX_HEAD,
+                ws="none",
+                lifespan="on",
+                limit_concurrency=settings.share(settings.max_connections),
+                timeout_keep_alive=math.ceil(settings.request_timeout_s),
+                timeout_graceful_shutdown=GRACE,
+                timeout_worker_healthcheck=HANG,
+                ssl_certfile=settings.tls_cert,
+                ssl_keyfile=settings.tls_key,
+                log_config=log_config(settings.log_level),
+                access_log=False,
+                proxy_headers=False,
+                server_header=False,
+            )
+        except SystemExit as ended:
+            return 1 if ended.code else 0
+    return 0
+
+
+def application() -> FastAPI:
+    """Return the application of this process, by the settings that `run` has put into the environment."""
+    gc.disable()  # until the service is ready
+    from .app import create_app
+    from .memory import return_large_blocks
+    from .settings import Settings
+    from .telemetry.metrics import forget_ended_workers
+
+    return_large_blocks()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    gc.set_threshold(*GARBAGE)
+    if COUNTS in os.environ:
+        forget_ended_workers(os.environ[COUNTS])
+    return create_app(Settings(), started=drain_on_signals)
+
+
+def drain_on_signals(services: Services) -> None:
+    """Report 503 on `/readyz` for `drain_s` before the server closes: a balancer sends nothing to a closed port.
+
+    Called in the event loop after the server has set its handlers. A second SIGINT closes the server at once.
+    """
+    loop, close = asyncio.get_running_loop(), signal.getsignal(signal.SIGTERM)
+    assert callable(close)
+
+    def drain(number: int) -> None:
+        if services.readiness.draining:
+            if number == signal.SIGINT:
+                close(signal.SIGTERM, None)
+            return
+        services.readiness.draining = True
+        loop.call_later(services.settings.drain_s, close, signal.SIGTERM, None)
+        loop.call_later(services.settings.drain_s + GRACE - 1, services.give_up)
+
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup has SIGHUP ignored
+            loop.add_signal_handler(number, drain, number)
 
 
 def cannot_keep_maps(settings: Settings) -> str | None:

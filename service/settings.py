@@ -138,7 +138,7 @@ class Settings(BaseSettings):
         512,
         ge=8,
         le=100_000,
-        description="maximum number of open connections; fewer if the system has fewer descriptors",
+        description="number of open connections at which further requests are refused",
     )
     max_map_segments: int = Field(200_000, ge=1, description="maximum number of segments of a map, and of its points")
     max_scan_segments: int = Field(2_000, ge=1, description="maximum number of segments of a scan")
@@ -154,17 +154,10 @@ class Settings(BaseSettings):
         gt=0.0,
         le=3600.0,
         allow_inf_nan=False,
-        description="seconds for the head of a request (at most 60), and for its body",
+        description="seconds for the body of a request, and between two requests of a connection",
     )
     drain_s: Finite = Field(
         1.0, ge=0.0, le=5.0, description="seconds of answering after SIGTERM, while /readyz returns 503"
-    )
-    hang_s: Finite = Field(
-        30.0,
-        ge=2.0,
-        le=3600.0,
-        allow_inf_nan=False,
-        description="seconds until a worker with a blocked event loop is replaced",
     )
     log_level: str = Field(
         "info",
@@ -224,6 +217,16 @@ class Settings(BaseSettings):
             return database_url(self.database_url.get_secret_value())
         return URL.create("sqlite", database=str(self.data_dir / "maps.sqlite3"))
 
+    def share(self, whole: int) -> int:
+        """Return one worker's part of something that all workers have together."""
+        return whole // self.workers
+
+    def export(self) -> None:
+        """Put what was set into the environment, from which worker processes read their settings."""
+        for name in [name for name in os.environ if name.upper() in map(_variable, self.model_fields_set)]:
+            del os.environ[name]
+        os.environ.update({_variable(name): _text(getattr(self, name)) for name in self.model_fields_set})
+
     def limits(self) -> Limits:
         """Return the counts that requests are held to."""
         return Limits(
@@ -234,6 +237,17 @@ class Settings(BaseSettings):
             pairs=self.max_correspondences,
             batch=self.max_batch,
         )
+
+
+def _variable(name: str) -> str:
+    return f"LINEFIX_{name.upper()}"
+
+
+def _text(value: Any) -> str:
+    """Return a setting as it stands in the environment."""
+    if isinstance(value, tuple):
+        return ",".join(map(_text, value))
+    return str(value.get_secret_value() if isinstance(value, SecretStr) else value)
 
 
 def is_loopback(host: str) -> bool:

@@ -52,13 +52,6 @@ class RunningService:
         except subprocess.TimeoutExpired:
             raise AssertionError(f"does not end: {self.log()}") from None
 
-    @property
-    def worker(self) -> int:
-        """The process that answers, where it is one: what the supervisor has started besides Python's own tracker."""
-        started = children_of(self.process.pid)
-        (worker,) = (pid for pid in started if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes())
-        return worker
-
     def kill(self) -> None:
         """Kill all of its processes, as a machine does that goes down."""
         for pid in family_of(self.process.pid):

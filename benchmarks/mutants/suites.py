@@ -64,7 +64,6 @@ SUITES = {
     "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),
     "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
     "service/parsing/": Suite(("tests/service/parsing", "tests/service/http/test_bodies.py")),
-    "service/process/": Suite(("tests/service/process", "tests/service/http/test_refusals.py")),
     "service/telemetry/": Suite(("tests/service/telemetry",)),
     "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py")),
     "cli/": Suite(("tests/cli",)),

@@ -129,15 +129,16 @@ class Intake:
         self._unread = message["type"] == "http.request" and message.get("more_body", False)
         return message
 
-    async def drop_rest(self, most_bytes: int) -> None:
-        """Read the rest and drop it, as far as it comes soon and is not too much."""
+    async def drop_rest(self, most_bytes: int) -> bool:
+        """Read the rest and drop it, as far as it comes soon and is not too much; return whether there is no more."""
         if not self._unread:
-            return
+            return True
         dropped = 0
         with suppress(TimeoutError):
             async with asyncio.timeout(DROP_SECONDS):
                 while self._unread and dropped <= most_bytes:
                     dropped += len((await self.receive()).get("body", b""))
+        return not self._unread
 
 
 def _is_gzip(request: Request, *, form: bool) -> bool:

@@ -31,7 +31,6 @@ OTHER = "unmatched"
 STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
-NO_HOST = (b"host", b"")  # the server's header in place of a host if none was sent
 CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
 ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
 _HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
@@ -58,8 +57,6 @@ class RequestMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        if NO_HOST in scope["headers"]:
-            scope["headers"] = [field for field in scope["headers"] if field != NO_HOST]
         state = RequestState(asyncio.get_running_loop().time(), taken_or_made(scope["headers"]))
         attach(scope, state)
         try:
@@ -87,11 +84,11 @@ class RequestMiddleware:
         assert problem is not None
         stranger = isinstance(error, STRANGERS)
         most_bytes = STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes
-        await Intake(receive, scope["headers"]).drop_rest(most_bytes)
+        ends = not await Intake(receive, scope["headers"]).drop_rest(most_bytes) or stranger
 
         async def send_refusal(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(message, request_id, close=stranger)
+                _add_headers(message, request_id, close=ends)
             await send(message)
 
         await problem.response(request_id)(scope, receive, send_refusal)
@@ -107,8 +104,8 @@ class RequestMiddleware:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                await intake.drop_rest(most_bytes)
-                _add_headers(message, state.request_id)
+                ends = not await intake.drop_rest(most_bytes)  # the server would read on without end
+                _add_headers(message, state.request_id, close=ends)
             await send(message)
 
         try:

@@ -8,8 +8,9 @@ import os
 import time
 from collections import Counter as Tally
 from collections.abc import Callable
+from pathlib import Path
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest, multiprocess, values
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest, multiprocess
 
 from ..version import VERSION
 
@@ -22,18 +23,13 @@ REPORT_SECONDS = 1.0  # between two reports of refusals
 EXPOSITION_SECONDS = 0.2  # between two texts; one takes 10 ms of the event loop, more of several workers
 
 
-def share_counts(directory: str, index: int) -> None:
-    """Have the counts of this worker kept in files next to those of the others; before any count is made.
-
-    A worker that takes the place of another goes on with its files: counts never go down.
-    """
-    os.environ[_DIRECTORY] = directory
-    values.ValueClass = values.MultiProcessValue(process_identifier=lambda: index)  # type: ignore[no-untyped-call]
-
-
-def forget_worker(directory: str, index: int) -> None:
-    """Take the running and waiting requests of a dead worker out of the sums; its counts stay."""
-    multiprocess.mark_process_dead(index, directory)  # type: ignore[no-untyped-call]
+def forget_ended_workers(directory: str) -> None:
+    """Take running and waiting requests of processes that have ended out of the sums; their counts stay."""
+    for pid in {int(path.stem.rpartition("_")[2]) for path in Path(directory).glob("gauge_live*.db")}:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            multiprocess.mark_process_dead(pid, directory)  # type: ignore[no-untyped-call]
 
 
 class Metrics:

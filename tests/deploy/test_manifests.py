@@ -10,13 +10,14 @@ from typing import Any
 import pytest
 import yaml
 
-from service.process.draining import LAST_CALL
+from service.serving import GRACE
 from service.settings import Settings
 from tests.faults.replicas import CONF
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 KUBERNETES = DEPLOY / "kubernetes"
 REPLICAS = DEPLOY / "replicas"
+LAST = 5.0 + GRACE  # s of a service's end, with the longest draining
 SERVICE_BYTES = 661_000_000  # of all its processes, at most, while others send the largest maps and scans
 KIND_FILES = {
     "Deployment": "deployment.yaml",
@@ -98,8 +99,8 @@ def test_a_pod_has_memory_for_an_import_next_to_the_service() -> None:
 def test_a_pod_has_time_to_end() -> None:
     pod = manifest("Deployment")["spec"]["template"]["spec"]
     pause = float(pod["containers"][0]["lifecycle"]["preStop"]["exec"]["command"][1])
-    assert pod["terminationGracePeriodSeconds"] > pause + LAST_CALL
-    assert float(compose()["services"]["linefix"]["stop_grace_period"].rstrip("s")) > LAST_CALL
+    assert pod["terminationGracePeriodSeconds"] > pause + LAST
+    assert float(compose()["services"]["linefix"]["stop_grace_period"].rstrip("s")) > LAST
 
 
 def test_settings_and_metrics_are_the_services() -> None:

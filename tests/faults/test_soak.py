@@ -124,7 +124,7 @@ def test_memory_is_flat_under_mixed_load(start_service: Callable[..., Any], requ
     samples: list[int] = []
     while any(caller.is_alive() for caller in callers):
         time.sleep(0.5)
-        samples.append(resident(running.worker))
+        samples.append(resident(running.process.pid))
     fifth = len(samples) // 5
     medians = [statistics.median(samples[i * fifth : (i + 1) * fifth]) / 1e6 for i in range(5)]
     print(f"\n{seconds / 60:g} minutes, {sum(counts.values())} requests: {dict(sorted(counts.items()))}")

@@ -62,7 +62,7 @@ def steps(log: Path, folder: Path) -> list[str]:
 def test_a_write_is_on_the_disk_before_it_is_acknowledged(start_service: Callable[..., Any], tmp_path: Path) -> None:
     running = start_service(probe="/livez")  # maps are served before the kernels are warm
     log = tmp_path / "calls"
-    with traced(running.worker, log):
+    with traced(running.process.pid, log):
         for document in (examples.MAP, {"segments": examples.WALLS * 500}):
             assert running.client.put("/v1/maps/m", json=document).is_success
         assert running.client.delete("/v1/maps/m").status_code == 204

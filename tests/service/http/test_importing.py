@@ -115,14 +115,14 @@ def test_reading_files_takes_no_place_of_a_search(start_service: Callable[..., R
     """Class of attack: one key's long work in the only place. Others searched in what it left, 4 % of the time."""
     running = start_service(searches=1, max_deadline_ms=600_000)
     curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
-    before = children_of(running.worker)
+    before = children_of(running.process.pid)
     importing = threading.Thread(target=send, args=(running.client, {"a.svg": curves}))
     importing.start()
     with client_of(running.url) as client:
-        until(lambda: len(children_of(running.worker) - before) > 0)
+        until(lambda: len(children_of(running.process.pid) - before) > 0)
         assert running.count("linefix_searches_running") == 0
         assert client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
-        for child in children_of(running.worker) - before:
+        for child in children_of(running.process.pid) - before:
             os.kill(child, signal.SIGKILL)
     importing.join()
 

@@ -75,7 +75,7 @@ def test_a_service_with_large_bodies_keeps_nothing_of_them_and_takes_its_parser_
 ) -> None:
     """Neither by a statement nor by its parameters: 15 MB each, and that for each connection."""
     running = start_service()
-    pid = running.worker
+    pid = running.process.pid
 
     def resident() -> float:
         status = Path(f"/proc/{pid}/status").read_text()

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import threading
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -17,14 +14,9 @@ import httpx
 import orjson
 import pytest
 
-from service.part import Part
-from service.process.worker import take_part
 from service.schemas import examples
-from tests.running import PATIENCE, RunningService, children_of, client_of, is_running, running, until
+from tests.running import RunningService, children_of, client_of, is_running, running, until
 from tests.service.searches import searched_briefly, searched_for, store_hard_map
-
-# A worker that dies sooner after the start of the one before it ends the service: the server takes it for a crash loop.
-CRASH_LOOP_SECONDS = 5.5
 
 POSTS = 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}'
 
@@ -35,19 +27,6 @@ def workers_of(service: RunningService) -> set[int]:
         for pid in children_of(service.process.pid)
         if is_running(pid) and b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
     }
-
-
-def age_of(pid: int) -> float:
-    """Return for how long a process has run, s."""
-    began = int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[19]) / os.sysconf("SC_CLK_TCK")
-    return time.clock_gettime(time.CLOCK_BOOTTIME) - began
-
-
-def kill(service: RunningService, pids: Iterable[int]) -> None:
-    """Kill workers, when that is no crash loop."""
-    until(lambda: min(map(age_of, workers_of(service))) > CRASH_LOOP_SECONDS + 0.5)
-    for pid in pids:
-        os.kill(pid, signal.SIGKILL)
 
 
 def anew(service: RunningService, method: str, path: str, body: bytes | None = None) -> httpx.Response:
@@ -64,48 +43,20 @@ def ready(service: RunningService) -> int:
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     """Two workers; tests may kill them, since they are replaced."""
     folder = tmp_path_factory.mktemp("pair")
-    with running(folder, workers=2, searches=2, queue=4, hang_s=8) as service:
+    with running(folder, workers=2, searches=2, queue=4) as service:
         until(lambda: ready(service) == 2)
         yield service
         assert "a defect" not in service.log()
         assert "does not open" not in service.log()
 
 
-def test_shares_add_up() -> None:
-    for whole in (0, 1, 7, 16, 128_000_000):
-        for of in (1, 2, 3, 5):
-            shares = [Part(index, of).share(whole) for index in range(of)]
-            assert sum(shares) == whole
-            assert max(shares) - min(shares) <= 1
-            # One too many, while another is about to go, has no more than the least.
-            assert Part(of, of).share(whole) == min(shares)
-
-
-def test_a_part_is_one_process_s_as_long_as_it_lives(tmp_path: Path) -> None:
-    (first, one), (second, other) = (take_part(tmp_path, 2) for _ in range(2))
-    assert [(part.index, part.of, part.replaces) for part in (first, second)] == [(0, 2, False), (1, 2, False)]
-    third, more = take_part(tmp_path, 2)
-    assert (third.index, third.replaces) == (2, True)
-    one.release()
-    again, _ = take_part(tmp_path, 2)
-    assert (again.index, again.replaces) == (0, True)
-    other.release()
-    more.release()
-
-
 def test_no_worker_takes_a_request_before_it_can_serve_it(tmp_path: Path) -> None:
-    """And all end with the process above them."""
     with running(tmp_path, workers=2, searches=2, queue=64) as service, ThreadPoolExecutor(8) as several:
         body, statuses = orjson.dumps(examples.ASSOCIATE), []
         while ready(service) < 2 or len(statuses) < 100:
             asked = [several.submit(anew, service, "POST", "/v1/associate", body) for _ in range(10)]
             statuses += [one.result().status_code for one in asked]
         assert set(statuses) == {200}
-        pids = workers_of(service)
-        assert len(pids) == 2
-        service.process.kill()
-        service.process.wait()
-        until(lambda: not any(is_running(pid) for pid in pids))
 
 
 def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> None:
@@ -116,7 +67,8 @@ def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> No
     assert all(f"{POSTS} {before + 40}" in text for text in texts)
     # A worker that is killed takes none of its counts with it, but all that it had running.
     started = ready(pair)
-    kill(pair, workers_of(pair))
+    for pid in workers_of(pair):
+        os.kill(pid, signal.SIGKILL)
     until(lambda: ready(pair) == started + 2)
     assert pair.count(POSTS) == before + 40
     until(lambda: pair.count("linefix_workers_ready") == 2.0)
@@ -125,7 +77,7 @@ def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> No
 def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: RunningService) -> None:
     before, started = workers_of(pair), ready(pair)
     assert len(before) == 2
-    kill(pair, [min(before)])
+    os.kill(min(before), signal.SIGKILL)
     statuses: list[int] = []
 
     def replaced() -> bool:
@@ -138,17 +90,6 @@ def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: Ru
     after = workers_of(pair)
     assert len(after) == 2
     assert len(after & before) == 1
-
-
-def test_a_worker_that_dies_at_once_again_ends_the_service(tmp_path: Path) -> None:
-    """So that what started the service sees it: a worker that cannot start must not be started for ever."""
-    with running(tmp_path, workers=2, searches=2) as service:
-        until(lambda: ready(service) == 2)
-        kill(service, [min(workers_of(service))])
-        until(lambda: min(map(age_of, workers_of(service))) < 1.0)
-        os.kill(min(workers_of(service), key=age_of), signal.SIGKILL)
-        assert service.ended() == 1
-        assert "crash loop" in service.log()
 
 
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
@@ -196,30 +137,3 @@ def test_all_drain_and_end_together(start_service: Callable[..., RunningService]
     assert "Traceback" not in service.log()
     with pytest.raises(httpx.ConnectError):
         anew(service, "GET", "/livez")
-
-
-HANGING = """
-import asyncio, sys, time
-from service.process.worker import watch_loop
-
-async def main():
-    watch_loop(asyncio.get_running_loop(), 2.0)
-    await asyncio.sleep(float(sys.argv[1]))
-    time.sleep(float(sys.argv[2]))
-    await asyncio.sleep(1.5)
-    print("went on")
-
-asyncio.run(main())
-"""
-
-
-def test_a_process_whose_loop_stands_still_ends_itself() -> None:
-    def run(turns: float, stands: float) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", HANGING, str(turns), str(stands)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
-
-    with ThreadPoolExecutor(2) as threads:
-        hanging, busy = threads.map(run, (0.0, 3.0), (2 * PATIENCE, 0.5))
-    assert (hanging.returncode, hanging.stdout) == (1, "")
-    assert "in main" in hanging.stderr  # where it stands
-    assert (busy.returncode, busy.stdout) == (0, "went on\n")

@@ -11,7 +11,6 @@ import pytest
 from association import CancelledError, Deadline
 from service.admission.errors import DeadlinePassedError
 from service.app import create_app
-from service.part import Part
 from service.settings import Settings
 from service.work.importing import index_import
 from tests.service.maps.test_lookup import Lookup, inline
@@ -43,12 +42,7 @@ def test_an_import_takes_no_place_of_maps_that_are_searched(lookup: Lookup) -> N
 
 def test_readers_of_several_workers_have_the_memory_of_one(tmp_path: Path) -> None:
     """Class of attack: a limit of a process that is one of each of several."""
-    settings = Settings(data_dir=tmp_path)
-    parts = [create_app(settings, Part(k, 2)).state.services for k in range(2)]
-    assert sum(services.import_bounds.memory_bytes for services in parts) == settings.max_import_bytes
-    assert all(services.importing.slots == 1 for services in parts)
-    many = create_app(settings, Part(0, 8)).state.services
-    assert many.import_bounds.memory_bytes == 400_000_000  # with less no file is read at all
-    many.close()
-    for services in parts:
+    for workers, bound in ((2, 500_000_000), (8, 400_000_000)):  # with less no file is read at all
+        services = create_app(Settings(data_dir=tmp_path, workers=workers, searches=8)).state.services
+        assert (services.import_bounds.memory_bytes, services.importing.slots) == (bound, 1)
         services.close()

@@ -1,1 +1,0 @@
-"""The process that serves: server, workers, kernels."""
