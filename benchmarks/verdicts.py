@@ -1,4 +1,4 @@
-"""The pictures of ``docs/explanation/verdict.md``: small scenes, searched when drawn, titled with their verdicts.
+"""The pictures of ``docs/guides/read-the-answer.md``: small scenes, searched when drawn, titled with their verdicts.
 
 ``python -m benchmarks.verdicts`` writes them to ``docs``.
 """
