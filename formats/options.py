@@ -13,6 +13,7 @@ from .errors import InvalidOptionError
 Drawn = Literal["faces", "centres"]
 Directions = Literal["drawn", "none"]
 
+US_FOOT = 1200 / 3937  # of the US survey, m
 UNITS = {
     "mm": 1e-3,
     "cm": 1e-2,
@@ -22,6 +23,7 @@ UNITS = {
     "in": 0.0254,
     "ft": 0.3048,
     "yd": 0.9144,
+    "us-ft": US_FOOT,
 }
 
 
@@ -32,8 +34,8 @@ class ImportOptions:
     Attributes
     ----------
     units : str, float or None
-        Of a drawing: ``mm``, ``cm``, ``dm``, ``m``, ``km``, ``in``, ``ft``, ``yd``, or metres per unit; None: as the
-        file says.
+        Of a drawing: ``mm``, ``cm``, ``dm``, ``m``, ``km``, ``in``, ``ft``, ``yd``, ``us-ft``, or metres per unit;
+        None: as the file says.
     layers : tuple of str
         Patterns such as ``*WALL*``, without regard to case; empty: all layers that are drawn.
     drawn : "faces", "centres" or None

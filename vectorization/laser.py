@@ -21,9 +21,11 @@ USUAL_SCAN = 0.2  # s; of a slow scanner, assumed in its place
 
 MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
 
-# Beams that angle_max may differ from angle_min + (n - 1) * angle_increment. Drivers set angle_max to n increments
-# (LDS-01, neato: one beam more) or round it down by one; half a beam is left for rounding.
-BEAMS_OFF = 1.5
+# How far angle_max may be from the last beam. Drivers set it to the end of the field of view and round the number of
+# ranges down (LDS-01, neato, velodyne_laserscan), which makes less than two beams; filters cut ranges and leave it.
+BEAMS_OFF = 2.0
+ANGLE_OFF = math.radians(3.0)
+ROUNDING = 1e-3  # of a beam, as float32 has it
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,8 +160,8 @@ class LaserScan:
         return places[:, :2] + np.stack([r[seen] * np.cos(a), r[seen] * np.sin(a)], axis=1)
 
 
-def require_angle_max(angle_min: float, angle_max: float, angle_increment: float, beams: int) -> None:
-    """Refuse angles of a LaserScan message that contradict each other; drivers are often off by one beam.
+def require_angle_max(angle_min: float, angle_max: float, angle_increment: float, beams: int) -> float:
+    """Return how far `angle_max` of a LaserScan message is from its last beam, which increment and count determine.
 
     Parameters
     ----------
@@ -167,15 +169,21 @@ def require_angle_max(angle_min: float, angle_max: float, angle_increment: float
         Of the first beam, of the last one, and from beam to beam; radians.
     beams : int
 
+    Returns
+    -------
+    float
+        Radians.
+
     Raises
     ------
     InvalidScanError
-        When `angle_max` is more than 1.5 beams from that of the last beam, or the beams make more than a turn.
+        When that is two beams or more and above 3 degrees, or the beams make more than a turn.
     """
     span = (beams - 1) * angle_increment
-    agree = angle_increment != 0.0 and abs(angle_max - angle_min - span) <= BEAMS_OFF * abs(angle_increment)
+    off, two = abs(angle_max - angle_min - span), (BEAMS_OFF - ROUNDING) * abs(angle_increment)
+    agree = angle_increment != 0.0 and off <= max(two, ANGLE_OFF)
     if agree and abs(span) <= math.tau + abs(angle_increment):
-        return
+        return off
     told = f"angle_min {angle_min:g} rad, angle_max {angle_max:g} rad and angle_increment {angle_increment:g} rad"
     if agree:
         raise InvalidScanError(

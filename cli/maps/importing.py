@@ -33,7 +33,9 @@ class SaidOfFile:
 
     units: Annotated[
         str | None,
-        typer.Option(help="Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, or metres per unit.", metavar="UNIT"),
+        typer.Option(
+            help="Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit.", metavar="UNIT"
+        ),
     ] = None
     layers: Annotated[
         list[str] | None,

@@ -17,15 +17,13 @@ from ezdxf import recover
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.entities.polyline import Polyline
-from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
-from ezdxf.units import conversion_factor
 
 from ..errors import FormatError, MalformedFileError, TooLargeError, UnsupportedFormatError
 from ..files import name_of, read_bounded
 from ..limits import MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
-from ..options import ImportOptions
+from ..options import US_FOOT, ImportOptions
 from ..report import Notes, listed, shown
 from .drawing import Drawing
 from .dxf_blocks import Expansion
@@ -42,6 +40,14 @@ FREE_LEFT = "FREE_LEFT"
 
 # Of layers, in some languages of drawings.
 NAMES_OF_WALLS = ("*wall*", "*wand*", "*mauer*", "*muro*", "*pared*", "*mur", "*murs*")
+
+# Metres per unit, by the number in $INSUNITS: inch, foot, mile, mm, cm, m, km, microinch, mil, yard, angstrom, nm, um,
+# dm, dam, hm, and those of the US survey: foot, inch, yard, mile.
+METRES_OF = {
+    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 11: 1e-10,
+    12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 21: US_FOOT, 22: US_FOOT / 12, 23: 3 * US_FOOT,
+    24: 5280 * US_FOOT,
+}  # fmt: skip
 
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 SAGITTA = 0.01  # m; how far a chord may lie from its arc
@@ -62,7 +68,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """
     name = name_of(path)
     document = _document(path, notes)
-    drawing = Drawing(name, "dxf", options.layers, notes, _metres(document))
+    drawing = Drawing(name, "dxf", options.layers, notes, _metres(document, notes))
     expansion = Expansion.of(document, drawing)
     drawing.layers = options.layers or _layers_of_walls(document, expansion, notes)
     metres = options.metres or drawing.metres or 1.0
@@ -136,14 +142,13 @@ def _layers_of_walls(document: Document, expansion: Expansion, notes: Notes) -> 
     return NAMES_OF_WALLS
 
 
-def _metres(document: Document) -> float | None:
-    units = document.header.get("$INSUNITS", 0)
-    if not isinstance(units, int) or units == 0:
-        return None
-    try:
-        return float(conversion_factor(InsertUnits(units), InsertUnits.Meters))
-    except (DXFError, ValueError, LookupError):
-        return None
+def _metres(document: Document, notes: Notes) -> float | None:
+    """Return metres per unit; None where the file has no unit, or one that is none of a building."""
+    unit = document.header.get("$INSUNITS", 0)
+    metres = METRES_OF.get(unit)
+    if metres is None and unit != 0:
+        notes.add_assumed("unknown_unit", f"$INSUNITS is {shown(str(unit))}, which is no unit of a building")
+    return metres
 
 
 def _width(entity: DXFEntity) -> float:

@@ -15,6 +15,7 @@ from vectorization import InvalidScanError, LaserScan, require_angle_max
 
 from ..report import Notes
 
+USUAL_OFF = 1.5  # beams between angle_max and the last beam, of which nothing is said
 Message = Any  # sensor_msgs/LaserScan, whatever library it comes from
 
 
@@ -40,7 +41,14 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
     if not len(ranges):
         raise InvalidScanError("expected at least one range, found none", argument="ranges")
     first, last, step = (float(getattr(message, f"angle_{name}")) for name in ("min", "max", "increment"))
-    require_angle_max(first, last, step, len(ranges))
+    off = require_angle_max(first, last, step, len(ranges))
+    if off > USUAL_OFF * abs(step):
+        notes.add_assumed(
+            "angle_max",
+            f"scans whose angle_max is {math.degrees(off):.2g} degrees ({off / abs(step):.3g} beams) from the last "
+            "beam; angle_increment and the number of ranges are used",
+            1,
+        )
     low, high = _limits(float(message.range_min), float(message.range_max), notes)
     if high == math.inf:
         ranges = np.where(np.isinf(ranges), math.nan, ranges)

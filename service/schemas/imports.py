@@ -124,7 +124,10 @@ FORM: dict[str, Any] = {
             "type": "string",
             "description": "of a grid: the grey value of unknown cells, 0 to 255, or none; left out: recognized",
         },
-        "units": {"type": "string", "description": "of a drawing: mm, cm, dm, m, km, in, ft, yd, or metres per unit"},
+        "units": {
+            "type": "string",
+            "description": "of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit",
+        },
         "layers": {"type": "string", "description": "patterns such as *WALL*, comma separated"},
         "point": {"type": "string", "description": "a free place, `x y` in metres; may be repeated"},
         "drawn": {

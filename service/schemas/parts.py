@@ -191,7 +191,8 @@ class Laser(Strict):
         "the covariance is wider, and the answer has the warning `motion_unknown`",
     )
     angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
-        None, description="radians, of the last beam; must agree with the other angles within 1.5 beams"
+        None,
+        description="radians, of the last beam; at most two beams or 3 degrees from that of the other fields",
     )
     scan_time: Any = Field(None, description="field of a LaserScan message; not used")
     intensities: Any = Field(None, description="field of a LaserScan message; not used")

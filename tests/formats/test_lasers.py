@@ -89,6 +89,18 @@ def test_angles_that_agree_within_a_beam_are_taken(tmp_path: Path, laser: Laser)
     assert not assumed(report)
 
 
+@pytest.mark.parametrize("step", [0.007, 0.03, 0.1])
+def test_an_end_of_the_field_of_view_as_angle_max_is_a_note(tmp_path: Path, step: float) -> None:
+    """velodyne_laserscan makes as many bins as fit into a turn, and sets angle_max to pi."""
+    bins = int(math.tau / step)
+    (found,), report = read(tmp_path, Laser((2.0,) * bins, -math.pi, math.pi, step))
+    assert found.angles[-1] == pytest.approx(-math.pi + (bins - 1) * step, abs=1e-4)
+    off = (math.tau - step * (bins - 1)) / step
+    assert f"({off:.3g} beams)" in (message_of(report, "angle_max") if off > 1.5 else f"({off:.3g} beams)")
+    filtered = Laser((2.0,) * 1070, -2.35, -2.35 + 0.004363 * 1080, 0.004363)
+    assert "2.7 degrees" in message_of(read(tmp_path, filtered)[1], "angle_max")
+
+
 @pytest.mark.parametrize(
     "laser",
     [

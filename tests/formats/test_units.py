@@ -7,10 +7,14 @@ from pathlib import Path
 import pytest
 from ezdxf.filemanagement import new
 
-from formats import ImportOptions, MalformedFileError, read_map
+from formats import ImportOptions, IncompleteFileError, MalformedFileError, read_map
 
 PLAN = [(0, 0, 8, 0), (8, 0, 8, 5), (8, 5, 3.5, 5), (2.6, 5, 0, 5), (0, 5, 0, 0), (4, 0, 4, 2), (4, 2.9, 4, 5)]
-IN_METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0}  # of $INSUNITS
+US_FOOT = 1200 / 3937
+IN_METRES = {  # of $INSUNITS
+    1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 21: US_FOOT,
+    22: US_FOOT / 12, 23: 3 * US_FOOT, 24: 5280 * US_FOOT,
+}  # fmt: skip
 
 
 def noted(tmp_path: Path, units: int, drawn_in: float, options: ImportOptions | None = None) -> dict[str, str]:
@@ -49,6 +53,13 @@ def test_another_unit_is_named_with_its_factor(tmp_path: Path, units: int, drawn
     found = noted(tmp_path, units, drawn_in)
     assert said in found["unlikely_unit"]
     assert "set the option units" in found["unlikely_unit"]
+
+
+@pytest.mark.parametrize("units", [19, 25, 99])
+def test_a_unit_that_no_building_has_is_none(tmp_path: Path, units: int) -> None:
+    with pytest.raises(IncompleteFileError, match=f"INSUNITS is {units}, .*set the option units"):
+        noted(tmp_path, units, 1.0)
+    assert noted(tmp_path, units, US_FOOT, ImportOptions(units="us-ft"))["unit"].endswith("8 m by 5 m")
 
 
 def test_a_drawing_of_millimetres_that_is_in_metres(tmp_path: Path) -> None:

@@ -43,8 +43,10 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     """
     metres = options.metres or drawing.metres
     if metres is None:
+        doubt = drawing.notes.assumed.get("unknown_unit")
+        why = f": {doubt.message}" if doubt is not None else ""
         raise IncompleteFileError(
-            "does not state its unit; set the option units, for example to mm or m", argument=drawing.name
+            f"does not state its unit{why}; set the option units, for example to mm or m", argument=drawing.name
         )
     if not drawing.segments:
         raise drawing.without_lines()
