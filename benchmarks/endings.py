@@ -22,7 +22,7 @@ import numpy as np
 import orjson
 
 from examples.running import running_service
-from service.schemas import examples
+from linefix.documents import examples
 
 from .open_loop import request_of
 from .siege import parallel_walls

@@ -20,7 +20,7 @@ from contextlib import suppress
 import numpy as np
 import orjson
 
-from service.schemas import examples
+from linefix.documents import examples
 
 from .open_loop import at_rate, beside, request_of, without_pause
 from .overload import Service, goodput, highest, loaded_service

@@ -16,105 +16,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import simulation
-from association import (
-    AssociationOptions,
-    AssociationResult,
-    Deadline,
-    HardPrior,
-    MapIndex,
-    MapSet,
-    Scan,
-    SoftPrior,
-    Status,
-    View,
-    assemble,
-)
-from registration import (
-    Beams,
-    InputError,
-    MeasuredSegments,
-    RegistrationOptions,
-    RegistrationResult,
-    RigidTransform,
-    Segments,
-    register,
-)
-from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
-
-from .checking import CheckedMap, check
-from .driving import associate
-from .explaining import Explanation, explain
-from .locating import index_map, index_maps, locate, scan_of
-from .ranges import MountedScan, view_of
-from .updating import update_map
-
 if TYPE_CHECKING:
-    from formats import ImportOptions, LineMap, LogOptions, draw_map, read_log, read_map, write_map
-
-_OF_FORMATS = frozenset(("ImportOptions", "LineMap", "LogOptions", "draw_map", "read_log", "read_map", "write_map"))
-
-__all__ = [
-    "AssociationOptions",
-    "AssociationResult",
-    "Beams",
-    "CheckedMap",
-    "Deadline",
-    "Explanation",
-    "HardPrior",
-    "ImportOptions",
-    "InputError",
-    "LaserScan",
-    "LineMap",
-    "LogOptions",
-    "MapIndex",
-    "MapSet",
-    "MeasuredSegments",
-    "Motion",
-    "MountedScan",
-    "RegistrationOptions",
-    "RegistrationResult",
-    "RigidTransform",
-    "Scan",
-    "Segments",
-    "SoftPrior",
-    "Status",
-    "Vectorization",
-    "VectorizationOptions",
-    "View",
-    "assemble",
-    "associate",
-    "check",
-    "draw_map",
-    "explain",
-    "index_map",
-    "index_maps",
-    "locate",
-    "read_log",
-    "read_map",
-    "register",
-    "scan_of",
-    "simulation",
-    "update_map",
-    "vectorize",
-    "view_of",
-    "write_map",
-]
+    from .public import *  # noqa: F403
 
 
 def __getattr__(name: str) -> Any:
-    """Import the readers and writers of files on first use: their libraries may be missing."""
-    if name not in _OF_FORMATS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
-        return getattr(importlib.import_module("formats"), name)
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            f"linefix.{name} requires the extra `formats`. Install it, for example with "
-            '`pip install ".[formats]"` in a '
-            "checkout"
-        ) from error
+    """Import the libraries on first use: documents and the command line start without them."""
+    return getattr(importlib.import_module("linefix.public"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *importlib.import_module("linefix.public").__all__})

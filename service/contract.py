@@ -5,13 +5,14 @@ It loads neither HTTP nor a database. An error that rejects a document names its
 
 from __future__ import annotations
 
+from linefix.documents.encoding import encode
+from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
+from linefix.documents.limits import Limits
+from linefix.documents.parts import InlineMap, StoredMap, is_oriented
+from linefix.documents.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
+
 from .parsing.errors import NotJsonError
 from .parsing.reading import parse, validate
-from .schemas.encoding import encode
-from .schemas.errors import Fault, InvalidRequestError, TooManyError
-from .schemas.limits import Limits
-from .schemas.parts import InlineMap, StoredMap, is_oriented
-from .schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
 from .work.inputs import association_options_of, fault_of, included_of, prior_of, scanned_of, scans_of
 from .work.job import Stopwatch
 from .work.registration import KnownPairs

@@ -16,10 +16,11 @@ from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_valid
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
+from linefix.documents.limits import Limits
+
 from .admission.key_file import KeyFileError, read_keys
 from .admission.keys import ALGORITHMS, Issuer
 from .database_location import database_url
-from .schemas.limits import Limits
 
 Finite = Annotated[float, AllowInfNan(False)]
 HELP = "Start the service. Each option may also be set in the environment, as LINEFIX_ and its name: LINEFIX_PORT=8001."

@@ -68,7 +68,7 @@ SUITES = {
     "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py")),
     "cli/": Suite(("tests/cli",)),
     "service/http/": Suite(("tests/service/http",)),
-    "service/schemas/": Suite(("tests/service/schemas", "tests/service/http")),
+    "linefix/documents/": Suite(("tests/linefix/documents", "tests/service/http")),
     "service/work/": Suite(("tests/service/work", "tests/service/http")),
     "service/": Suite(
         (

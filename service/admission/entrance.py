@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..schemas.errors import BodyTooLargeError
+from linefix.documents.errors import BodyTooLargeError
+
 from .errors import ForeignMapError, MissingRoleError
 from .gate import Gate
 from .grants import GUARDED, Asked, Grant, asked_of

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from starlette.requests import Request
 from starlette.types import Message, Receive
 
+from linefix.documents.errors import BodyTooLargeError
+
 from ..admission.budget import ByteAccount, ByteBudget
 from ..admission.fair_queue import Holder
-from ..schemas.errors import BodyTooLargeError
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"

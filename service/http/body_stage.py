@@ -8,10 +8,10 @@ from functools import partial
 from typing import TypeVar
 
 from association import Deadline
+from linefix.documents.limits import Limits
 
 from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
-from ..schemas.limits import Limits
 from ..telemetry.traces import stage
 from ..work.job import Stopwatch
 from .exchange import Exchange

@@ -6,8 +6,9 @@ import re
 
 from starlette.requests import Request
 
+from linefix.documents.errors import Fault, InvalidRequestError
+
 from ..maps import Preconditions
-from ..schemas.errors import Fault, InvalidRequestError
 
 _TAG = re.compile(r'(W/)?"([^"]*)"')
 _REVISION = re.compile(r"[1-9][0-9]{0,17}")

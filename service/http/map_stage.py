@@ -10,6 +10,8 @@ from functools import partial
 from typing import TypeVar
 
 from association import Deadline
+from linefix.documents.parts import InlineMap, StoredMap
+from linefix.documents.requests import AssociateRequest, BatchRequest
 
 from ..admission.errors import DeadlinePassedError, ForeignMapError
 from ..admission.ticket import Ticket
@@ -17,8 +19,6 @@ from ..maps.cache import CachedMap
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
 from ..maps.several import CachedMaps, FoundMaps
-from ..schemas.parts import InlineMap, StoredMap
-from ..schemas.requests import AssociateRequest, BatchRequest
 from .exchange import Exchange
 from .services import Services
 

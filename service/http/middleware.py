@@ -13,9 +13,10 @@ from unicodedata import category
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from linefix.documents.errors import RequestError
+
 from ..admission.entrance import search_of
 from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
-from ..schemas.errors import RequestError
 from .bodies import Intake
 from .errors import ControlCharacterError, HttpError, NotHttpError
 from .exchange import RequestState, attach, state_of

@@ -10,9 +10,10 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
+from linefix.documents import analysis, parts, replies, requests, updates
+from linefix.documents.encoding import encode
+
 from ..admission.grants import GUARDED
-from ..schemas import analysis, parts, replies, requests, updates
-from ..schemas.encoding import encode
 from ..thread_pool import Threads
 
 DESCRIPTION = """

@@ -13,15 +13,15 @@ import orjson
 from starlette.responses import Response
 
 from association import CancelledError
+from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError, in_one_line
+from linefix.documents.limits import MAX_FAULTS
+from linefix.documents.replies import ProblemCode
 from registration import InputError
 
 from ..admission import errors as admission
 from ..importing import errors as importing
 from ..maps import errors as maps
 from ..parsing import errors as parsing
-from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError, in_one_line
-from ..schemas.limits import MAX_FAULTS
-from ..schemas.replies import ProblemCode
 from ..work.inputs import fault_of
 from . import errors as http
 from .etags import etag

@@ -11,8 +11,9 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import Match
 
-from ..schemas.errors import InvalidRequestError
-from ..schemas.faults import faults_of
+from linefix.documents.errors import InvalidRequestError
+from linefix.documents.faults import faults_of
+
 from .errors import BodyBrokenError, MethodNotAllowedError, NotFoundError, RefusedError
 from .exchange import state_of
 from .problems import INTERNAL, RAISED, problem_of

@@ -15,9 +15,9 @@ from typing import IO, Any
 import orjson
 
 from association import CancelledError, Deadline
+from linefix.documents.errors import Fault, InvalidRequestError
 
 from ..parsing.parser_process import command_of
-from ..schemas.errors import Fault, InvalidRequestError
 from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
 from .folders import own_folder
 from .reader import NO_ROOM, Bounds

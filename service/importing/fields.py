@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..schemas.errors import Fault, InvalidRequestError
+from linefix.documents.errors import Fault, InvalidRequestError
 
 if TYPE_CHECKING:
     from formats import ImportOptions

@@ -12,7 +12,7 @@ from python_multipart import FormParser
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import parse_options_header
 
-from ..schemas.errors import Fault, InvalidRequestError
+from linefix.documents.errors import Fault, InvalidRequestError
 
 if TYPE_CHECKING:
     from python_multipart.multipart import Field, File

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from ..schemas.errors import Fault, InvalidRequestError
+from linefix.documents.errors import Fault, InvalidRequestError
+
 from .fields import KNOWN, pointer_of
 
 if TYPE_CHECKING:

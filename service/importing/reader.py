@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 
 import orjson
 
-from ..schemas.errors import InvalidRequestError
+from linefix.documents.errors import InvalidRequestError
+
 from .own_files import Lines, OwnFiles, read_own
 from .scans import read_scans
 

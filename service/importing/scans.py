@@ -7,7 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..schemas.errors import Fault, InvalidRequestError
+from linefix.documents.errors import Fault, InvalidRequestError
+
 from .fields import Fields
 from .own_files import Lines, OwnFiles, read_own
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from functools import partial
 
 from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapPoints, MapSet
+from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
+from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
+from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.errors import Fault, InvalidRequestError, TooManyError
-from ..schemas.parts import InlineMap, MapDocument, StoredMap, is_oriented
-from ..schemas.several import MOST_MAPS, MapPrefix, NamedMap
 from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .records import MapOutline, MapRecord

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..schemas.parts import InlineMap
+from linefix.documents.parts import InlineMap
+
 from .records import MapRecord
 
 if TYPE_CHECKING:  # the store comes without what computes

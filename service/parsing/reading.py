@@ -8,12 +8,13 @@ from typing import Any, TypeVar
 import orjson
 from pydantic import BaseModel, ValidationError
 
-from ..schemas.encoding import encode
-from ..schemas.errors import InvalidRequestError, RequestError, TooManyError
-from ..schemas.faults import faults_of
-from ..schemas.limits import Limits
-from ..schemas.parts import MapDocument
-from ..schemas.requests import BatchItem, BatchRequest
+from linefix.documents.encoding import encode
+from linefix.documents.errors import InvalidRequestError, RequestError, TooManyError
+from linefix.documents.faults import faults_of
+from linefix.documents.limits import Limits
+from linefix.documents.parts import MapDocument
+from linefix.documents.requests import BatchItem, BatchRequest
+
 from .errors import NotJsonError
 
 M = TypeVar("M", bound=BaseModel)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 
-from ..schemas.errors import BodyTooLargeError
+from linefix.documents.errors import BodyTooLargeError
+
 from .errors import NotJsonError
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time

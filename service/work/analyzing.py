@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 from association import CancelledError, Deadline
 from linefix.answers import Json
+from linefix.documents.analysis import AnalyzeRequest
+from linefix.documents.parts import InlineMap
 from linefix.map_answers import analysis_json
 from map_quality import Analysis, PlaceVerdict, Robot
 from registration import Segments
 
 from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
-from ..schemas.analysis import AnalyzeRequest
-from ..schemas.parts import InlineMap
 from .association import reference_to
 from .job import Done, Job
 

@@ -19,14 +19,14 @@ from association import (
     Scan,
 )
 from linefix.answers import Json, association_json
+from linefix.documents.encoding import encode
+from linefix.documents.parts import HardPriorFields, InlineMap, SearchOptions, SoftPriorFields
+from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest
 from linefix.driving import associate, associate_on_maps
 
 from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap, CachedMaps, FoundMaps
 from ..maps.lookup import FoundMap, MapLookup
-from ..schemas.encoding import encode
-from ..schemas.parts import HardPriorFields, InlineMap, SearchOptions, SoftPriorFields
-from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
 from .inputs import association_options_of, included_of, prior_of, scanned_of

@@ -7,13 +7,13 @@ from typing import Any
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
+from linefix.documents.parts import InlineMap, is_oriented
 from linefix.map_answers import check_json
 from map_quality import check_map
 
 from ..admission.errors import DeadlinePassedError
 from ..importing.bounded import ReadMap, ReadScans
 from ..maps.lookup import MapLookup, outline_of
-from ..schemas.parts import InlineMap, is_oriented
 from .job import Done, Job
 
 

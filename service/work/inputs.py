@@ -12,6 +12,20 @@ from numpy.typing import NDArray
 
 from association import PARTS, AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
 from linefix.answers import Included
+from linefix.documents.errors import Fault, InvalidRequestError
+from linefix.documents.parts import (
+    HardPriorFields,
+    LaserScan,
+    MeasuredFields,
+    PointScan,
+    SearchOptions,
+    SegmentScan,
+    SoftPriorFields,
+    is_oriented,
+)
+from linefix.documents.requests import CheckRequest, RegisterRequest
+from linefix.documents.strict import Pose
+from linefix.documents.views import LaserView, PointView, SegmentView, ViewsScan
 from registration import (
     IDENTITY,
     InputError,
@@ -22,20 +36,6 @@ from registration import (
     Segments,
 )
 
-from ..schemas.errors import Fault, InvalidRequestError
-from ..schemas.parts import (
-    HardPriorFields,
-    LaserScan,
-    MeasuredFields,
-    PointScan,
-    SearchOptions,
-    SegmentScan,
-    SoftPriorFields,
-    is_oriented,
-)
-from ..schemas.requests import CheckRequest, RegisterRequest
-from ..schemas.strict import Pose
-from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
 from .scans import Scanned, range_scan, scan_points, view_laser, viewpoint_of
 
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot

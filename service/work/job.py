@@ -8,9 +8,9 @@ from threading import Event
 from typing import Any
 
 from association import Deadline
+from linefix.documents.encoding import encode
 
 from ..admission.errors import DeadlinePassedError
-from ..schemas.encoding import encode
 
 
 class Stopwatch:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linefix.answers import registration_json
+from linefix.documents.encoding import encode_list
+from linefix.documents.requests import RegisterRequest
 from registration import (
     MeasuredSegments,
     RegistrationOptions,
@@ -17,8 +19,6 @@ from registration import (
     register_estimating,
 )
 
-from ..schemas.encoding import encode_list
-from ..schemas.requests import RegisterRequest
 from .inputs import measured_of, pairs_of, registration_options_of
 from .job import Done, Job
 

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from association import AssociationWarning, Scan, View
 from linefix import view_of
 from linefix.answers import Json, vectorization_json
+from linefix.documents.errors import Fault, InvalidRequestError
+from linefix.documents.parts import Laser, Twist
+from linefix.documents.requests import VectorizeRequest
 from linefix.ranges import RangeScan, motion_warning
 from registration import RigidTransform
 from vectorization import (
@@ -25,9 +28,6 @@ from vectorization import (
     vectorize,
 )
 
-from ..schemas.errors import Fault, InvalidRequestError
-from ..schemas.parts import Laser, Twist
-from ..schemas.requests import VectorizeRequest
 from .job import Done, Job
 
 Floats = NDArray[np.float64]

@@ -11,14 +11,14 @@ import numpy as np
 
 from association import CancelledError, Deadline
 from linefix.answers import Json
+from linefix.documents.errors import Fault, InvalidRequestError
+from linefix.documents.parts import MapDocument
+from linefix.documents.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
 from linefix.map_answers import update_json
 from map_quality import NOT_SHARPENED, MapUpdate, Replacement, Sharpened, VisitScan, apply_changes, updating
 from registration import InputError, Segments
 
 from ..maps.lookup import FoundMap, MapLookup, outline_of
-from ..schemas.errors import Fault, InvalidRequestError
-from ..schemas.parts import MapDocument
-from ..schemas.updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
 from .association import reference_to
 from .inputs import naming_scan, scanned_of, transform_of
 from .job import Done, Job

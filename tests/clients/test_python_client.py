@@ -30,8 +30,8 @@ from linefix_client import (
 )
 
 from examples.running import free_port
+from linefix.documents import examples
 from registration import RigidTransform
-from service.schemas import examples
 from tests.running import RunningService
 
 ROOM: Any = examples.MAP

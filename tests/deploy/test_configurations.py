@@ -18,8 +18,8 @@ import trustme
 from ruamel.yaml import YAML
 
 from examples.running import free_port
+from linefix.documents import examples
 from service.database_location import database_url
-from service.schemas import examples
 from service.settings import Settings
 from tests.running import JSON, RunningService, until
 from tests.service.issuing import key_lines

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 
 BODY = {"map": {"map_id": "room"}, "scan": {"segments": examples.SEEN}}
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from linefix.documents import examples
 from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
-from service.schemas import examples
 
 BOX = MapOutline(4, (-1.5, 0.0, 1.0, 1e5))
 # Small ones lie among the rows, large ones on pages of their own.

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import client_of
 
 WRITERS = 3

@@ -12,7 +12,7 @@ import numpy as np
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from service.work.warmup import room_ranges
 from tests.running import client_of, until
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.faults.replicas import Replicas, replicas
 from tests.running import client_of, until
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 
 CALLS = "fsync,fdatasync,unlink,unlinkat,sendto,sendmsg,write,writev"
 

@@ -7,11 +7,12 @@ from functools import partial
 
 from fastapi import APIRouter, Request, Response
 
+from linefix.documents import examples
+from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
+from linefix.documents.parts import InlineMap, StoredMap
+
 from ...admission.errors import DeadlinePassedError
 from ...parsing.reading import read_model
-from ...schemas import examples
-from ...schemas.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
-from ...schemas.parts import InlineMap, StoredMap
 from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
 from ...work.job import Done, Job
 from ..body_stage import read

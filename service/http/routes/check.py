@@ -9,15 +9,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
+from linefix.documents import examples
+from linefix.documents.checks import CheckAnswer
+from linefix.documents.parts import StoredMap
+from linefix.documents.requests import CheckRequest
 from map_quality import Sample
 
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
 from ...parsing.reading import read_model
-from ...schemas import examples
-from ...schemas.checks import CheckAnswer
-from ...schemas.parts import StoredMap
-from ...schemas.requests import CheckRequest
 from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
 from ..body_stage import read

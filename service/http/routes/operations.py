@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from ...schemas.encoding import encode
-from ...schemas.replies import Limits, Live, Version
+from linefix.documents.encoding import encode
+from linefix.documents.replies import Limits, Live, Version
+
 from ...version import VERSION
 from ..sending import json_response
 from ..services import services_of

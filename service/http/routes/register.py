@@ -6,10 +6,11 @@ from functools import partial
 
 from fastapi import APIRouter, Request, Response
 
+from linefix.documents import examples
+from linefix.documents.replies import RegisterAnswer
+from linefix.documents.requests import RegisterRequest
+
 from ...parsing.reading import read_model
-from ...schemas import examples
-from ...schemas.replies import RegisterAnswer
-from ...schemas.requests import RegisterRequest
 from ...work.registration import answer_registration
 from ..body_stage import read
 from ..exchange import begin_search

@@ -7,12 +7,13 @@ from functools import partial
 
 from fastapi import APIRouter, Request, Response
 
+from linefix.documents import examples
+from linefix.documents.parts import StoredMap
+from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
+
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
 from ...parsing.reading import read_model
-from ...schemas import examples
-from ...schemas.parts import StoredMap
-from ...schemas.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
 from ...work.job import Done, Job
 from ...work.updating import Progress, answer_apply, begin_update, take_steps, update_done
 from ..body_stage import read

@@ -6,10 +6,11 @@ from functools import partial
 
 from fastapi import APIRouter, Request, Response
 
+from linefix.documents import examples
+from linefix.documents.replies import VectorizeAnswer
+from linefix.documents.requests import VectorizeRequest
+
 from ...parsing.reading import read_model
-from ...schemas import examples
-from ...schemas.replies import VectorizeAnswer
-from ...schemas.requests import VectorizeRequest
 from ...work.scans import answer_vectorization
 from ..body_stage import read
 from ..exchange import begin_search

@@ -8,6 +8,7 @@ import pytest
 from pydantic import SecretStr
 from starlette.routing import compile_path
 
+from linefix.documents.errors import BodyTooLargeError
 from service.admission.entrance import Entrance, search_of
 from service.admission.errors import (
     ForeignHostError,
@@ -23,7 +24,6 @@ from service.admission.key_file import KeyFile
 from service.admission.keys import Keyring
 from service.admission.origins import Origins
 from service.admission.ticket import Ticket
-from service.schemas.errors import BodyTooLargeError
 from tests.service.issuing import key_lines
 
 from .gates import BlockedGate, gate_of, in_loop

@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from simulation import offices
 
 URL = "/v1/maps/analyzed:analyze"

@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from service.work.warmup import ROOM, room_ranges
 
 TURN = [-math.pi + math.tau * i / 720 for i in range(720)]

@@ -12,12 +12,12 @@ import orjson
 import pytest
 from starlette.requests import Request
 
+from linefix.documents import examples
+from linefix.documents.errors import BodyTooLargeError
 from service.admission.budget import ByteBudget
 from service.admission.errors import TooMuchHeldError
 from service.http.bodies import BodyReceiver
 from service.http.errors import BodyTooSlowError, EncodingError, MediaTypeError
-from service.schemas import examples
-from service.schemas.errors import BodyTooLargeError
 from tests.running import RunningService
 
 PACKED = {"content-encoding": "gzip"}

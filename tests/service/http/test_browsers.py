@@ -8,7 +8,7 @@ import httpx
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import JSON, RunningService
 
 MAP = orjson.dumps(examples.MAP)

@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.map_quality.check.drawn import THICK, centre_lines, faces, sampled
 
 URL = "/v1/maps/checked:check"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from service.settings import SettingsError, read_settings
 from tests.running import RunningService
 

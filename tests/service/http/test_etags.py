@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from starlette.requests import Request
 
+from linefix.documents.errors import InvalidRequestError
 from service.http.etags import demands_of, etag, is_conditional, is_unchanged
 from service.maps import Preconditions
-from service.schemas.errors import InvalidRequestError
 
 
 def request_of(*headers: tuple[str, str]) -> Request:

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from schemathesis import GenerationMode, checks
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, running
 from tests.service.importing.forms import SQUARE, TYPE, form, room_grid
 

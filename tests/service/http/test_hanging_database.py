@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import JSON, RunningService, until
 from tests.service.conftest import LOCAL, empty_database
 

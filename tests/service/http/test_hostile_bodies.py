@@ -14,7 +14,7 @@ import httpx
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import PATIENCE, RunningService, client_of, until
 from tests.service.parsing.bodies import large_map
 

@@ -19,7 +19,7 @@ from ezdxf.filemanagement import new
 from PIL import Image
 
 from formats import read_map
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, children_of, client_of, until
 from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
 

@@ -12,7 +12,7 @@ import httpx
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, children_of, is_running, until
 from tests.service.parsing.bodies import large_map
 from tests.service.searches import POST, searching, slow_to_index, store_hard_map

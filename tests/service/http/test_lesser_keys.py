@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, running
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing, key_lines
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.linefix.test_map_points import POSTS, ROOM, ROOMS, SCANNER, ranges
 
 from ..importing.forms import TYPE, form

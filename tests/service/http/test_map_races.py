@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, running
 from tests.service.conftest import KINDS, empty_database
 

@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 
 
 def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:

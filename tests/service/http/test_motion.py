@@ -9,8 +9,8 @@ import httpx
 import numpy as np
 import pytest
 
+from linefix.documents import examples
 from registration import RigidTransform
-from service.schemas import examples
 
 from .test_views import EXACT, HERE, pose_json, read_from
 

@@ -12,10 +12,10 @@ import httpx
 import pytest
 
 from association import ReasonCode, Status, WarningCode
+from linefix.documents import examples
 from map_quality import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
-from service.schemas import examples
 from service.thread_pool import Threads
 
 

@@ -12,7 +12,7 @@ import httpx
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, until
 from tests.service.searches import POST, searching, store_hard_map
 

@@ -8,14 +8,14 @@ import orjson
 import pytest
 
 from association import CancelledError
+from linefix.documents import errors as schemas
+from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
 from registration import InvalidArgumentError
 from service.admission import errors as admission
 from service.http import errors as http
 from service.http.problems import INTERNAL, KINDS, RAISED, TABLE, problem_of
 from service.maps import errors as maps
 from service.parsing import errors as parsing
-from service.schemas import errors as schemas
-from service.schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
 
 TREES = (admission.AdmissionError, http.HttpError, maps.StoreError, parsing.ParsingError, schemas.RequestError)
 

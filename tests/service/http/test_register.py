@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 
 
 def registered(client: httpx.Client, **parts: Any) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 import pytest
 
+from linefix.documents import examples
 from service.admission.grants import GUARDED, ROUTES, Role
-from service.schemas import examples
 from tests.running import RunningService, running, until
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing, key_lines
 

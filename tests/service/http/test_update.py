@@ -10,8 +10,8 @@ import httpx
 import numpy as np
 import pytest
 
+from linefix.documents import examples
 from registration import RigidTransform, Segments
-from service.schemas import examples
 from simulation import scan
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, box, segments
 

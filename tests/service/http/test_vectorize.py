@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas.requests import VectorizeOptions
+from linefix.documents.requests import VectorizeOptions
 from service.work.warmup import ROOM, room_ranges
 from vectorization import VectorizationOptions
 

@@ -9,8 +9,8 @@ import httpx
 import numpy as np
 import pytest
 
+from linefix.documents import examples
 from registration import RigidTransform
-from service.schemas import examples
 
 HERE = RigidTransform(1.0, 0.5, math.pi / 2)  # of the robot in the examples' room
 MOUNTS = (RigidTransform(0.3, 0.2, math.pi / 4), RigidTransform(-0.3, -0.2, -3.0 * math.pi / 4))

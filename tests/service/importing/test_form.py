@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from linefix.documents.errors import InvalidRequestError
 from service.importing.fields import options_of
 from service.importing.form import MOST_PARTS, read_form
-from service.schemas.errors import InvalidRequestError
 
 from .forms import TYPE, form
 

@@ -13,8 +13,8 @@ import ezdxf
 import numpy as np
 import pytest
 
+from linefix.documents.errors import InvalidRequestError
 from service.importing.reader import Bounds, read_files
-from service.schemas.errors import InvalidRequestError
 from tests.formats.test_logs import Recorder
 
 from .forms import SQUARE, TYPE, YAML, form, room_grid

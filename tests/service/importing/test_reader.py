@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from linefix.documents.errors import InvalidRequestError
 from service.importing.reader import Bounds, read_files
 from service.importing.scans import read_scans
-from service.schemas.errors import InvalidRequestError
 
 from .forms import SQUARE, TYPE, YAML, form
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from linefix.documents import examples
 from service.app import create_app
 from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import StoreAwayError
-from service.schemas import examples
 from service.settings import Settings
 from tests.running import RunningService, children_of, until
 

@@ -17,10 +17,10 @@ from typing import Any
 import psycopg
 import pytest
 
+from linefix.documents import examples
 from service.database_location import database_url
 from service.maps import MapStore
 from service.maps.errors import UnknownMapError
-from service.schemas import examples
 from tests.running import RunningService
 
 from .stores import ANY, BOX, alter, opened

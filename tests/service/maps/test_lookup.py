@@ -11,14 +11,14 @@ import orjson
 import pytest
 
 from association import Deadline, InvalidMapError
+from linefix.documents import examples
+from linefix.documents.parts import InlineMap, MapDocument, StoredMap
 from registration import InputError
 from service.database_location import database_url
 from service.maps import CachedMap, IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.errors import BusyStoreError, UnknownMapError
 from service.maps.lookup import OVERHEAD, MapLookup, outline_of
 from service.parsing.parser_process import LARGE, ParserProcess
-from service.schemas import examples
-from service.schemas.parts import InlineMap, MapDocument, StoredMap
 from service.telemetry.metrics import Metrics
 
 

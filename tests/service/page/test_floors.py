@@ -11,7 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService
 
 from .plan import Plan, box_of, verdict

@@ -7,12 +7,12 @@ from dataclasses import replace
 import orjson
 import pytest
 
+from linefix.documents import examples
+from linefix.documents.errors import InvalidRequestError, TooManyError
+from linefix.documents.parts import MapDocument
+from linefix.documents.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
 from service.parsing.errors import NotJsonError
 from service.parsing.reading import parse, read_batch, read_map, read_model, read_stored
-from service.schemas import examples
-from service.schemas.errors import InvalidRequestError, TooManyError
-from service.schemas.parts import MapDocument
-from service.schemas.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
 
 from .bodies import LIMITS
 

@@ -7,10 +7,10 @@ import tracemalloc
 
 import pytest
 
+from linefix.documents.errors import BodyTooLargeError
 from service.admission.errors import TooMuchHeldError
 from service.parsing.errors import NotJsonError
 from service.parsing.unpacking import unpack as unpack_counted
-from service.schemas.errors import BodyTooLargeError
 
 MEGABYTE = 1 << 20
 

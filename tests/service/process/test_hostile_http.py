@@ -11,7 +11,7 @@ from contextlib import suppress
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import PATIENCE, RunningService
 
 HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"

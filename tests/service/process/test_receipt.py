@@ -12,7 +12,7 @@ from contextlib import suppress
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, running
 
 

@@ -11,7 +11,7 @@ import httpx
 import pytest
 import trustme
 
-from service.schemas import examples
+from linefix.documents import examples
 from service.settings import SettingsError, read_settings
 from tests.running import JSON, RunningService, until
 

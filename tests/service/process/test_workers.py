@@ -14,7 +14,7 @@ import httpx
 import orjson
 import pytest
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, children_of, client_of, is_running, running, until
 from tests.service.searches import searched_briefly, searched_for, store_hard_map
 

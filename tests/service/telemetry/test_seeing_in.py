@@ -9,7 +9,7 @@ from pathlib import Path
 
 import httpx
 
-from service.schemas import examples
+from linefix.documents import examples
 from tests.running import RunningService, until
 
 DASHBOARD = json.loads((Path(__file__).parents[3] / "deploy" / "grafana.json").read_text())

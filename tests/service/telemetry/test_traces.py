@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from examples.running import free_port
-from service.schemas import examples
+from linefix.documents import examples
 from service.telemetry.traces import queued, stage, traces_of_environment
 from tests.running import RunningService, running, until
 

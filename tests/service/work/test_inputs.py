@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from association import PARTS, AssociationOptions
-from service.schemas.parts import SearchOptions
+from linefix.documents.parts import SearchOptions
 from service.work.inputs import association_options_of
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from service.schemas import examples
+from linefix.documents import examples
 from service.work.warmup import warm_up
 from tests.running import until
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from service.schemas.faults import faults_of
-from service.schemas.requests import AssociateRequest, VectorizeRequest
+from linefix.documents.faults import faults_of
+from linefix.documents.requests import AssociateRequest, VectorizeRequest
 
 SCAN = {"segments": [[0.0, 0.0, 1.0, 0.0]]}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.schemas.encoding import BLOCK, NotFiniteError, encode, encode_list
+from linefix.documents.encoding import BLOCK, NotFiniteError, encode, encode_list
 
 
 @pytest.mark.parametrize("answer", [np.nan, {"a": [1.0, {"b": np.inf}]}, {"a": np.array([[1.0, -np.inf]])}, (np.nan,)])

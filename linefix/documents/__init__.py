@@ -1,0 +1,1 @@
+"""Requests and answers as documents: each declared once, for HTTP, files and the command line."""
