@@ -21,14 +21,14 @@ def key(
         list[Role] | None, typer.Option(help="Role of the key; repeat for more roles. Default: all.")
     ] = None,
     maps: Annotated[
-        str,
+        str | None,
         typer.Option(metavar="PREFIX", help="Prefix of the ids of the maps that the key may use. Default: all maps."),
-    ] = "",
+    ] = None,
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
     made = secrets.token_urlsafe(32)
     described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}
-    if maps:
+    if maps is not None:
         described["maps"] = maps
     # A string or a list of them is the same in TOML as in JSON.
     lines = ["[[key]]", *(f"{field} = {orjson.dumps(value).decode()}" for field, value in described.items())]

@@ -61,9 +61,6 @@ logger = logging.getLogger("linefix")
 Started = Callable[[Services], None]
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
-FIRST_KEYS_SECONDS = (
-    12.0  # that a start waits for the issuer's keys: as long as a fetch of them may take, and some more
-)
 PROGRESS_SECONDS = 5.0  # between two log lines with the progress of compiling
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
@@ -128,7 +125,7 @@ def _services(settings: Settings) -> Services:
     parser = ParserProcess()
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
-    keyring = _keyring(settings)
+    keyring = Keyring(settings.keys, None if settings.keys_file is None else KeyFile(settings.keys_file))
     origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
@@ -166,20 +163,8 @@ def _services(settings: Settings) -> Services:
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
         key_threads=Threads(1, "keys"),
-        issuer_threads=Threads(1, "issuer"),
         traces=traces_of_environment(),
     )
-
-
-def _keyring(settings: Settings) -> Keyring:
-    """Return the keyring that the settings describe."""
-    file = None if settings.keys_file is None else KeyFile(settings.keys_file)
-    if settings.issuer is None:
-        return Keyring(settings.keys, file)
-    # Imported where there is an issuer: cryptography takes some megabytes.
-    from .admission.tokens import Tokens
-
-    return Keyring(settings.keys, file, Tokens(settings.issuer))
 
 
 def _budget(settings: Settings, most: int) -> ByteBudget:
@@ -191,10 +176,7 @@ def _budget(settings: Settings, most: int) -> ByteBudget:
 async def _lifespan(app: FastAPI, services: Services, started: Started | None) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
-    following = [
-        asyncio.create_task(_follow(services.key_threads, services.keyring.refresh)),
-        asyncio.create_task(_follow(services.issuer_threads, services.keyring.refresh_tokens)),
-    ]
+    following = asyncio.create_task(_follow(services.key_threads, services.keyring.refresh))
     if started is not None:
         started(services)
     if services.settings.workers > 1:  # a request must not come to one of them that has to refuse it
@@ -204,8 +186,7 @@ async def _lifespan(app: FastAPI, services: Services, started: Started | None) -
     finally:
         getting_ready.cancel()
         refreshing.cancel()
-        for task in following:
-            task.cancel()
+        following.cancel()
         services.close()
 
 
@@ -233,7 +214,7 @@ async def _prepare(services: Services) -> None:
     await threads.run(remove_abandoned)
     if not is_complete():
         await _compile(services)
-    await asyncio.gather(threads.run(warm_up), threads.run(parser.start), _fetch_first_keys(services))
+    await asyncio.gather(threads.run(warm_up), threads.run(parser.start))
     # Objects made until now live as long as the process: the garbage collector need not look through them, ever. It has
     # been off since the process began, which saves a fifth of the start; hardly any of these objects is garbage.
     gc.freeze()
@@ -241,13 +222,6 @@ async def _prepare(services: Services) -> None:
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")
-
-
-async def _fetch_first_keys(services: Services) -> None:
-    """Wait for the keys of the issuer, but not longer than a fetch may take: other keys are checked without them."""
-    with suppress(Exception):  # `_follow` tries again, and logs
-        async with asyncio.timeout(FIRST_KEYS_SECONDS):
-            await services.issuer_threads.run(services.keyring.refresh_tokens)
 
 
 async def _compile(services: Services) -> None:

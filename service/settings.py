@@ -10,7 +10,6 @@ import ssl
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import urlsplit
 
 from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
@@ -19,7 +18,6 @@ from sqlalchemy import URL
 from linefix.documents.limits import Limits
 
 from .admission.key_file import KeyFileError, read_keys
-from .admission.keys import ALGORITHMS, Issuer
 from .database_location import database_url
 
 Finite = Annotated[float, AllowInfNan(False)]
@@ -30,10 +28,6 @@ _METAVARS = {
     "data_dir": "DIRECTORY",
     "database_url": "URL",
     "keys_file": "PATH",
-    "jwt_issuer": "ISSUER",
-    "jwt_audience": "AUDIENCE",
-    "jwt_keys": "PATH-OR-URL",
-    "jwt_algorithms": "NAME,...",
     "hosts": "NAME,...",
     "cors_origins": "ORIGIN,...",
     "tls_cert": "PATH",
@@ -88,15 +82,6 @@ class Settings(BaseSettings):
     )
     keys_file: Path | None = Field(
         None, description="file with keys and roles, or folder of such files; a change applies within 2 s"
-    )
-    jwt_issuer: str | None = Field(None, description="issuer whose JSON Web Tokens are accepted in addition to keys")
-    jwt_audience: str | None = Field(None, description="audience that these tokens must have")
-    jwt_keys: str | None = Field(None, description="path or https URL of the JSON Web Key Set of this issuer")
-    jwt_algorithms: Annotated[tuple[str, ...], NoDecode] = Field(
-        ("RS256", "ES256", "EdDSA"), description="accepted signature algorithms, comma separated"
-    )
-    jwt_leeway_s: Finite = Field(
-        30.0, ge=0.0, le=600.0, description="seconds by which the clock of the issuer may differ"
     )
     hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         (), description="without keys: accepted host names in the Host header, comma separated"
@@ -166,7 +151,7 @@ class Settings(BaseSettings):
         description="level of the log on stderr: debug, info, warning or error",
     )
 
-    @field_validator("keys", "hosts", "jwt_algorithms", "cors_origins", mode="before")
+    @field_validator("keys", "hosts", "cors_origins", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         items = value.split(",") if isinstance(value, str) else value
@@ -202,14 +187,7 @@ class Settings(BaseSettings):
     @property
     def guarded(self) -> bool:
         """Return whether the service requires keys."""
-        return bool(self.keys) or self.keys_file is not None or self.jwt_issuer is not None
-
-    @property
-    def issuer(self) -> Issuer | None:
-        """The issuer whose tokens are accepted."""
-        if self.jwt_issuer is None or self.jwt_audience is None or self.jwt_keys is None:
-            return None
-        return Issuer(self.jwt_issuer, self.jwt_audience, self.jwt_keys, self.jwt_algorithms, self.jwt_leeway_s)
+        return bool(self.keys) or self.keys_file is not None
 
     @property
     def url(self) -> URL:
@@ -305,21 +283,6 @@ def _require_usable_keys(settings: Settings) -> None:
             read_keys(settings.keys_file)
         except KeyFileError as error:
             raise SettingsError(f"keys_file: {error}") from None
-    said = [value is not None for value in (settings.jwt_issuer, settings.jwt_audience, settings.jwt_keys)]
-    if any(said) and not all(said):
-        raise SettingsError(
-            f"jwt_issuer, jwt_audience, jwt_keys: expected all three or none, found {sum(said)}; set the missing ones"
-        )
-    unknown = set(settings.jwt_algorithms) - set(ALGORITHMS)
-    if unknown or not settings.jwt_algorithms:
-        raise SettingsError(
-            f"jwt_algorithms: expected some of {', '.join(ALGORITHMS)}, found {', '.join(sorted(unknown)) or 'none'}"
-        )
-    where = urlsplit(settings.jwt_keys or "")
-    if where.scheme and where.scheme != "https" and not (where.scheme == "http" and is_loopback(where.hostname or "")):
-        raise SettingsError(
-            f"jwt_keys: expected a path, or a URL that begins with https, found one that begins with {where.scheme}"
-        )
 
 
 def _require_usable_certificate(settings: Settings) -> None:

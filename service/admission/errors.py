@@ -35,7 +35,7 @@ class UnknownKeyError(AdmissionError):
     """A key that is none of the service's."""
 
     def __init__(self) -> None:
-        super().__init__("the service does not know this key, or its token is expired; send a valid one")
+        super().__init__("the service does not know this key; send a valid one")
 
 
 class MissingRoleError(AdmissionError):

@@ -6,7 +6,7 @@
     name = "robots"
     sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
     roles = ["associate"]
-    maps = "hq-"          # how the ids of its maps begin; left out: all of them
+    maps = "hq-"          # how the ids of its maps begin; left out: all of them. Empty is refused
 
 `linefix key robots` makes a key and these lines.
 """
@@ -38,7 +38,7 @@ class Key(BaseModel):
     name: str = Field(min_length=1, max_length=64)
     sha256: Digest
     roles: frozenset[Role] = Field(EVERY_ROLE, min_length=1)
-    maps: str = Field("", max_length=128, pattern="^[A-Za-z0-9._-]*$")
+    maps: str = Field("", min_length=1, max_length=128, pattern="^[A-Za-z0-9._-]+$")
 
 
 class _File(BaseModel):

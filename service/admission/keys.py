@@ -1,4 +1,4 @@
-"""Identification of callers: by a key, by a token, or by an address where the service has neither."""
+"""Identification of callers: by a key, or by an address where the service has none."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import hashlib
 import hmac
 import ipaddress
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 from pydantic import SecretStr
 
@@ -18,63 +16,24 @@ from .grants import Grant
 from .key_file import KeyFile
 
 Client = tuple[str, int] | None
-# The key that checks such a signature cannot make one; "none" and shared secrets are not among them.
-ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")
-
-
-@dataclass(frozen=True, slots=True)
-class Issuer:
-    """An issuer whose tokens are accepted.
-
-    Attributes
-    ----------
-    name, audience : str
-        Required values of the claims `iss` and `aud`.
-    keys : str
-        Path or URL of its JSON Web Key Set.
-    algorithms : tuple of str
-        Of `ALGORITHMS`; the algorithm that a token names does not count.
-    leeway : float
-        Seconds that its clock and this one may differ.
-    """
-
-    name: str
-    audience: str
-    keys: str
-    algorithms: tuple[str, ...] = ("RS256", "ES256", "EdDSA")
-    leeway: float = 30.0
-
-
-class TokenSource(Protocol):
-    """A checker of tokens."""
-
-    def grant(self, token: bytes) -> Grant:
-        """Return the permissions of a token; raises `UnknownKeyError` where it is none."""
-
-    def refresh(self) -> None:
-        """Look for new keys of the issuer; off the event loop."""
 
 
 class Keyring:
-    """The keys that are known, as digests, and the issuer whose tokens are.
+    """The keys that are known, as digests.
 
     Parameters
     ----------
     keys : sequence of SecretStr
         Keys with every permission.
     file : KeyFile, or None
-    tokens : TokenSource, or None
-        Without all three every caller is let in.
+        Without both every caller is let in.
     """
 
-    def __init__(
-        self, keys: Sequence[SecretStr], file: KeyFile | None = None, tokens: TokenSource | None = None
-    ) -> None:
+    def __init__(self, keys: Sequence[SecretStr], file: KeyFile | None = None) -> None:
         digests = (digest_of(key.get_secret_value().encode()) for key in keys)
         self._whole = {digest: Grant(digest) for digest in digests}
         self._file = file
-        self._tokens = tokens
-        self._guarded = bool(keys) or file is not None or tokens is not None
+        self._guarded = bool(keys) or file is not None
 
     def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
         """Return the permissions of a request; where the service has no keys, all, for the address it comes from.
@@ -108,19 +67,12 @@ class Keyring:
         found = [grant for grant in known if hmac.compare_digest(digest, grant.holder or b"")]
         if found:
             return found[0]
-        if self._tokens is not None and key.count(b".") == 2:
-            return self._tokens.grant(key)
         raise UnknownKeyError
 
     def refresh(self) -> None:
         """Look for keys of the file that came or went; off the event loop."""
         if self._file is not None:
             self._file.refresh()
-
-    def refresh_tokens(self) -> None:
-        """Look for new keys of the issuer, in another thread than `refresh`: a slow server holds up this alone."""
-        if self._tokens is not None:
-            self._tokens.refresh()
 
 
 def digest_of(key: bytes) -> bytes:

@@ -57,7 +57,7 @@ class Services:
         Slot in which maps of other tools are read, one at a time: each may take much memory.
     import_bounds : Bounds
         That reading one is held to.
-    parse_threads, store_threads, key_threads, issuer_threads : Threads
+    parse_threads, store_threads, key_threads : Threads
     traces : Traces, or None
         None where no traces are requested.
     """
@@ -85,7 +85,6 @@ class Services:
     parse_threads: Threads
     store_threads: Threads
     key_threads: Threads
-    issuer_threads: Threads
     traces: Traces | None = None
 
     @property
@@ -104,7 +103,7 @@ class Services:
         for gate in self._gates:
             gate.close()
         self.parser.close()
-        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.issuer_threads, self.probe):
+        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
             threads.close()
         self.store.close()
         if self.traces is not None:

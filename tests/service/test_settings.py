@@ -142,20 +142,3 @@ def test_a_key_is_no_argument(arguments: list[str]) -> None:
     with pytest.raises(SettingsError, match="LINEFIX_KEYS") as caught:
         read_settings(arguments)
     assert "sesame" not in str(caught.value)
-
-
-def test_an_issuer_is_named_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LINEFIX_JWT_ISSUER", "https://issuer.example")
-    with pytest.raises(SettingsError, match="all three or none"):
-        read_settings([])
-    monkeypatch.setenv("LINEFIX_JWT_AUDIENCE", "linefix")
-    for keys, message in (("http://issuer.example/keys", "https"), ("ftp://issuer.example/keys", "https")):
-        monkeypatch.setenv("LINEFIX_JWT_KEYS", keys)
-        with pytest.raises(SettingsError, match=message):
-            read_settings([])
-    monkeypatch.setenv("LINEFIX_JWT_KEYS", "https://issuer.example/keys")
-    assert read_settings(["--host", "0.0.0.0"]).guarded
-    for algorithms in ("HS256", "none", "RS256,HS256"):
-        monkeypatch.setenv("LINEFIX_JWT_ALGORITHMS", algorithms)
-        with pytest.raises(SettingsError, match="jwt_algorithms"):
-            read_settings([])

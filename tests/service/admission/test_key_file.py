@@ -39,7 +39,10 @@ def test_a_byte_order_mark_is_no_part_of_a_key(tmp_path: Path) -> None:
         read_keys(path)
 
 
-@pytest.mark.parametrize("arguments", [["", "--maps", "x"], ["robots", "--maps", "hq/"], ["robots", "--role", "all"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["", "--maps", "x"], ["robots", "--maps", ""], ["robots", "--maps", "hq/"], ["robots", "--role", "all"]],
+)
 def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     assert run(["key", *arguments]) == 2
     assert capsys.readouterr().out == ""
@@ -53,6 +56,7 @@ def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], argum
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = ["all"]', "roles"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = []', "roles"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmaps = "hq/"', "maps"),
+        (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmaps = ""', "maps"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmap = "hq-"', "map"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmaps = "{"x" * 129}"', "maps"),
         (f'[[key]]\nname = ""\nsha256 = "{DIGEST}"', "name"),
