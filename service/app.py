@@ -61,7 +61,7 @@ logger = logging.getLogger("linefix")
 Started = Callable[[Services], None]
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
-PROGRESS_SECONDS = 5.0  # between two log lines with the progress of compiling
+PROGRESS_SECONDS = 2.0  # between two counts of the compiled kernels
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
@@ -179,7 +179,7 @@ async def _lifespan(app: FastAPI, services: Services, started: Started | None) -
     following = asyncio.create_task(_follow(services.key_threads, services.keyring.refresh))
     if started is not None:
         started(services)
-    if services.settings.workers > 1:  # a request must not come to one of them that has to refuse it
+    if services.settings.workers > 1 or is_complete():  # no request comes to a process that has to refuse it
         await getting_ready
     try:
         yield {KEY: services}
@@ -227,21 +227,22 @@ async def _prepare(services: Services) -> None:
 async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and log the progress."""
     logger.info("compiling the kernels, which takes one to two minutes; later starts load them from the cache")
-    services.readiness.compiled = compiled_fraction
-    logging_progress = asyncio.create_task(_log_progress())
+    following = asyncio.create_task(_follow_compiling(services))
     try:
         with suppress(ParserEndedError):  # if that process ends early, this one compiles the missing kernels
             await services.parse_threads.run(partial(services.parser.call, compile_kernels))
     finally:
-        logging_progress.cancel()
+        following.cancel()
     services.parser.close()
     services.readiness.compiled = None
 
 
-async def _log_progress() -> None:
+async def _follow_compiling(services: Services) -> None:
+    """Count the compiled kernels now and then, in a thread: refusals and the log report the count."""
     while True:
+        services.readiness.compiled = fraction = await services.store_threads.run(compiled_fraction)
+        logger.info("compiling", extra={"share": round(fraction, 2)})
         await asyncio.sleep(PROGRESS_SECONDS)
-        logger.info("compiling", extra={"share": round(compiled_fraction(), 2)})
 
 
 async def _follow(threads: Threads, refresh: Callable[[], None]) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from .errors import NotReadyError
 
 
@@ -16,14 +14,14 @@ class Readiness:
         True when the kernels are loaded.
     draining : bool
         True when the service is to end.
-    compiled : callable, or None
-        Returns the compiled fraction of the kernels, 0 to 1; None before and after the compilation.
+    compiled : float or None
+        Compiled fraction of the kernels, 0 to 1; None before and after the compilation.
     """
 
     def __init__(self) -> None:
         self.warm = False
         self.draining = False
-        self.compiled: Callable[[], float] | None = None
+        self.compiled: float | None = None
 
     @property
     def takes_requests(self) -> bool:
@@ -36,9 +34,7 @@ class Readiness:
             return
         if self.compiled is None:
             raise NotReadyError("the kernels are being loaded; send the request again later")
-        raise NotReadyError(
-            f"the kernels are being compiled, {self.compiled():.0%} so far; send the request again later"
-        )
+        raise NotReadyError(f"the kernels are being compiled, {self.compiled:.0%} so far; send the request again later")
 
     def require_all(self) -> None:
         """Raise `NotReadyError` when requests should go elsewhere."""

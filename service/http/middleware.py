@@ -105,7 +105,8 @@ class RequestMiddleware:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                ends = not await intake.drop_rest(most_bytes)  # the server would read on without end
+                # The server would read on without end; and one that drains has no idle connections when it closes.
+                ends = not await intake.drop_rest(most_bytes) or self._services.readiness.draining
                 _add_headers(message, state.request_id, close=ends)
             await send(message)
 

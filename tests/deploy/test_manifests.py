@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -86,14 +87,24 @@ def test_a_pod_has_no_right_that_it_does_not_need() -> None:
     }
 
 
-def test_a_pod_has_memory_for_an_import_next_to_the_service() -> None:
-    """Together beyond the limit, the system ends the pod with all its searches, and one client can have that again."""
+def test_every_deployment_has_memory_for_an_import_next_to_the_service() -> None:
+    """Together beyond the limit, the system ends the service with all its searches, again and again."""
     container = manifest("Deployment")["spec"]["template"]["spec"]["containers"][0]
-    told = {one["name"]: one.get("value") for one in container["env"]}
-    reader = int(told.get("LINEFIX_MAX_IMPORT_BYTES") or Settings.model_fields["max_import_bytes"].default)
-    limit = container["resources"]["limits"]["memory"]
-    assert limit.endswith("Gi")
-    assert int(limit.removesuffix("Gi")) * 2**30 >= SERVICE_BYTES + reader
+    limits = {
+        container["resources"]["limits"]["memory"].removesuffix("Gi"),
+        compose()["services"]["linefix"]["deploy"]["resources"]["limits"]["memory"].removesuffix("g"),
+        yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]["linefix"]["mem_limit"].removesuffix("g"),
+        *re.findall(r"^MemoryMax=(\d+)G$", (DEPLOY / "linefix.service").read_text(), re.MULTILINE),
+    }
+    assert limits == {"2"}
+    assert SERVICE_BYTES + Settings.model_fields["max_import_bytes"].default <= 2 * 2**30
+
+
+def test_counts_are_for_the_monitoring_alone() -> None:
+    """And HTTP for the proxy: a policy has no paths."""
+    (rule,) = manifest("NetworkPolicy")["spec"]["ingress"]
+    named = [one["namespaceSelector"]["matchLabels"]["kubernetes.io/metadata.name"] for one in rule["from"]]
+    assert named == ["ingress-nginx", "monitoring"]
 
 
 def test_a_pod_has_time_to_end() -> None:
@@ -132,7 +143,7 @@ def test_compose_file_is_valid() -> None:
 def test_the_proxy_does_what_was_tested(line: str) -> None:
     """By tests/faults/test_replicas.py, with a file of its own."""
     deployed = [text for text in (REPLICAS / "nginx.conf").read_text().splitlines() if line in text]
-    tested = [text.replace("{repeats}", "non_idempotent") for text in CONF.splitlines() if line in text]
+    tested = [text for text in CONF.splitlines() if line in text]
     if line == "max_fails=0;":
         assert "max_fails=0;" in deployed[0]
     else:

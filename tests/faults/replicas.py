@@ -22,7 +22,7 @@ from tests.service.conftest import LOCAL, empty_database
 
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")
 
-# As deploy/compose.yaml has it, without root: a request that a replica cannot answer goes to the next one, once each.
+# As deploy/replicas/nginx.conf has it, without root.
 CONF = """
 daemon off;
 worker_processes 1;
@@ -49,8 +49,8 @@ http {{
       proxy_set_header Connection "";
       proxy_set_header Host $host;
       proxy_connect_timeout 1s;
-      proxy_next_upstream error timeout http_503 {repeats};
-      proxy_next_upstream_tries 3;
+      proxy_next_upstream error timeout http_503;
+      proxy_next_upstream_tries 2;
     }}
   }}
 }}
@@ -160,7 +160,7 @@ def _proxy(folder: Path, services: list[RunningService]) -> Iterator[str]:
     # No replica is ever left out: if all answer 503, clients get this 503, not a 502.
     servers = " ".join(f"server 127.0.0.1:{one.port} max_fails=0;" for one in services)
     conf = folder / "nginx.conf"
-    conf.write_text(CONF.format(folder=folder, servers=servers, port=port, repeats="non_idempotent"))
+    conf.write_text(CONF.format(folder=folder, servers=servers, port=port))
     process = subprocess.Popen([str(NGINX), "-c", str(conf), "-p", str(folder), "-e", str(folder / "error.log")])
     try:
         url = f"http://127.0.0.1:{port}"

@@ -11,7 +11,7 @@ from service.admission.readiness import Readiness
 def test_it_takes_requests_from_warm_until_it_goes_down() -> None:
     readiness = Readiness()
     assert not readiness.takes_requests
-    for compiled, told in ((None, "loaded"), (lambda: 0.613, "compiled, 61% so far")):
+    for compiled, told in ((None, "loaded"), (0.613, "compiled, 61% so far")):
         readiness.compiled = compiled
         for require in (readiness.require_warm, readiness.require_all):
             with pytest.raises(NotReadyError, match=told):
