@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from .drawings.csv_and_json import read_csv, read_json
+from .drawings.csv_table import read_csv
 from .drawings.drawing import Drawing
 from .drawings.dxf import read_dxf
 from .drawings.geojson import read_geojson
+from .drawings.own_json import read_json
 from .drawings.svg import read_svg
 from .drawings.walls.to_map import to_map
-from .errors import MalformedFileError, UnsupportedFormatError
+from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError
 from .files import ending_of, name_of
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
@@ -66,6 +67,7 @@ def read_map(
     """
     file = Path(path)
     suffix = file.suffix.lower()
+    _require_use(options, suffix)
     if suffix in (".yaml", ".yml"):
         return _read_map_server(file, options, pictures)
     if is_bag(file):
@@ -81,10 +83,22 @@ def read_map(
     )
 
 
+def _require_use(options: ImportOptions, suffix: str) -> None:
+    """Refuse an option that would say nothing of a file: a floor of a grid, the surface of a drawing."""
+    drawing = suffix in DRAWINGS
+    idle = {"surface": drawing, "where": not drawing or suffix == ".json", "level": not drawing or suffix == ".json"}
+    for name, is_idle in idle.items():
+        if is_idle and getattr(options, name) not in (None, ()):
+            what = "drawing" if name == "surface" else "grid or a map of segments"
+            raise InvalidOptionError(
+                f"found a value, but the file is a {what}, which has no {name}; omit it", argument=name
+            )
+
+
 def _read_map_server(file: Path, options: ImportOptions, pictures: Mapping[str, Path] | None) -> ImportedMap:
     notes = Notes()
     grid, files = read_grid(file, options, notes, pictures)
-    line_map = _from_grid(grid, notes, files[0], "map")
+    line_map = _from_grid(grid, notes, files[0], "map", options.surface)
     return ImportedMap(line_map, notes.report("map_server", files), picture_of(grid))
 
 
@@ -92,7 +106,7 @@ def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
     notes, name = Notes(), name_of(file)
     found = read_bag_grid(file, options.topic, notes)
     try:
-        line_map = _from_grid(found.grid, notes, name, found.frame)
+        line_map = _from_grid(found.grid, notes, name, found.frame, options.surface)
     except MalformedFileError as error:
         if not found.costmap:
             raise
@@ -123,8 +137,8 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
     return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)), picture_of(grid))
 
 
-def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
-    faces = find_faces(grid, notes, name)
+def _from_grid(grid: Grid, notes: Notes, name: str, frame: str, surface: float | None = None) -> LineMap:
+    faces = find_faces(grid, notes, name, surface)
     notes.add_read("segments", "faces of walls", len(faces.segments))
     sigma = SURFACE_SIGMA * grid.resolution
     notes.add_assumed("sigma", f"sigma of the walls is assumed to be {sigma:g} m, half a cell")

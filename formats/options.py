@@ -54,6 +54,13 @@ class ImportOptions:
     unknown : int, "none" or None
         Grey value of the unknown cells in the picture of a grid, 0 to 255; ``none``: no opaque cell is unknown; None:
         found from the picture.
+    where : tuple of str
+        Properties of entities to read, as ``property=value``, the value a pattern. Values of one property are
+        alternatives, several properties must all fit. Empty: all but those that no laser sees, such as doors.
+    level : str or None
+        Floor of a drawing that has several, as it names it, or the height of its lines in metres.
+    surface : float or None
+        How far behind the front of the occupied cells of a grid the surface of walls lies, cells, 0 to 10; None: found.
 
     Raises
     ------
@@ -70,6 +77,9 @@ class ImportOptions:
     local_metres: bool = False
     topic: str | None = None
     unknown: int | Literal["none"] | None = None
+    where: tuple[str, ...] = ()
+    level: str | None = None
+    surface: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.units, str) and self.units not in UNITS:
@@ -88,6 +98,11 @@ class ImportOptions:
             raise InvalidOptionError(
                 f"expected none, or a grey value from 0 to 255, found {self.unknown!r}", argument="unknown"
             )
+        if self.surface is not None and not 0.0 <= self.surface <= 10.0:
+            raise InvalidOptionError(f"expected from 0 to 10 cells, found {self.surface!r}", argument="surface")
+        for one in self.where:
+            if not one.partition("=")[0].strip() or "=" not in one:
+                raise InvalidOptionError("expected property=value, found none", argument="where")
         for place in self.inside:
             if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
                 found = "one that is too large or not finite" if len(place) == 2 else f"{len(place)} numbers"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -104,3 +105,14 @@ def listed(names: Iterable[str]) -> str:
     first, *others = dict.fromkeys(names)
     named = [shown(name) for name in (first, *others[: MAX_NAMED - 1])]
     return ", ".join(named) + (" ..." if len(others) >= MAX_NAMED else "")
+
+
+def listed_counts(counts: Counter[str]) -> str:
+    """Return names of a file with their counts in one line, the most frequent first, the first few of many.
+
+    A single name is without its count, which its note has.
+    """
+    if len(counts) == 1:
+        return shown(next(iter(counts)))
+    named = [f"{shown(name)} ({count})" for name, count in counts.most_common(MAX_NAMED)]
+    return ", ".join(named) + (" ..." if len(counts) > MAX_NAMED else "")

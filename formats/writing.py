@@ -13,7 +13,7 @@ import orjson
 from ezdxf import units
 from ezdxf.filemanagement import new
 
-from .drawings.csv_and_json import COLUMNS
+from .drawings.csv_table import COLUMNS
 from .drawings.dxf import FREE_LEFT
 from .drawings.geojson import OWN
 from .drawings.svg import METRES, NAMESPACE, ORIENTED

@@ -41,6 +41,23 @@ class SaidOfFile:
         list[str] | None,
         typer.Option(metavar="PATTERN", help="Layers of a drawing to read, such as *WALL*; repeat for more patterns."),
     ] = None
+    where: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PROPERTY=VALUE",
+            help="Entities of a drawing to read, by a property, such as indoor=wall; repeat for more.",
+        ),
+    ] = None
+    level: Annotated[str | None, typer.Option(metavar="NAME", help="Floor of a drawing that has several levels.")] = (
+        None
+    )
+    surface: Annotated[
+        float | None,
+        typer.Option(
+            metavar="CELLS",
+            help="Distance of wall surfaces behind the front of the occupied cells of a grid. Default: detected.",
+        ),
+    ] = None
     point: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -92,6 +109,9 @@ class SaidOfFile:
             self.local_metres,
             self.topic,
             unknown,
+            tuple(self.where or ()),
+            self.level,
+            self.surface,
         )
 
     @property
@@ -105,9 +125,11 @@ class SaidOfFile:
             "local_metres": "true" if self.local_metres else None,
             "topic": self.topic,
             "unknown": self.unknown,
+            "level": self.level,
+            "surface": self.surface,
         }
         found: dict[str, list[str]] = {name: [str(value)] for name, value in once.items() if value is not None}
-        found |= {"layers": self.layers} if self.layers else {}
+        found |= {name: values for name, values in (("layers", self.layers), ("where", self.where)) if values}
         found |= {"point": [f"{self.point[0]} {self.point[1]}"]} if self.point else {}
         return found
 

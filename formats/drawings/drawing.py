@@ -2,17 +2,53 @@
 
 from __future__ import annotations
 
-import fnmatch
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_SEGMENTS, MAX_UNITS
-from ..report import Notes, shown
+from ..options import DEFAULT_OPTIONS, ImportOptions
+from ..report import Notes, listed_counts, shown
+from .selection import excluded_by, levels_of, matches
 
 Floats = NDArray[np.float64]
+
+FLAT, STEEP = 1e-3, 0.05  # of the greater extent in the plane: how narrow and how high a section is
+LEFT_OUT = {
+    "other_layer": "entities on layers that the option layers excludes",
+    "other_value": "entities that the option where excludes",
+    "not_seen": "entities that no laser sees; set the option where to read them",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polyline:
+    """Lines that belong together.
+
+    Attributes
+    ----------
+    ends : (k, 4)
+        Units of the drawing.
+    width : float
+        Units of the drawing; 0 where it has none.
+    layer : str
+        Empty where it has none.
+    levels : tuple of str
+        Floors that it is on, as the file names them.
+    heights : (float, float)
+        Least and greatest z, units of the drawing.
+    """
+
+    ends: Floats
+    width: float = 0.0
+    layer: str = ""
+    levels: tuple[str, ...] = ()
+    heights: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -24,9 +60,9 @@ class Drawing:
     name : str
         Of the file, for errors and reports.
     format : str
-    layers : tuple of str
-        Patterns of the layers that are wanted; empty: all.
     notes : Notes
+    options : ImportOptions
+        Layers and properties that are wanted.
     metres : float or None
         Per unit of the drawing; None where it does not say.
     oriented : bool
@@ -37,18 +73,13 @@ class Drawing:
         Objects too small for a wall, units of the drawing.
     points_sigma : float or None
         As in `LineMap`.
-    segments : list of (k, 4)
-        The lines so far, units of the drawing.
-    widths : list of float
-        Of each polyline, units of the drawing; 0 where it has none.
-    layer_names : list of str
-        Of each polyline; empty where it has none.
+    polylines : list of Polyline
     """
 
     name: str
     format: str
-    layers: tuple[str, ...]
     notes: Notes
+    options: ImportOptions = DEFAULT_OPTIONS
     metres: float | None = None
     oriented: bool = False
     sigma: float | None = None
@@ -56,31 +87,48 @@ class Drawing:
     meta: dict[str, str] = field(default_factory=dict)
     points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     points_sigma: float | None = None
-    segments: list[Floats] = field(default_factory=list)
-    widths: list[float] = field(default_factory=list)
-    layer_names: list[str] = field(default_factory=list)
+    polylines: list[Polyline] = field(default_factory=list)
+    _left_out: dict[str, Counter[str]] = field(default_factory=dict)
     _count: int = 0
 
-    def wants(self, *layers: str) -> bool:
-        """Tell whether lines of a layer, or of one within others, are wanted."""
-        if not self.layers:
-            return True
-        names = [layer.casefold() for layer in layers]
-        return any(fnmatch.fnmatchcase(n, pattern.casefold()) for n in names for pattern in self.layers)
+    def takes(self, layers: tuple[str, ...], properties: Mapping[str, Any] | None = None) -> bool:
+        """Tell whether an entity is wanted: by its layers, outermost first, and its properties; count it where not."""
+        why = None
+        if self.options.layers and not matches(layers, self.options.layers):
+            why = "other_layer", layers[-1] if layers else "no layer"
+        why = why or excluded_by(properties or {}, self.options.where)
+        if why is not None:
+            self._left_out.setdefault(why[0], Counter())[why[1]] += 1
+        return why is None
 
-    def add(self, points: ArrayLike, *, closed: bool = False, width: float = 0.0, layer: str = "") -> None:
+    def note_left_out(self) -> None:
+        """Note the entities that `takes` excluded, with counts."""
+        for code, counts in self._left_out.items():
+            self.notes.add_dropped(code, f"{LEFT_OUT[code]}: {listed_counts(counts)}", counts.total())
+
+    def add(
+        self,
+        points: ArrayLike,
+        *,
+        closed: bool = False,
+        width: float = 0.0,
+        layers: tuple[str, ...] = (),
+        properties: Mapping[str, Any] | None = None,
+    ) -> None:
         """Add a polyline.
 
         Parameters
         ----------
-        points : array-like of shape (n, 2)
+        points : array-like of shape (n, 2) or (n, 3)
             Units of the drawing.
         closed : bool
             True if a line runs from the last point to the first.
         width : float
             Units of the drawing.
-        layer : str
-            That it is on, for messages.
+        layers : tuple of str
+            That it is on, outermost first.
+        properties : mapping, optional
+            May name its floor.
 
         Raises
         ------
@@ -89,48 +137,61 @@ class Drawing:
         TooLargeError
             When the drawing has too many lines.
         """
-        p = self._checked(points, 2)
+        p = self._checked(points)
         if closed and len(p) > 2 and not np.array_equal(p[0], p[-1]):
             p = np.vstack([p, p[:1]])
         if len(p) >= 2:
-            self._keep(np.hstack([p[:-1], p[1:]]), width, layer)
+            heights = (float(p[:, 2].min()), float(p[:, 2].max())) if p.shape[1] == 3 else (0.0, 0.0)
+            levels, ends = levels_of(layers, properties or {}), np.hstack([p[:-1, :2], p[1:, :2]])
+            self._keep(Polyline(ends, width, layers[-1] if layers else "", levels, heights))
 
     def add_segments(self, endpoints: ArrayLike) -> None:
         """Add lines of their own, ``(n, 4)`` units of the drawing; raises as `add` does."""
-        self._keep(self._checked(endpoints, 4), 0.0, "")
+        self._keep(Polyline(self._checked(endpoints, 4)))
 
-    def _keep(self, endpoints: Floats, width: float, layer: str) -> None:
-        self._count += len(endpoints)
+    def _keep(self, polyline: Polyline) -> None:
+        self._count += len(polyline.ends)
         if self._count > MAX_SEGMENTS:
             raise TooLargeError(
                 f"expected at most {MAX_SEGMENTS} lines, found {self._count} or more; select layers", argument=self.name
             )
-        if len(endpoints):
-            self.segments.append(endpoints)
-            self.widths.append(width)
-            self.layer_names.append(layer)
+        if len(polyline.ends):
+            self.polylines.append(polyline)
 
-    def _checked(self, values: ArrayLike, columns: int) -> Floats:
+    def _checked(self, values: ArrayLike, *columns: int) -> Floats:
         try:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise MalformedFileError(
                 f"has a coordinate that is not a number up to {MAX_UNITS:g}: found text or a list", argument=self.name
             ) from error
+        columns = columns or (2, 3)
         if array.size == 0:
-            return np.zeros((0, columns))
-        if array.ndim != 2 or array.shape[1] != columns or not (np.abs(array) <= MAX_UNITS).all():
+            return np.zeros((0, columns[0]))
+        if array.ndim != 2 or array.shape[1] not in columns or not (np.abs(array) <= MAX_UNITS).all():
             raise MalformedFileError(f"has a coordinate that is not a number up to {MAX_UNITS:g}", argument=self.name)
         return array
 
     @property
     def extent(self) -> str:
         """The extent of the lines, for messages, units of the drawing; empty where there are none."""
-        if not self.segments:
+        if not self.polylines:
             return ""
-        corners = np.vstack(self.segments).reshape(-1, 2)
+        corners = np.vstack([one.ends for one in self.polylines]).reshape(-1, 2)
         (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
         return f" from ({left:g}, {bottom:g}) to ({right:g}, {top:g})"
+
+    def require_plan(self) -> None:
+        """Refuse a section or an elevation, which lies in the x-z or y-z plane; raises `MalformedFileError`."""
+        corners = np.vstack([one.ends for one in self.polylines]).reshape(-1, 2)
+        width, depth = np.ptp(corners, axis=0)
+        height = max(one.heights[1] for one in self.polylines) - min(one.heights[0] for one in self.polylines)
+        if min(width, depth) <= FLAT * max(width, depth) and height > STEEP * max(width, depth):
+            raise MalformedFileError(
+                f"is no plan: its lines extend {width:g} by {depth:g} units in x and y, and {height:g} in z, as a "
+                "section or an elevation; expected walls in the x-y plane. Rotate the drawing",
+                argument=self.name,
+            )
 
     def drop(self, kind: str, *, hint: str = "") -> None:
         """Note what is no wall or cannot be read, and what to do about it."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import fnmatch
 import io
 import logging
 import re
 import struct
 from collections import Counter
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +26,9 @@ from ..limits import MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
 from ..options import US_FOOT, ImportOptions
 from ..report import Notes, listed, shown
 from .drawing import Drawing
-from .dxf_blocks import Expansion
+from .dxf_blocks import Expansion, Placed
+from .dxf_clips import shown_parts
+from .selection import matches
 
 if TYPE_CHECKING:
     from ezdxf.audit import Auditor
@@ -52,6 +54,8 @@ METRES_OF = {
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 SAGITTA = 0.01  # m; how far a chord may lie from its arc
 
+CURVE, FRAME = 8, 16  # flags of a vertex of a POLYLINE that was smoothed: of the curve, or a control point
+
 BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
 _OBJECT = re.compile(rb"\n[ \t]*0\r?\n")  # group code 0 begins an entity, an object or a section
 BROKEN = (DXFError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError, struct.error)
@@ -68,30 +72,27 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """
     name = name_of(path)
     document = _document(path, notes)
-    drawing = Drawing(name, "dxf", options.layers, notes, _metres(document, notes))
+    drawing = Drawing(name, "dxf", notes, options, _metres(document, notes))
     expansion = Expansion.of(document, drawing)
-    drawing.layers = options.layers or _layers_of_walls(document, expansion, notes)
     metres = options.metres or drawing.metres or 1.0
-    directed, others = 0, Counter[str]()
+    directed = 0
     try:
-        for entity, layers in expansion.visible(document.modelspace()):
-            if not drawing.wants(*layers):
-                others[layers[-1]] += 1
+        if not options.layers and not options.where:
+            drawing.options = replace(options, layers=_layers_of_walls(document, expansion, notes))
+        for placed in expansion.visible(document.modelspace()):
+            if not drawing.takes(placed.layers, _properties(placed)):
                 continue
-            before = len(drawing.segments)
-            _add(entity, drawing, layers[-1], SAGITTA / metres)
-            directed += (len(drawing.segments) - before) * (layers[-1] == FREE_LEFT)
+            before = len(drawing.polylines)
+            _add(placed, drawing, SAGITTA / metres)
+            directed += (len(drawing.polylines) - before) * (placed.layers[-1] == FREE_LEFT)
     except FormatError:
         raise
     except BROKEN as error:
         raise MalformedFileError(
             "has a block that cannot be read; expected valid entities. Repair the drawing (AUDIT)", argument=name
         ) from error
-    if others:
-        what = f"entities on layers that the option layers excludes: {listed(others)}"
-        notes.add_dropped("other_layer", what, others.total())
     _note_paper_space(document, drawing)
-    drawing.oriented = 0 < directed == len(drawing.segments)
+    drawing.oriented = 0 < directed == len(drawing.polylines)
     return drawing
 
 
@@ -124,9 +125,9 @@ def _parsed(path: Path, content: bytes) -> tuple[Document, Auditor]:
 
 def _layers_of_walls(document: Document, expansion: Expansion, notes: Notes) -> tuple[str, ...]:
     """Return patterns of the layers that hold walls by their names, where there are others; else none."""
-    names = {str(entity.dxf.get("layer", "0")) for entity in document.modelspace()}
-    shown_names = sorted(name for name in names if not expansion.hides(name))
-    walls = [n for n in shown_names if any(fnmatch.fnmatchcase(n.casefold(), pattern) for pattern in NAMES_OF_WALLS)]
+    chains = expansion.layers(document.modelspace())
+    shown_names = sorted({chain[-1] for chain in chains})
+    walls = sorted({chain[-1] for chain in chains if matches(chain, NAMES_OF_WALLS)})
     others = [name for name in shown_names if name not in walls]
     if len(shown_names) < 2 or not others:
         return ()
@@ -159,16 +160,28 @@ def _width(entity: DXFEntity) -> float:
     return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
 
 
-def _add(entity: DXFEntity, drawing: Drawing, layer: str, sagitta: float) -> None:
-    kind = entity.dxftype()
+def _properties(placed: Placed) -> dict[str, str]:
+    """Return what the option where may name."""
+    dxf = placed.entity.dxf
+    return {
+        "layer": placed.layers[-1],
+        "entity": placed.entity.dxftype(),
+        "color": str(dxf.get("color", 256)),
+        "linetype": str(dxf.get("linetype", "BYLAYER")),
+    }
+
+
+def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
+    entity, layer, kind = placed.entity, placed.layers[-1], placed.entity.dxftype()
     mesh = isinstance(entity, Polyline) and not (entity.is_2d_polyline or entity.is_3d_polyline)
     if kind not in LINES or mesh:
         drawing.drop("POLYLINE of a mesh" if mesh else kind, hint=_hint(kind))
         return
     try:
-        curve = ezpath.make_path(entity)
-        points = [(p.x, p.y) for p in islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)]
+        curve = ezpath.make_path(_without_frame(entity))
+        points = list(islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1))
         width = max(0.0, _width(entity))
+        parts = shown_parts(points, placed.clips) if len(points) <= MAX_CURVE_POINTS else []
     except BROKEN as error:
         handle = shown(str(entity.dxf.get("handle", None) or "of a block"))
         raise MalformedFileError(
@@ -181,8 +194,19 @@ def _add(entity: DXFEntity, drawing: Drawing, layer: str, sagitta: float) -> Non
             f"{shown(layer)}",
             argument=drawing.name,
         )
-    drawing.add(points, width=width, layer=layer)
-    drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
+    if placed.clips and (len(parts) != 1 or len(parts[0]) < len(points)):
+        drawing.notes.add_dropped("clipped", "lines that the clipping of a block (XCLIP) hides, or divides", 1)
+    for part in parts:
+        drawing.add(part, width=width, layers=placed.layers)
+    if parts:
+        drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
+
+
+def _without_frame(entity: DXFEntity) -> DXFEntity:
+    """Leave out the control points of a polyline that was smoothed, where it has the vertices of the curve too."""
+    if isinstance(entity, Polyline) and any(vertex.dxf.flags & CURVE for vertex in entity.vertices):
+        entity.vertices[:] = [vertex for vertex in entity.vertices if not vertex.dxf.flags & FRAME]
+    return entity
 
 
 def _hint(kind: str) -> str:
@@ -200,10 +224,10 @@ def _note_paper_space(document: Document, drawing: Drawing) -> None:
         kinds = Counter(entity.dxftype() for entity in layout if entity.dxftype() != "VIEWPORT")
         if not kinds:
             continue
-        sheet = Drawing(drawing.name, "dxf", (), Notes())
+        sheet = Drawing(drawing.name, "dxf", Notes())
         for entity in islice(layout, MAX_CURVE_POINTS):
             try:
-                _add(entity, sheet, "", SAGITTA)
+                _add(Placed(entity, ("",), ()), sheet, SAGITTA)
             except FormatError:
                 continue
         drawing.notes.add_dropped(

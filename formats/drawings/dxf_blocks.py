@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.insert import Insert
@@ -20,14 +20,22 @@ from ..errors import TooLargeError
 from ..limits import MAX_BLOCK_DEPTH, MAX_ENTITIES
 from ..report import Notes, listed, shown
 from .drawing import Drawing
+from .dxf_clips import Clip, clip_of
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document
 
 BYBLOCK = "0"  # the layer whose entities take that of their block's reference
 
-Placed = tuple[DXFEntity, tuple[str, ...]]
-"""An entity with its layers, those of the references that it is in first."""
+Clips = tuple[Clip, ...]
+
+
+class Placed(NamedTuple):
+    """An entity with its layers, those of the references that it is in first, and what these clip."""
+
+    entity: DXFEntity
+    layers: tuple[str, ...]
+    clips: Clips
 
 
 @dataclass(slots=True)
@@ -65,35 +73,53 @@ class Expansion:
         TooLargeError
             When blocks lie too deep in one another, or expand to too much.
         """
-        yield from self._visible(entities, (), 0)
+        yield from self._visible(entities, (), (), 0)
         self._note(self.drawing.notes)
+
+    def layers(self, entities: Iterable[Any]) -> set[tuple[str, ...]]:
+        """Return the layers of the visible entities, with those of the references that they are in."""
+        found: set[tuple[str, ...]] = set()
+        waiting: list[tuple[Iterable[Any], tuple[str, ...]]] = [(entities, ())]
+        known: set[tuple[str, tuple[str, ...]]] = set()
+        while waiting and len(known) < MAX_ENTITIES:
+            some, outer = waiting.pop()
+            for entity in some:
+                layers = _layers_of(entity, outer)
+                if self.hides(layers[-1], reference=isinstance(entity, Insert)):
+                    continue
+                if not isinstance(entity, Insert):
+                    found.add(layers)
+                elif (block := entity.block()) is not None and (block.name, layers) not in known:
+                    known.add((block.name, layers))
+                    if len(layers) <= MAX_BLOCK_DEPTH:
+                        waiting.append((block, layers))
+        return found
 
     def hides(self, layer: str, *, reference: bool = False) -> bool:
         """Tell whether a layer hides its entities, or a reference on it with all that is in it."""
         name = layer.casefold()
         return name in self.frozen or (name in self.off and not reference)
 
-    def _visible(self, entities: Iterable[Any], outer: tuple[str, ...], depth: int) -> Iterator[Placed]:
+    def _visible(self, entities: Iterable[Any], outer: tuple[str, ...], clips: Clips, depth: int) -> Iterator[Placed]:
         for entity in entities:
             self._count += 1
             if self._count > MAX_ENTITIES:
                 self._refuse(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
-            layer = str(entity.dxf.get("layer", BYBLOCK))
-            layers = (*outer, outer[-1] if outer and layer == BYBLOCK else layer)
+            layers = _layers_of(entity, outer)
             if entity.dxf.get("invisible", 0):
                 self.drawing.notes.add_dropped("invisible", "entities and blocks with the attribute invisible", 1)
             elif self.hides(layers[-1], reference=isinstance(entity, Insert)):
                 self._hidden[layers[-1]] += 1
             elif isinstance(entity, Insert):
-                yield from self._expanded(entity, layers, depth)
+                yield from self._expanded(entity, layers, clips, depth)
             elif isinstance(entity, MLine):
                 self.drawing.notes.add_read("entity_mline", "MLINE entities", 1)
                 lines = (part for part in entity.virtual_entities() if part.dxftype() != "HATCH")
-                yield from ((part, layers) for part in lines)
+                yield from (Placed(part, layers, clips) for part in lines)
             else:
-                yield entity, layers
+                yield Placed(entity, layers, clips)
 
-    def _expanded(self, reference: Insert, layers: tuple[str, ...], depth: int) -> Iterator[Placed]:
+    def _expanded(self, reference: Insert, layers: tuple[str, ...], clips: Clips, depth: int) -> Iterator[Placed]:
         if depth >= MAX_BLOCK_DEPTH:
             self._refuse(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another")
         if reference.mcount > MAX_ENTITIES:
@@ -110,7 +136,8 @@ class Expansion:
         for one in reference.multi_insert() if reference.mcount > 1 else (reference,):
             self._count += 1  # so that empty blocks cannot be repeated without end
             inner = one.virtual_entities(skipped_entity_callback=self._skipped)
-            yield from self._visible(inner, layers, depth + 1)
+            clip = clip_of(reference, one)
+            yield from self._visible(inner, layers, clips if clip is None else (*clips, clip), depth + 1)
 
     def _skipped(self, entity: DXFEntity, _reason: str) -> None:
         self.drawing.drop(entity.dxftype())
@@ -132,3 +159,8 @@ class Expansion:
 
     def _refuse(self, why: str) -> None:
         raise TooLargeError(why, argument=self.drawing.name)
+
+
+def _layers_of(entity: DXFEntity, outer: tuple[str, ...]) -> tuple[str, ...]:
+    layer = str(entity.dxf.get("layer", BYBLOCK))
+    return (*outer, outer[-1] if outer and layer == BYBLOCK else layer)

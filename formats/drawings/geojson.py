@@ -1,4 +1,4 @@
-"""Drawings in GeoJSON with coordinates in metres, which the standard has no place for: by an explicit flag."""
+"""Drawings in GeoJSON with coordinates in metres or another unit of length; degrees are refused."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
+from ..errors import MalformedFileError, TooLargeError
 from ..files import kind_of, load_json, name_of, read_bounded
 from ..limits import MAX_ENTITIES, MAX_MAP_BYTES, MAX_UNITS
 from ..options import ImportOptions
 from ..report import Notes
+from .coordinate_systems import require_lengths
 from .drawing import Drawing
 
 MAX_COLLECTIONS = 4
 OWN = "linefix"  # the member that identifies our own files
+HIDDEN = ("feature_type", "id")  # members of an IMDF feature outside its properties
 
 Lines = Iterator[tuple[Any, bool]]
 
@@ -25,29 +27,25 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     Parameters
     ----------
     path : Path
+        An object, or one feature on each line.
     options : ImportOptions
-        `local_metres` has to be set for any file but our own; layers are the properties ``layer`` and ``name``, and
-        ``thickness`` or ``width`` are those of a wall drawn by its centre line.
+        Layers are the properties ``layer`` and ``name``, and ``thickness`` or ``width`` are those of a wall drawn by
+        its centre line.
     notes : Notes
 
     Raises
     ------
     FormatError
-        When it is no GeoJSON, or its coordinates are degrees.
+        When it is no GeoJSON, or its coordinates are degrees or of an unknown unit.
     """
     name = name_of(path)
-    root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
+    root = _loaded(read_bounded(path, MAX_MAP_BYTES), name)
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
         found = "an object without it" if isinstance(root, dict) else kind_of(root)
         raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}", argument=name)
     own = root.get(OWN)
     told = own if isinstance(own, dict) else {}
-    if not options.local_metres and told.get("metres") is not True:
-        raise IncompleteFileError(
-            "has degrees, as its standard requires; expected metres. If it has metres, set the option local_metres",
-            argument=name,
-        )
-    drawing = Drawing(name, "geojson", options.layers, notes, 1.0, told.get("oriented") is True)
+    drawing = Drawing(name, "geojson", notes, options, 1.0, told.get("oriented") is True)
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
         raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}", argument=name)
@@ -58,17 +56,28 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
             raise MalformedFileError(
                 f"expected every feature to be an object, found {kind_of(feature)} as feature {k}", argument=name
             )
-        _read_feature(feature, drawing)
+        _read_feature(feature, drawing, k)
+    if told.get("metres") is not True:
+        require_lengths(root.get("crs"), drawing)
     return drawing
 
 
-def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
+def _loaded(content: bytes, name: str) -> Any:
+    """Return the object of a file, or the collection of those on its lines (RFC 8142, and without its separators)."""
+    lines = [line for one in content.split(b"\n") if (line := one.strip(b"\x1e \r\t"))]
+    if len(lines) < 2 or not all(line.startswith(b"{") and line.endswith(b"}") for line in lines):
+        return load_json(content, name)
+    return load_json(b'{"type": "FeatureCollection", "features": [' + b",".join(lines) + b"]}", name)
+
+
+def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> None:
     geometry = feature.get("geometry") if feature.get("type") == "Feature" else feature
     properties = feature.get("properties")
-    named = properties if isinstance(properties, dict) else {}
-    layers = [value for key in ("layer", "name") if isinstance(value := named.get(key), str)]
-    if not drawing.wants(*layers):
-        drawing.notes.add_dropped("other_layer", "features on layers that the option layers excludes", 1)
+    named = {key: feature[key] for key in HIDDEN if key in feature} | (
+        properties if isinstance(properties, dict) else {}
+    )
+    layers = tuple(value for key in ("layer", "name") if isinstance(value := named.get(key), str))
+    if not drawing.takes(layers, named):
         return
     if geometry is None:
         drawing.drop("feature without geometry")
@@ -77,17 +86,19 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
     width = next((told for told in map(_width, widths) if told is not None), 0.0)
     for points, closed in _lines(geometry, drawing):
         try:
-            pairs = [(p[0], p[1]) for p in points]
+            places = [(p[0], p[1], p[2] if len(p) > 2 else 0.0) for p in points]
         except (TypeError, LookupError) as error:
             raise MalformedFileError(
-                "has a position that is not [x, y]: check the nesting of lists", argument=drawing.name
+                f"has a position that is not [x, y] in feature {number}: check the nesting of lists",
+                argument=drawing.name,
             ) from error
-        wrong = next((c for pair in pairs for c in pair if type(c) not in (int, float)), 0)
+        wrong = next((c for place in places for c in place if type(c) not in (int, float)), 0)
         if wrong != 0:
             raise MalformedFileError(
-                f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)}", argument=drawing.name
+                f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)} in feature {number}",
+                argument=drawing.name,
             )
-        drawing.add(pairs, closed=closed, width=width, layer=layers[0] if layers else "")
+        drawing.add(places, closed=closed, width=width, layers=layers[:1], properties=named)
 
 
 def _width(value: Any) -> float | None:

@@ -52,7 +52,7 @@ class Faces:
     points: Floats
 
 
-def find_faces(grid: Grid, notes: Notes, name: str) -> Faces:
+def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None) -> Faces:
     """Find the faces of the walls in a grid, and what is too small for one.
 
     Contours of the free space have it on their left. A border with unknown cells is no wall. The
@@ -64,6 +64,8 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Faces:
     notes : Notes
     name : str
         Of the file, for errors.
+    surface : float or None
+        How far behind the front the surface of walls lies, cells; None: found from the grid.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Faces:
     for name_of_kind, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN)):
         count = int((cells == kind).sum())
         notes.add_read(f"{name_of_kind}_cells", f"{name_of_kind} cells" if count else f"no {name_of_kind} cell", count)
-    depth = surface_depth(cells)
+    depth = surface_depth(cells) if surface is None else surface
     options = VectorizationOptions(
         sigma=CONTOUR_SIGMA * grid.resolution, min_length=max(1e-3, LEAST_LENGTH * grid.resolution)
     )

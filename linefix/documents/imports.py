@@ -138,6 +138,16 @@ FORM: dict[str, Any] = {
         "directions": {"enum": ["drawn", "none"], "description": "whether free space lies on the left of the lines"},
         "local_metres": {"enum": ["true", "false"], "description": "whether a GeoJSON is in metres"},
         "topic": {"type": "string", "description": "of the grid in a bag"},
+        "where": {
+            "type": "string",
+            "description": "entities of a drawing to read, as property=value, the value a pattern; may be repeated",
+        },
+        "level": {"type": "string", "description": "floor of a drawing that has several levels"},
+        "surface": {
+            "type": "string",
+            "description": "of a grid: cells from the front of occupied cells to the surface of walls, 0 to 10; "
+            "left out: found from the grid",
+        },
     },
 }
 """The schema of the form; everything in a form is text."""

@@ -109,4 +109,7 @@ KNOWN: dict[str, Callable[[Sequence[str]], Any]] = {
     "local_metres": _truth,
     "topic": _text,
     "unknown": _unknown,
+    "where": tuple,
+    "level": _text,
+    "surface": _number,
 }

@@ -132,4 +132,4 @@ def test_a_wall_layer_is_asked_for_by_the_layer_of_the_reference(tmp_path: Path)
     other = {
         note.code: note for note in read_map(tmp_path / "plan.dxf", ImportOptions(layers=("WALLS",))).report.dropped
     }
-    assert "A, DESKS" in other["other_layer"].message
+    assert "A (1), DESKS (1)" in other["other_layer"].message

@@ -42,7 +42,7 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     root = parse_xml(read_bounded(path, MAX_MAP_BYTES), name)
     if kind_of(root) != "svg":
         raise MalformedFileError("expected an svg element", argument=name)
-    drawing = Drawing(name, "svg", options.layers, notes)
+    drawing = Drawing(name, "svg", notes, options)
     drawing.oriented = root.get(ORIENTED) == "true"
     try:
         drawing.metres = float(root.attrib[METRES]) if METRES in root.attrib else None
@@ -59,13 +59,11 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 def _read_shapes(root: Element, drawing: Drawing) -> None:
     for element, place in Visible(root, drawing).shapes():
-        if not drawing.wants(*place.layers):
-            drawing.notes.add_dropped("other_layer", "elements on layers that the option layers excludes", 1)
+        if not drawing.takes(place.layers, element.attrib):
             continue
         kind = kind_of(element)
-        layer = " ".join(place.layers[-1:])
         for points, closed in SHAPES[kind](Measure(element, place.viewport, drawing.name)):
-            drawing.add(_placed(points, place.matrix), closed=closed, width=place.width, layer=layer)
+            drawing.add(_placed(points, place.matrix), closed=closed, width=place.width, layers=place.layers)
         drawing.notes.add_read(f"element_{kind}", f"{kind} elements", 1)
 
 

@@ -52,7 +52,7 @@ def near_lines(endpoints: Floats, layer_of: Integers, drawing: Drawing) -> Flags
     endpoints : (n, 4)
         Metres.
     layer_of : (n,)
-        Index of each line into the drawing's `layer_names`.
+        Index of each line into the drawing's `polylines`.
     drawing : Drawing
         Its notes take what is left out, by layer and position.
 
@@ -119,7 +119,7 @@ def _places(endpoints: Floats, kept: Flags) -> Places:
 def _named(endpoints: Floats, layer_of: Integers, some: Flags, drawing: Drawing) -> str:
     """Return how many lines they are, and the layers and the middles of the first."""
     middles = 0.5 * (endpoints[some, :2] + endpoints[some, 2:])
-    names = [name for k in np.unique(layer_of[some])[:1000] if (name := drawing.layer_names[k])]
+    names = [name for k in np.unique(layer_of[some])[:1000] if (name := drawing.polylines[k].layer)]
     layers = f" on {listed(names)}" if names else ""
     if len(middles) <= MAX_NAMED // 2:
         places = ", ".join(f"({x:.6g}, {y:.6g})" for x, y in middles)

@@ -14,6 +14,7 @@ from ..drawing import Drawing
 from .centre_lines import are_centres, walls_of
 from .far_lines import near_lines
 from .free_sides import Sides, sides_seen
+from .levels import on_level
 from .outline import outline
 from .units import note_unit
 
@@ -42,17 +43,20 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
         When a free place lies on a wall or outside.
     """
     metres = options.metres or drawing.metres
+    drawing.note_left_out()
     if metres is None:
         doubt = drawing.notes.assumed.get("unknown_unit")
         why = f": {doubt.message}" if doubt is not None else ""
         raise IncompleteFileError(
             f"does not state its unit{why}; set the option units, for example to mm or m", argument=drawing.name
         )
-    if not drawing.segments:
+    if not drawing.polylines:
         raise drawing.without_lines()
-    endpoints = np.vstack(drawing.segments) * metres
-    lengths = [len(s) for s in drawing.segments]
-    widths = np.repeat(np.asarray(drawing.widths), lengths) * metres
+    drawing.require_plan()
+    drawing.polylines = on_level(drawing, metres)
+    endpoints = np.vstack([one.ends for one in drawing.polylines]) * metres
+    lengths = [len(one.ends) for one in drawing.polylines]
+    widths = np.repeat([one.width for one in drawing.polylines], lengths) * metres
     oriented = _means_directions(drawing, options)
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)

@@ -61,6 +61,9 @@ def test_fields_are_options() -> None:
         "drawn": ["centres"],
         "thickness": ["0.2"],
         "local_metres": ["true"],
+        "where": ["indoor=wall", "layer=A, B"],
+        "level": [" 1 "],
+        "surface": ["0.5"],
     }
     options = options_of(fields)
     assert (options.units, options.layers, options.inside) == (
@@ -69,6 +72,7 @@ def test_fields_are_options() -> None:
         ((1.0, 2.5), (-3.0, 4.0)),
     )
     assert (options.drawn, options.thickness, options.local_metres) == ("centres", 0.2, True)
+    assert (options.where, options.level, options.surface) == (("indoor=wall", "layer=A, B"), "1", 0.5)
     assert options_of({"units": ["ft"]}).units == "ft"
 
 
@@ -84,6 +88,9 @@ def test_fields_are_options() -> None:
         ("thickness", ["thick"], "a number"),
         ("drawn", ["somehow"], "faces or centres"),
         ("local_metres", ["perhaps"], "true or false"),
+        ("where", ["indoor"], "property=value"),
+        ("level", ["1", "2"], "once"),
+        ("surface", ["11"], "from 0 to 10 cells"),
         ("unknown", ["grey"], "expected none, or a grey value from 0 to 255"),
     ],
     ids=str,

@@ -1,22 +1,19 @@
-"""Segments as such: our own JSON, and CSV."""
+"""Segments as such: a map file of our own in JSON."""
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import MalformedFileError, TooLargeError
-from ..files import kind_of, load_json, name_of, read_bounded, text_of
-from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES, MAX_POINTS
+from ..files import kind_of, load_json, name_of, read_bounded
+from ..limits import MAX_MAP_BYTES, MAX_POINTS
 from ..options import ImportOptions
 from ..report import Notes, shown
 from .drawing import Drawing
 
-COLUMNS = ("x1", "y1", "x2", "y2")
 OWN_FIELDS = {"segments", "sigma", "oriented", "frame_id", "meta", "points", "points_sigma"}
 
 
@@ -38,7 +35,7 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, 4, f"segment {k}"))), None)
     if wrong is not None:
         raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}", argument=name)
-    drawing = Drawing(name, "json", options.layers, notes, 1.0)
+    drawing = Drawing(name, "json", notes, options, 1.0)
     _take_properties(told, drawing)
     _take_points(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
@@ -90,66 +87,3 @@ def _take_points(told: dict[str, Any], drawing: Drawing) -> None:
         )
     drawing.points = np.array(points, dtype=np.float64).reshape(-1, 2)
     drawing.points_sigma = None if sigma is None else float(sigma)
-
-
-def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
-    """Read rows of x1, y1, x2, y2, metres unless an option says otherwise.
-
-    A first row may name the columns, then in any order and among others; lines that begin with ``#`` are comments, of
-    which ours say ``# oriented=true``.
-
-    Raises
-    ------
-    MalformedFileError
-        When a row has no four numbers.
-    """
-    name = name_of(path)
-    text = text_of(read_bounded(path, MAX_MAP_BYTES), name)
-    ends = sum(text.count(end) for end in ("\n", "\r"))
-    if ends > 2 * MAX_LINES:
-        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends", argument=name)
-    lines = list(io.StringIO(text, newline=None))
-    longest = max(map(len, lines), default=0)
-    if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
-        raise TooLargeError(
-            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}",
-            argument=name,
-        )
-    comments = {line[1:].strip() for line in lines if line.startswith("#")}
-    body = "".join(line for line in lines if line.strip() and not line.startswith("#"))
-    first = body.partition("\n")[0]
-    delimiter = max(",;\t ", key=first.count) if first else ","
-    drawing = Drawing(name, "csv", options.layers, notes, 1.0, "oriented=true" in comments)
-    rows: list[list[str]] = []
-    try:
-        rows += [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(body), delimiter=delimiter)]
-        wanted, start = _columns(rows[0] if rows else [])
-        table = np.array([[row[k] for k in wanted] for row in rows[start:]], dtype=np.float64).reshape(-1, 4)
-    except (csv.Error, ValueError, LookupError) as error:
-        raise MalformedFileError(
-            f"expected rows of x1, y1, x2, y2, found {_fault_of_rows(rows)}", argument=name
-        ) from error
-    drawing.add_segments(table)
-    return drawing
-
-
-def _fault_of_rows(rows: list[list[str]]) -> str:
-    """Return what the first row has that cannot be read; rows are counted without comments and empty lines."""
-    wanted, start = _columns(rows[0] if rows else [])
-    for number, row in enumerate(rows[start:], start + 1):
-        if len(row) <= max(wanted):
-            return f"{len(row)} cells in row {number}"
-        for column in wanted:
-            try:
-                float(row[column])
-            except ValueError:
-                return f"no number in column {column + 1} of row {number}"
-    return "cells that cannot be divided: check the quotes"
-
-
-def _columns(first: list[str]) -> tuple[list[int], int]:
-    """Return which columns hold the coordinates, and which row is the first of them."""
-    names = [cell.casefold() for cell in first]
-    if set(COLUMNS) <= set(names):
-        return [names.index(column) for column in COLUMNS], 1
-    return [0, 1, 2, 3], 0

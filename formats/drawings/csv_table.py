@@ -1,0 +1,177 @@
+"""Segments in CSV: tables of x1, y1, x2, y2, as programs and spreadsheets write them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
+from ..files import name_of, read_bounded, text_of
+from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES
+from ..options import UNITS, ImportOptions
+from ..report import Notes, first_of, shown
+from .drawing import Drawing
+
+COLUMNS = ("x1", "y1", "x2", "y2")
+SYNONYMS = {
+    end + axis: f"{axis}{number}"
+    for number, ends in ((1, ("start", "begin", "from", "s", "a")), (2, ("end", "to", "e", "b")))
+    for end in ends
+    for axis in "xy"
+}
+DELIMITERS = (";", "\t", ",", " ")
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+UNIT = re.compile(r"(.*?)[\s_]*[\[(]\s*([\w-]+)\s*[\])]")  # x1 [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table, and what its columns are.
+
+    Attributes
+    ----------
+    rows : list of list of str
+        Without the header.
+    lines : list of int
+        Of the file, where each row is.
+    wanted : tuple of int
+        Columns of x1, y1, x2 and y2.
+    names : tuple of str
+        Of all columns; empty where the file does not name them.
+    metres : float
+        Per unit.
+    """
+
+    rows: list[list[str]]
+    lines: list[int]
+    wanted: tuple[int, ...]
+    names: tuple[str, ...]
+    metres: float
+
+
+def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+    """Read rows of x1, y1, x2, y2, metres unless an option or the header says otherwise.
+
+    A first row may name the columns, then in any order and among others, which are properties of the segments. Lines
+    that begin with ``#`` are comments, of which ours say ``# oriented=true``.
+
+    Raises
+    ------
+    FormatError
+        When a row has no four numbers, or it is not clear which columns are the coordinates.
+    """
+    name = name_of(path)
+    text = text_of(read_bounded(path, MAX_MAP_BYTES), name)
+    ends = sum(text.count(end) for end in ("\n", "\r"))
+    if ends > 2 * MAX_LINES:
+        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends", argument=name)
+    lines = list(io.StringIO(text, newline=None))
+    longest = max(map(len, lines), default=0)
+    if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
+        raise TooLargeError(
+            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}",
+            argument=name,
+        )
+    comments = {line[1:].strip() for line in lines if line.startswith("#")}
+    table = _table(lines, name)
+    drawing = Drawing(name, "csv", notes, options, table.metres, "oriented=true" in comments)
+    others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
+    commas, loose = 0, []
+    for row, line in zip(table.rows, table.lines, strict=True):
+        numbers = [number for k in table.wanted if k < len(row) and (number := _number(row[k])) is not None]
+        if len(numbers) < len(COLUMNS):
+            wrong = next(k for k in table.wanted if k >= len(row) or _number(row[k]) is None)
+            found = f"'{shown(row[wrong])}' in column {wrong + 1}" if wrong < len(row) else f"{len(row)} cells"
+            raise MalformedFileError(f"line {line}: expected rows of x1, y1, x2, y2, found {found}", argument=name)
+        if not table.names and sum(_number(cell) is not None for cell in row) > len(COLUMNS):
+            raise _unclear(row, line, name)
+        commas += any("," in row[k] for k in table.wanted)
+        properties = {table.names[k]: row[k] for k in others if k < len(row)}
+        layer = properties.get("layer")
+        if not others:
+            loose.append(numbers)
+        elif drawing.takes((layer,) if layer else (), properties):
+            x1, y1, x2, y2 = numbers
+            drawing.add([(x1, y1), (x2, y2)], layers=(layer,) if layer else (), properties=properties)
+    drawing.add_segments(loose)
+    if commas:
+        notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
+    return drawing
+
+
+def _table(lines: list[str], name: str) -> Table:
+    """Return the table by the delimiter that gives four numbers, or a header; else by the most frequent one."""
+    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    told = re.fullmatch(r"\"?sep=(.)\"?\s*", kept[0][1]) if kept else None
+    kept = kept[1:] if told else kept
+    first = kept[0][1] if kept else ""
+    likely = max(DELIMITERS, key=first.count)
+    for delimiter in (told[1],) if told else (*DELIMITERS, likely):
+        header = _cells(first, delimiter)
+        columns, metres, names = _columns(header)
+        if names or sum(_number(cell) is not None for cell in header) >= len(COLUMNS):
+            break
+    else:
+        raise _no_columns(header, kept[0][0] if kept else 1, name)
+    kept = kept[1:] if names else kept
+    try:
+        reader = csv.reader((line for _, line in kept), delimiter=delimiter)
+        rows, at = [], []
+        for row in reader:
+            rows.append([cell.strip() for cell in row])
+            at.append(kept[reader.line_num - 1][0])
+    except csv.Error as error:
+        raise MalformedFileError(
+            "expected rows of x1, y1, x2, y2, found cells that cannot be divided: check the quotes", argument=name
+        ) from error
+    return Table(rows, at, columns, names, metres)
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    except csv.Error:
+        return []
+
+
+def _columns(first: list[str]) -> tuple[tuple[int, ...], float, tuple[str, ...]]:
+    """Return the columns of the coordinates, metres per unit, and the names of all; no names where it has none."""
+    units = [found[2] if (found := UNIT.fullmatch(cell)) else None for cell in first]
+    names = [(found[1] if (found := UNIT.fullmatch(cell)) else cell).casefold().strip() for cell in first]
+    short = [re.sub(r"[\s_.-]", "", name) for name in names]
+    if {"x0", "y0", "x1", "y1"} <= set(short) and not set(COLUMNS) <= set(short):
+        short = [{"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}.get(name, name) for name in short]
+    short = [SYNONYMS.get(name, SYNONYMS.get(name[1:] + name[:1], name)) for name in short]
+    if not all(short.count(column) == 1 for column in COLUMNS):
+        numeric = tuple(k for k, cell in enumerate(first) if _number(cell) is not None)
+        return numeric[:4] if len(numeric) >= len(COLUMNS) else (0, 1, 2, 3), 1.0, ()
+    wanted = tuple(short.index(column) for column in COLUMNS)
+    told = {units[k] for k in wanted}
+    metres = UNITS.get(told.pop() or "m", 0.0) if len(told) == 1 else 0.0
+    return (wanted, metres, tuple(names)) if metres else ((0, 1, 2, 3), 1.0, ())
+
+
+def _number(cell: str) -> float | None:
+    if COMMA.fullmatch(cell):
+        return float(cell.replace(",", "."))
+    return float(cell) if NUMBER.fullmatch(cell) else None
+
+
+def _unclear(row: list[str], line: int, name: str) -> IncompleteFileError:
+    numbers = sum(_number(cell) is not None for cell in row)
+    return IncompleteFileError(
+        f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected four: x1, y1, x2, y2. An index, z, "
+        "or decimal commas make more. Delete the others, or name the columns in a first row: x1,y1,x2,y2 among others",
+        argument=name,
+    )
+
+
+def _no_columns(cells: list[str], line: int, name: str) -> MalformedFileError:
+    return MalformedFileError(
+        f"line {line}: expected rows of x1, y1, x2, y2, or a row of these names, found {first_of(cells) or 'none'}",
+        argument=name,
+    )
