@@ -34,7 +34,9 @@ def clip_of(reference: Insert, placed: Insert) -> Clip | None:
     if clip is None or not (clip.has_clipping_path and clip.is_clipping_enabled):
         return None
     path = clip.get_block_clipping_path()
-    polygon = Vec2.tuple(placed.matrix44().transform_vertices(Vec3.generate(path.inner_polygon())))
+    inner = list(path.inner_polygon())
+    corners = BoundingBox2d(inner).rect_vertices() if len(inner) == 2 else inner
+    polygon = Vec2.tuple(placed.matrix44().transform_vertices(Vec3.generate(corners)))
     return Clip(polygon, path.is_inverted_clip) if len(polygon) > 2 else None
 
 

@@ -9,6 +9,7 @@ import pytest
 from ezdxf import units
 from ezdxf.document import Drawing as Document
 from ezdxf.filemanagement import new
+from ezdxf.xclip import XClip
 
 from formats import ImportedMap, ImportOptions, MalformedFileError, TooLargeError, read_map
 
@@ -176,3 +177,62 @@ def test_many_tiny_entities_are_refused_before_they_are_parsed(tmp_path: Path) -
     (tmp_path / "plan.dxf").write_text("  0\nSECTION\n  2\nENTITIES\n" + "0\nLINE\n" * 800_000 + "0\nENDSEC\n0\nEOF\n")
     with pytest.raises(TooLargeError, match="entities and objects"):
         read_map(tmp_path / "plan.dxf")
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize(
+    ("clip", "inverted", "expected"),
+    [
+        ([(1, -1), (3, 1)], False, [(1, 0, 3, 0)]),
+        ([(1, -1), (3, -1), (3, 1), (2, -0.5), (1, 1)], False, [(1, 0, 1.6667, 0), (2.3333, 0, 3, 0)]),
+        ([(1, -1), (3, -1), (3, 1), (1, 1)], True, [(0, 0, 1, 0), (3, 0, 4, 0)]),
+        (None, False, [(0, 0, 4, 0)]),
+    ],
+)
+def test_what_a_clip_of_a_block_hides(
+    tmp_path: Path,
+    nested: bool,
+    clip: list[tuple[float, float]] | None,
+    inverted: bool,
+    expected: list[tuple[float, ...]],
+) -> None:
+    document = new(units=units.M)
+    document.blocks.new("PLAN").add_line((0, 0), (4, 0))
+    document.blocks["PLAN"].add_line((0, 9), (4, 9))
+    outer = document.blocks.new("OUTER") if nested else document.modelspace()
+    reference = outer.add_blockref("PLAN", (10, 20))
+    clipping = XClip(reference)
+    if clip is not None:
+        clipping.set_block_clipping_path(clip)
+    if inverted:
+        clipping.invert_clipping_path([(-1, -1), (5, 10)], ignore_acad_compatibility=True)
+    if nested:
+        document.modelspace().add_blockref("OUTER", (1, 1))
+    x, y = (11, 21) if nested else (10, 20)
+    found = read(tmp_path, document)
+    low = [row for row in found.map.segments.endpoints.tolist() if row[1] < y + 5]
+    assert sorted(low) == [pytest.approx((a + x, b + y, c + x, d + y), abs=1e-3) for a, b, c, d in expected]
+    assert ("clipped" in notes(found)) == (clip is not None)
+
+
+def test_the_control_frame_of_a_smoothed_polyline_is_no_wall(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    curve = document.modelspace().add_polyline2d([(0, 0), (1, 0.5), (2, 0)], dxfattribs={"flags": 4})
+    for vertex in curve.vertices:
+        vertex.dxf.flags = 8
+    curve.append_vertices([(0, 0), (1, 5), (2, 0)], dxfattribs={"flags": 16})
+    assert read(tmp_path, document).map.segments.endpoints[:, [1, 3]].max() == 0.5
+
+
+def test_layers_of_walls_are_found_in_blocks(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
+    inner.add_line((0, 0), (4, 0), dxfattribs={"layer": "P$0$A-WALL"})
+    inner.add_line((0, 1), (4, 1), dxfattribs={"layer": "P$0$A-FURN"})
+    inner.add_line((0, 2), (4, 2))
+    outer.add_blockref("INNER", (0, 0), dxfattribs={"layer": "P$0$X"})
+    document.modelspace().add_blockref("OUTER", (0, 0))
+    found = read(tmp_path, document)
+    assert found.map.segments.endpoints.tolist() == [[0, 0, 4, 0]]
+    assert notes(found)["other_layer"][1] == 2
+    assert "P$0$A-FURN" in notes(found)["layers"][0]

@@ -202,7 +202,31 @@ def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
     assert (found["hidden"], found["entity_circle"], found["entity_text"], found["clipped"]) == (2, 2, 1, 1)
 
 
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        ("transform='rotate(90)' transform-origin='3 -2'", [1, -5, -4, 5]),
+        ("style='transform: rotate(0.25turn); transform-origin: 3px -2px'", [1, -5, -4, 5]),
+        ("style='transform: scale(0.5); transform-origin: center'", [10, 5, 15, 7.5]),
+        ("style='transform: scale(0.5); transform-origin: bottom right'", [20, 10, 25, 12.5]),
+        ("style='transform: scale(0.5); transform-origin: 50% top'", [10, 0, 15, 2.5]),
+        ("style='transform: translate3d(1px, 10%, 0) scale3d(2, 2, 1)'", [1, 2, 21, 12]),
+        ("style='transform: translateY(10%) rotateZ(90deg)'", [0, 2, -5, 12]),
+        ("style='transform: matrix3d(1,0,0,0, 0,1,0,0, 0,0,1,0, 4,5,0,1)'", [4, 5, 14, 10]),
+        ("style='rotate: 90deg; translate: 1px 2px; scale: 2'", [1, 2, -9, 22]),
+        ("style='rotate: z 90deg'", [0, 0, -5, 10]),
+        ("style='rotate: x 45deg; transform: none' rotate='90'", [0, 0, 10, 5]),
+    ],
+)
+def test_transforms(tmp_path: Path, attributes: str, expected: list[float]) -> None:
+    ((x1, y1, x2, y2),) = lines(tmp_path, f"<g {attributes}>{ONE}</g>")
+    assert [x1, y1, x2, y2] == pytest.approx(expected, abs=1e-6)
+
+
 def test_transforms_of_css(tmp_path: Path) -> None:
+    turned = f"<g style='transform: rotateX(9deg)'>{ONE}</g>"
+    boxed = f"<g style='transform: scale(1); transform-origin: 0% 0%; transform-box: fill-box'>{ONE}</g>"
+    assert counted(read(tmp_path, turned + boxed)) == {"transform": 1, "transform_box": 1, "directions": 0}
     assert lines(tmp_path, f"<g style='transform: translate(3px, 2px)'>{ONE}</g>") == [[3, 2, 13, 7]]
 
 

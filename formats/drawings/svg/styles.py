@@ -13,6 +13,7 @@ from ...errors import TooLargeError
 from ...limits import MAX_STYLE_RULES
 from .xml import kind_of
 
+# Those by which it is decided what is drawn, and where.
 PROPERTIES = frozenset(
     {
         "display",
@@ -24,11 +25,13 @@ PROPERTIES = frozenset(
         "fill",
         "fill-opacity",
         "transform",
+        "transform-origin",
+        "transform-box",
         "clip-path",
         "mask",
     }
 )
-"""Those by which it is decided what is drawn, and where."""
+OF_CSS_ALONE = frozenset({"translate", "rotate", "scale"})  # attributes of these names are something else
 CACHED = 10_000  # texts of style attributes, which repeat
 
 Declared = tuple[tuple[str, str, bool], ...]
@@ -104,5 +107,5 @@ def _declared(nodes: Iterable[Any]) -> Declared:
     return tuple(
         (node.lower_name, tinycss2.serialize(node.value).strip(), bool(node.important))
         for node in nodes
-        if node.type == "declaration" and node.lower_name in PROPERTIES
+        if node.type == "declaration" and node.lower_name in PROPERTIES | OF_CSS_ALONE
     )

@@ -15,6 +15,7 @@ from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES, MAX_UNITS
 from ..drawing import Drawing
 from .shapes import SHAPES, Measure, Viewport
 from .styles import Styles
+from .transforms import matrix_of
 from .xml import kind_of
 
 INKSCAPE_LABEL = "http://www.inkscape.org/namespaces/inkscape}label"
@@ -153,12 +154,12 @@ class Visible:
                 "elements with a clip-path or a mask are used whole, although a part of them may be hidden",
                 1,
             )
-        transform = style.get("transform", "")
+        matrix = matrix_of(style, outer.viewport, self._drawing)
         visibility = style.get("visibility", "").lower()
         return replace(
             outer,
             layers=(*outer.layers, *filter(None, names)),
-            matrix=svgelements.Matrix(transform) * outer.matrix if transform else outer.matrix,
+            matrix=outer.matrix if matrix is None else matrix * outer.matrix,
             stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
             visible=visibility == "visible" if visibility else outer.visible,
             stroked=_paints(style.get("stroke"), style.get("stroke-opacity"), outer.stroked),
