@@ -23,6 +23,20 @@ KINDS = ("FLASER", "RLASER", "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASE
 MESSAGES = {"ODOM", "TRUEPOS", "PARAM", "SYNC", "NMEAGGA", "NMEARMC", *KINDS}
 NO_RETURN = 80.0  # m; what the range finders of these logs read, or more, where nothing came back
 
+# Field of view, degrees, by the number of beams: SICK LMS 200 at 100 degrees, LMS 5xx at 190, Hokuyo URG-04LX, LMS 1xx,
+# TiM 571 and UTM-30LX.
+FIELDS_OF_VIEW = (
+    {101: 100.0, 201: 100.0, 401: 100.0} | dict.fromkeys((191, 381, 571, 761, 1141), 190.0)
+    | {681: 680 * 360 / 1024, 682: 681 * 360 / 1024, 683: 682 * 360 / 1024, 726: 725 * 360 / 1024, 769: 270.0}
+    | dict.fromkeys((541, 811, 1081), 270.0) | {540: 269.5, 1080: 269.75}
+)  # fmt: skip
+HALF_TURN = (180, 181, 360, 361, 720, 721)  # beams of a scanner of 180 degrees
+FEW_BEAMS = 100  # of which nothing is said
+
+
+Settings = dict[str, str]
+"""Values of the PARAM messages by name."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Angles:
@@ -53,8 +67,11 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
     wanted, stamps, first = options.topic, Stamps(notes), ""
     moves: bool | None = None
     seen: Counter[str] = Counter()
+    settings: Settings = {}
     for number, words in _messages(path, notes):
         kind = words[0]
+        if kind == "PARAM" and len(words) > 2:
+            settings[words[1]] = words[2]
         seen[kind] += 1
         if kind not in KINDS or (wanted is not None and kind != wanted):
             notes.add_dropped(f"message_{kind.lower()}", f"{kind} messages", 1)
@@ -64,7 +81,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             wanted = kind
             notes.add_assumed("topic", f"scans are those of {kind}, the first kind in the log")
         try:
-            scan = READERS[kind](words, kind)
+            scan = READERS[kind](words, kind, settings, notes)
         except InputError as error:
             first = first or error.message
             notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
@@ -93,7 +110,7 @@ def _moves(path: Path, kind: str) -> bool:
         if words[0] != kind:
             continue
         try:
-            scan = READERS[kind](words, kind)
+            scan = READERS[kind](words, kind, {}, Notes())
         except (InputError, ValueError, LookupError, OverflowError):
             continue
         if scan.pose is None or scan.pose != scan.mount:
@@ -119,19 +136,47 @@ def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
                 notes.add_dropped("other_lines", "lines that are not messages of CARMEN", 1)
 
 
-def _simple(words: list[str], kind: str) -> LoggedScan:
-    """``FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host logger_time``, half a turn from the right."""
+def _simple(words: list[str], kind: str, settings: Settings, notes: Notes) -> LoggedScan:
+    """``FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host logger_time``, ahead in the middle."""
     n = _count(words[1])
     ranges = [float(w) for w in words[2 : 2 + n]]
     rest = words[2 + n :]
     laser, robot = _pose(rest[0:3]), _pose(rest[3:6])
-    # 180 beams are one degree apart and leave the last end out, 181 have one at either end.
-    step = math.pi / (n if n % 2 == 0 else max(1, n - 1))
-    angles = _Angles(-0.5 * math.pi, step, NO_RETURN)
-    return _logged(kind, rest[6], ranges, angles, laser, robot)
+    side = "rear" if kind == "RLASER" else "front"
+    most = _setting(settings, f"robot_{side}_laser_max") or NO_RETURN
+    first, step = _field_of_view(n, settings, side, notes)
+    return _logged(kind, rest[6], ranges, _Angles(first, step, min(most, NO_RETURN)), laser, robot)
 
 
-def _full(words: list[str], kind: str) -> LoggedScan:
+def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple[float, float]:
+    """Return the first angle and the step of n beams, radians: by the settings of the log, else by n."""
+    step = _setting(settings, f"laser_{side}_laser_resolution")
+    field = _setting(settings, f"laser_{side}_laser_fov")
+    why, spaces = "by the PARAM of the log", max(1, n - 1)
+    if step and field and min(abs(n * step - field), abs((n - 1) * step - field)) > 1.5 * step:
+        why, step, field = f"because its PARAM {field:g} and {step:g} degrees contradict each other", None, None
+    elif step and field is None:
+        field = n * step if n % 2 == 0 and n * step in (180.0, 360.0) else (n - 1) * step
+    elif not (step or field):
+        known = n in FIELDS_OF_VIEW or n in HALF_TURN
+        why = "by the number of ranges" if known else "which neither a PARAM nor the number of ranges says"
+    if n not in FIELDS_OF_VIEW and n % 2 == 0 and field in (None, n * step if step else field):
+        spaces = n  # the last end is left out: 180 beams are one degree apart, 181 have one at either end
+    field = field or FIELDS_OF_VIEW.get(n, 180.0)
+    if field != 180.0 or (n > FEW_BEAMS and n not in HALF_TURN):
+        notes.add_assumed("field_of_view", f"scans of {n} ranges over {field:.4g} degrees, {why}", 1)
+    return -0.5 * math.radians(field), math.radians(step or field / spaces)
+
+
+def _setting(settings: Settings, name: str) -> float | None:
+    try:
+        value = float(settings[name])
+    except (LookupError, ValueError):
+        return None
+    return value if 0.0 < value <= 360.0 else None
+
+
+def _full(words: list[str], kind: str, settings: Settings, notes: Notes) -> LoggedScan:
     """``ROBOTLASER1 type start fov step max accuracy mode n r.. m remission.. laser(3) robot(3) (5) time ..``."""
     angles = _Angles(float(words[2]), float(words[4]), float(words[5]))
     n = _count(words[8])
@@ -172,7 +217,7 @@ def _pose(words: list[str]) -> RigidTransform:
     return RigidTransform(x, y, theta)
 
 
-READERS: dict[str, Callable[[list[str], str], LoggedScan]] = {
+READERS: dict[str, Callable[[list[str], str, Settings, Notes], LoggedScan]] = {
     "FLASER": _simple,
     "RLASER": _simple,
     "ROBOTLASER1": _full,

@@ -63,6 +63,36 @@ def test_an_odd_number_of_beams_has_one_at_either_end(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.degrees(scan.laser.angles[[0, 90, 180]]), [-90, 0, 90], atol=1e-9)
 
 
+FIELD, STEP = "PARAM laser_front_laser_fov", "PARAM laser_front_laser_resolution"
+
+
+@pytest.mark.parametrize(
+    ("params", "beams", "first", "last", "said"),
+    [
+        ("", 180, -90, 89, None), ("", 361, -90, 90, None), ("", 541, -135, 135, "number of ranges"),
+        ("", 1081, -135, 135, "number of ranges"), ("", 381, -95, 95, "number of ranges"),
+        ("", 682, -119.71, 119.71, "number of ranges"), ("", 401, -50, 50, "number of ranges"),
+        ("", 500, -90, 89.64, "neither a PARAM"), (f"{STEP} 0.25\n", 1081, -135, 135, "by the PARAM"),
+        (f"{FIELD} 190\n", 191, -95, 95, "by the PARAM"), (f"{FIELD} 180\n{STEP} 1.0\n", 180, -90, 89, None),
+        (f"{FIELD} 240\n{STEP} 0.36\n", 667, -120, 119.76, "by the PARAM"),
+        (f"{FIELD} 180\n{STEP} 0.25\n", 541, -135, 135, "contradict"),
+    ],
+)  # fmt: skip
+def test_the_field_of_view_of_flaser(
+    tmp_path: Path, params: str, beams: int, first: float, last: float, said: str | None
+) -> None:
+    log = read_log(written(tmp_path, f"{params}FLASER {beams} {'1.0 ' * beams} 0 0 0 0 0 0 1 host 1\n"))
+    (scan,) = log
+    np.testing.assert_allclose(np.degrees(scan.laser.angles[[0, -1]]), [first, last], atol=0.01)
+    found = [n.message for n in log.report.assumed if n.code == "field_of_view"]
+    assert (said is None and not found) or (said is not None and said in found[0])
+
+
+def test_a_greatest_range_of_flaser_is_no_return(tmp_path: Path) -> None:
+    path = written(tmp_path, "PARAM robot_front_laser_max 5.6 1 host 1\nFLASER 3 1.0 5.6 4.0 0 0 0 0 0 0 1 host 1\n")
+    np.testing.assert_array_equal(next(iter(read_log(path))).laser.cleaned, [1.0, math.inf, 4.0])
+
+
 def test_robotlaser_has_its_angles_and_poses_behind_the_remissions(tmp_path: Path) -> None:
     path = written(tmp_path, ROBOTLASER)
     (scan,) = read_log(path)
