@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from association import Deadline
 from registration import Segments
 
+from .beams import within
 from .evidence import are_enough
-from .scans import Localized
+from .scans import Localized, blocks, go_on
 from .tuning import (
     BIN,
     FULLY_ON_MAP,
@@ -56,14 +58,17 @@ class SeenLines:
         return SeenLines(self.lines.take(kept), self.visits[kept], self.places[kept], self.weights[kept])
 
 
-def unexplained(found: Sequence[Localized], known: Segments) -> SeenLines:
+def unexplained(found: Sequence[Localized], known: Segments, deadline: Deadline) -> SeenLines:
     """Return the lines of scans that lie along no wall of the map, or only in part."""
     ends, visits, places, weights = [], [], [], []
     for one in found:
         seen = one.scan.measured
         long = np.flatnonzero(seen.segments.lengths >= LEAST_SEEN)
         lines = Segments.derived(one.pose.apply(seen.segments.endpoints[long].reshape(-1, 2)).reshape(-1, 4))
-        new = _fraction_on_map(lines, known) < FULLY_ON_MAP
+        place = np.array([one.pose.x, one.pose.y])
+        reach = np.abs(lines.endpoints.reshape(-1, 2) - place).max(initial=0.0)
+        near = known.take(within(known, place, 1.5 * float(reach)))
+        new = _fraction_on_map(lines, near, deadline) < FULLY_ON_MAP
         rows = long[new]
         ends.append(lines.endpoints[new])
         visits.append(np.full(len(rows), one.visit))
@@ -77,20 +82,23 @@ def unexplained(found: Sequence[Localized], known: Segments) -> SeenLines:
     )
 
 
-def _fraction_on_map(lines: Segments, known: Segments) -> Floats:
+def _fraction_on_map(lines: Segments, known: Segments, deadline: Deadline) -> Floats:
     """Return which fraction of each line lies along walls of the map that face the same way, at most 1, (n,)."""
-    parallel = lines.directions @ known.directions.T >= np.cos(2.0 * SAME_ANGLE)
-    beside = np.abs(lines.midpoints @ known.normals.T - known.offsets[None, :]) <= ON_MAP
-    rows, walls = np.nonzero(parallel & beside)
-    direction = lines.directions[rows]
-    ends = [np.einsum("ij,ij->i", known.endpoints[walls, k : k + 2] - lines.endpoints[rows, :2], direction)
-            for k in (0, 2)]  # fmt: skip
-    low, high = np.maximum(np.minimum(*ends), 0.0), np.minimum(np.maximum(*ends), lines.lengths[rows])
-    covered = np.bincount(rows, np.maximum(0.0, high - low), len(lines))
+    covered = np.zeros(len(lines))
+    for part in blocks(len(lines), len(known), deadline):
+        parallel = lines.directions[part] @ known.directions.T >= np.cos(2.0 * SAME_ANGLE)
+        beside = np.abs(lines.midpoints[part] @ known.normals.T - known.offsets) <= ON_MAP
+        rows, walls = np.nonzero(parallel & beside)
+        rows += part.start
+        direction = lines.directions[rows]
+        ends = [np.einsum("ij,ij->i", known.endpoints[walls, k : k + 2] - lines.endpoints[rows, :2], direction)
+                for k in (0, 2)]  # fmt: skip
+        low, high = np.maximum(np.minimum(*ends), 0.0), np.minimum(np.maximum(*ends), lines.lengths[rows])
+        covered += np.bincount(rows, np.maximum(0.0, high - low), len(lines))
     return np.asarray(np.minimum(1.0, covered / lines.lengths))
 
 
-def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
+def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Floats, Floats]:
     """Join lines of several scans to walls that may be new.
 
     Parameters
@@ -98,6 +106,7 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
     seen : SeenLines
     known : Segments
         Of the map; what lies along them, or along a longer new wall, is left out.
+    deadline : Deadline
 
     Returns
     -------
@@ -111,13 +120,14 @@ def candidates(seen: SeenLines, known: Segments) -> tuple[Floats, Floats]:
     left = np.argsort(-seen.lines.lengths, kind="stable")
     endpoints, directions = seen.lines.endpoints[left], seen.lines.directions[left]
     while len(left):
+        go_on(deadline)
         mine = _along(endpoints, directions)
         rows = left[mine]
         left, endpoints, directions = left[~mine], endpoints[~mine], directions[~mine]
         if not _is_seen_often(seen.visits[rows], seen.places[rows]):
             continue
         group = seen.take(rows)
-        found = _pieces(group, known)
+        found = _pieces(group, known, deadline)
         walls += [piece for piece, _ in found]
         sigmas += [sigma for _, sigma in found]
         if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
@@ -152,7 +162,7 @@ def _along(endpoints: Floats, directions: Floats) -> Bools:
     return np.asarray(inside)
 
 
-def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
+def _pieces(group: SeenLines, known: Segments, deadline: Deadline) -> list[tuple[Floats, float]]:
     """Return the pieces of one line that several visits show, with their sigma; none along a wall of the map."""
     place, direction, sigma = _fit(group)
     begins = (group.lines.endpoints[:, :2] - place) @ direction
@@ -160,11 +170,14 @@ def _pieces(group: SeenLines, known: Segments) -> list[tuple[Floats, float]]:
     low = float(begins.min())
     count = int(np.ceil((float(ends.max()) - low) / BIN)) + 1
     middles = low + BIN * (np.arange(count) + 0.5)
-    covered = np.zeros((int(group.visits.max()) + 1, count), dtype=bool)
-    for visit, begin, end in zip(group.visits, begins, ends, strict=True):
-        covered[visit] |= (middles >= begin) & (middles <= end)
-    points = place + middles[:, None] * direction
-    seen = (covered.sum(axis=0) >= LEAST_VISITS) & ~_on_map(known, points, direction)
+    covered = np.zeros(count, dtype=np.intp)
+    for visit in np.unique(group.visits):
+        mine = group.visits == visit
+        first, past = np.searchsorted(middles, begins[mine]), np.searchsorted(middles, ends[mine], side="right")
+        steps = np.bincount(first, minlength=count + 1) - np.bincount(past, minlength=count + 1)
+        covered += np.cumsum(steps[:count]) > 0
+    seen = covered >= LEAST_VISITS
+    seen[seen] = ~_on_map(known, place + middles[seen, None] * direction, direction, deadline)
     return [
         (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
         for a, b in runs(seen)
@@ -189,17 +202,21 @@ def _fit(group: SeenLines) -> tuple[Floats, Floats, float]:
     return place, direction, float(np.sqrt(scatter / places + 1.0 / weight.sum()) + 0.002)
 
 
-def _on_map(known: Segments, points: Floats, direction: Floats) -> Bools:
+def _on_map(known: Segments, points: Floats, direction: Floats, deadline: Deadline) -> Bools:
     """Return which points of a line lie on a wall of the map that faces about the same way, (k,).
 
     A line across the sides of a round column is off their directions, too.
     """
     facing = np.flatnonzero(known.directions @ direction >= SAME_SIDE)
-    low, high = points.min(axis=0) - ON_MAP, points.max(axis=0) + ON_MAP
+    low = points.min(axis=0, initial=np.inf) - ON_MAP
+    high = points.max(axis=0, initial=-np.inf) + ON_MAP
     begins, ends = known.endpoints[facing, :2], known.endpoints[facing, 2:]
     met = (np.maximum(begins, ends) >= low).all(axis=1) & (np.minimum(begins, ends) <= high).all(axis=1)
     walls = known.take(facing[met])
-    off = points[:, None, :] - walls.endpoints[None, :, :2]
-    along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
-    gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
-    return np.asarray((gaps <= ON_MAP).any(axis=1))
+    out = np.zeros(len(points), dtype=bool)
+    for rows in blocks(len(points), len(walls), deadline):
+        off = points[rows, None, :] - walls.endpoints[None, :, :2]
+        along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
+        gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
+        out[rows] = (gaps <= ON_MAP).any(axis=1)
+    return out

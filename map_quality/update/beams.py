@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from association import Deadline
 from registration import Segments
 
 from .hanging import on_lines
-from .scans import Localized
-from .tuning import CHUNK, DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, MOST_BEAMS, THROUGH
+from .scans import Localized, blocks
+from .tuning import CHUNK, DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, MOST_BEAMS, MOST_PASSED, THROUGH
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+NOTHING = np.zeros(0, dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,10 @@ class Chunks:
         """Return the chunks of a wall."""
         return slice(int(self.first[wall]), int(self.first[wall + 1]))
 
+    def walls_of(self, chunks: Indices) -> Indices:
+        """Return the wall of each of some chunks."""
+        return np.searchsorted(self.first, chunks, side="right") - 1
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
@@ -60,26 +67,17 @@ class Followed:
     ----------
     chunks : (k,)
         That beams meet, in order.
-    through, on, before : (k,)
+    counts : (k, 3)
         Number of beams that pass through each, that end on it, and that end a little before it.
     """
 
     chunks: Indices
-    through: Indices
-    on: Indices
-    before: Indices
-
-    def and_behind(self, other: Followed, first: int) -> Followed:
-        """Return also the beams at further walls, whose chunks count from `first`."""
-        return Followed(
-            np.concatenate([self.chunks, other.chunks + first]),
-            np.concatenate([self.through, other.through]),
-            np.concatenate([self.on, other.on]),
-            np.concatenate([self.before, other.before]),
-        )
+    counts: Indices
 
 
-def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, oriented: bool) -> Followed:
+def follow(
+    chunks: Chunks, one: Localized, lines: Floats, sigma: float, deadline: Deadline, *, oriented: bool
+) -> Followed:
     """Follow the beams of a scan through walls.
 
     Parameters
@@ -90,15 +88,32 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
         Lines of walls that the scan is no evidence for, as of `hanging_lines`.
     sigma : float
         Standard deviation of the walls, metres.
+    deadline : Deadline
     oriented : bool
         True if a wall is seen from its left only.
     """
     origins, rays, ranges = beams_in_map(one)
-    near = _within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0)))
+    near = within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0))) if len(ranges) else NOTHING
     near = near[~on_lines(chunks.walls.take(near), lines)]
-    if not len(near) or not len(ranges):
-        return Followed(*(np.zeros(0, dtype=np.intp) for _ in range(4)))
-    walls = chunks.walls.take(near)
+    walls, first, counts = chunks.walls.take(near), chunks.first[near], chunks.counts[near]
+    met, flags = [NOTHING], [np.zeros((0, 3), dtype=bool)]
+    for rows in blocks(len(ranges), len(near), deadline):
+        column, along, kinds = _met(walls, one, (origins[rows], rays[rows], ranges[rows]), sigma, oriented=oriented)
+        part = (along / walls.lengths[column] * counts[column]).astype(np.intp)
+        met.append(first[column] + np.minimum(part, counts[column] - 1))
+        flags.append(kinds)
+    seen, where = np.unique(np.concatenate(met), return_inverse=True)
+    kinds = np.concatenate(flags)
+    total = np.stack([np.bincount(where[kinds[:, k]], minlength=len(seen)) for k in range(3)], axis=1)
+    some = total.any(axis=1)
+    return Followed(seen[some], total[some])
+
+
+def _met(
+    walls: Segments, one: Localized, seen: tuple[Floats, Floats, Floats], sigma: float, *, oriented: bool
+) -> tuple[Indices, Floats, Bools]:
+    """Return the walls that beams meet, where along them (m), and whether a beam passes, ends on, or ends before."""
+    origins, rays, ranges = seen
     beams, columns = _crossed(walls, origins, rays)
     normals = walls.normals[columns]
     slant = np.einsum("ij,ij->i", rays[beams], normals)
@@ -107,24 +122,21 @@ def follow(chunks: Chunks, one: Localized, lines: Floats, sigma: float, *, orien
     beams, columns, slant = beams[met], columns[met], slant[met]
     distance = ahead[met] / slant
     gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
-    kept = gap >= -np.maximum(HIDDEN, tolerance)
+    kept = np.flatnonzero(gap >= -np.maximum(HIDDEN, tolerance))
+    kept = kept[_nearest(beams[kept], distance[kept])]
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
     directions, lengths = walls.directions[columns], walls.lengths[columns]
     across = np.einsum("ij,ij->i", rays[beams], directions)
     off = origins[beams] - walls.endpoints[columns, :2]
     along = np.clip(np.einsum("ij,ij->i", off, directions) + distance * across, 0.0, lengths)
-    counts = chunks.counts[near[columns]]
-    chunk = chunks.first[near[columns]] + np.minimum((along / lengths * counts).astype(np.intp), counts - 1)
     facing = (slant < 0.0) | (not oriented)
     # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
     deep = along + THROUGH * tolerance / np.abs(slant) * across
-    within = (deep >= 0.0) & (deep <= lengths)
-    passed, ended = (gap > THROUGH * tolerance) & within, (np.abs(gap) <= tolerance) & facing
+    passed = (gap > THROUGH * tolerance) & (deep >= 0.0) & (deep <= lengths)
+    ended = (np.abs(gap) <= tolerance) & facing
     hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
-    counted = [np.bincount(chunk[one], minlength=len(chunks)) for one in (passed, ended, hidden)]
-    seen = np.flatnonzero(sum(counted))
-    return Followed(seen, *(one[seen] for one in counted))
+    return columns, along, np.stack([passed, ended, hidden], axis=1)
 
 
 def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, Indices]:
@@ -138,15 +150,22 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
     return np.divmod(np.flatnonzero(begins != ends), len(walls))
 
 
-def sees(chunks: Chunks, one: Localized, sigma: float) -> bool:
+def _nearest(beams: Indices, distance: Floats) -> Indices:
+    """Return the rows of the nearest walls of each beam, at most `MOST_PASSED`."""
+    order = np.lexsort((distance, beams))
+    sorted_beams = beams[order]
+    rank = np.arange(len(order)) - np.searchsorted(sorted_beams, sorted_beams)
+    return np.sort(order[rank < MOST_PASSED])
+
+
+def sees(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> bool:
     """Return whether any beam of a scan ends on some walls, a little before them, or passes through.
 
     True where the pose of the scan is not known: it may be anywhere.
     """
     if one.result.pose is None or one.result.covariance is None:
         return True
-    seen = follow(chunks, one, np.zeros((0, 3)), sigma, oriented=False)
-    return bool((seen.through + seen.on + seen.before).any())
+    return bool(len(follow(chunks, one, np.zeros((0, 3)), sigma, deadline, oriented=False).chunks))
 
 
 def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
@@ -164,7 +183,7 @@ def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
     return one.pose.apply(at), np.stack([np.cos(angles), np.sin(angles)], axis=1), beams.ranges[known]
 
 
-def _within(walls: Segments, place: Floats, reach: float) -> Indices:
+def within(walls: Segments, place: Floats, reach: float) -> Indices:
     """Return the walls that come nearer than `reach` to a place."""
     off = place - walls.endpoints[:, :2]
     along = np.clip(np.einsum("ij,ij->i", off, walls.directions), 0.0, walls.lengths)

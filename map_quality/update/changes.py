@@ -8,10 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from association import Deadline
 from registration import Segments
 
-from .evidence import WallEvidence, are_enough
+from .beams import Chunks
+from .evidence import Judged, WallEvidence, are_enough
 from .result import Change, ChangeCode, Evidence
+from .scans import blocks, go_on
 from .tuning import (
     CONTRADICTING,
     DEVIATIONS,
@@ -83,7 +86,9 @@ class Draft:
         )
 
 
-def draft_changes(evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float) -> list[Draft]:
+def draft_changes(
+    evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, deadline: Deadline
+) -> list[Draft]:
     """Return the changes that the evidence shows.
 
     Parameters
@@ -96,15 +101,17 @@ def draft_changes(evidence: WallEvidence, known: Segments, sigmas: Floats, sigma
         Of the walls that may be new, metres.
     sigma : float
         Of the map's walls, metres.
+    deadline : Deadline
     """
-    cuts = find_cuts(evidence, len(known))
+    judged = evidence.judge()
+    cuts = find_cuts(evidence, judged, len(known), deadline)
     removed = [_removal(cut) for cut in cuts if not len(cut.left)]
     shortened = [_shortening(cut, sigma) for cut in cuts if len(cut.left)]
-    extended, added = _new_walls(evidence, known, {cut.wall for cut in cuts}, sigmas, sigma)
+    extended, added = _new_walls(judged, known, {cut.wall for cut in cuts}, sigmas, sigma, deadline)
     ends = [known.endpoints[list(one.segments)] for one in removed]
-    removed = _joined(removed, ends, JOINED)
-    added = _joined(added, [one.new for one in added], NEW_JOINED)
-    moved, removed, added = _moves(removed, added, known)
+    removed = _joined(removed, ends, JOINED, deadline)
+    added = _joined(added, [one.new for one in added], NEW_JOINED, deadline)
+    moved, removed, added = _moves(removed, added, known, deadline)
     return [*moved, *removed, *added, *extended, *shortened]
 
 
@@ -117,20 +124,19 @@ def _shortening(cut: Cut, sigma: float) -> Draft:
 
 
 def _new_walls(
-    evidence: WallEvidence, known: Segments, cut: set[int], sigmas: Floats, map_sigma: float
+    judged: Judged, known: Segments, cut: set[int], sigmas: Floats, map_sigma: float, deadline: Deadline
 ) -> tuple[list[Draft], list[Draft]]:
     """Return extensions of walls of the map, one for each wall, and walls that continue none."""
     extended: dict[int, Draft] = {}
     added = []
-    there, gone = evidence.there, evidence.gone
     pieces: list[Floats] = []
     for number, sigma in enumerate(sigmas):
         wall = len(known) + number
-        own = evidence.chunks.of_wall(wall)
-        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), evidence, wall)
-        for begin, end in runs(_filled(there[own], gone[own]) & single):
-            piece = _part(evidence, wall, begin, end)
-            chunks = own.start + begin + np.flatnonzero(there[own][begin:end])
+        gone, there, _, _ = judged.of_wall(wall)
+        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), judged.chunks, wall, deadline)
+        for begin, end in runs(_filled(there, gone) & single):
+            piece = _part(judged.chunks, wall, begin, end)
+            chunks = judged.chunks.first[wall] + begin + np.flatnonzero(there[begin:end])
             if np.hypot(*(piece[2:] - piece[:2])) < LEAST_PIECE:
                 continue
             pieces.append(piece)
@@ -158,25 +164,28 @@ def _filled(there: Bools, gone: Bools) -> Bools:
     return out
 
 
-def _doubled(new: Segments, evidence: WallEvidence, wall: int) -> Bools:
+def _doubled(new: Segments, chunks: Chunks, wall: int, deadline: Deadline) -> Bools:
     """Return which chunks of a wall lie close before or behind a new wall that faces the same way, (k,).
 
     The one in front hides the other, so that both are never seen. Flat beams show a wall too near, for example.
     """
-    walls, count = evidence.chunks.walls, int(evidence.chunks.counts[wall])
+    walls, count = chunks.walls, int(chunks.counts[wall])
     direction = walls.directions[wall]
     places = (np.arange(count) + 0.5) / count * walls.lengths[wall]
     points = walls.endpoints[wall, :2] + places[:, None] * direction
     near = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * SAME_ANGLE)))
-    off = points[:, None, :] - near.endpoints[None, :, :2]
-    along = np.einsum("kij,ij->ki", off, near.directions)
-    across = np.abs(np.einsum("kij,ij->ki", off, near.normals))
-    return np.asarray(((along >= 0.0) & (along <= near.lengths) & (across <= DOUBLED)).any(axis=1))
+    out = np.zeros(count, dtype=bool)
+    for rows in blocks(count, len(near), deadline):
+        off = points[rows, None, :] - near.endpoints[None, :, :2]
+        along = np.einsum("kij,ij->ki", off, near.directions)
+        across = np.abs(np.einsum("kij,ij->ki", off, near.normals))
+        out[rows] = ((along >= 0.0) & (along <= near.lengths) & (across <= DOUBLED)).any(axis=1)
+    return out
 
 
-def _part(evidence: WallEvidence, wall: int, begin: int, end: int) -> Floats:
+def _part(chunks: Chunks, wall: int, begin: int, end: int) -> Floats:
     """Return the ends of some chunks of a wall, (4,)."""
-    walls, count = evidence.chunks.walls, evidence.chunks.counts[wall]
+    walls, count = chunks.walls, chunks.counts[wall]
     step, place, along = walls.lengths[wall] / count, walls.endpoints[wall, :2], walls.directions[wall]
     return np.concatenate([place + begin * step * along, place + end * step * along])
 
@@ -219,27 +228,29 @@ def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Float
     return np.concatenate([place + min(reach) * along, place + max(reach) * along])
 
 
-def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float) -> list[Draft]:
+def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float, deadline: Deadline) -> list[Draft]:
     """Join changes of walls whose ends are near one another: they are one thing."""
-    label = list(range(len(drafts)))
-    corners = [one.reshape(-1, 2) for one in ends]
-    for k in range(len(drafts)):
-        for other in range(k):
-            apart = np.linalg.norm(corners[k][:, None] - corners[other][None], axis=2)
-            if apart.min() <= gap:
-                old, new = label[k], label[other]
-                label = [new if one == old else one for one in label]
+    label = np.arange(len(drafts))
+    corners = np.concatenate([NO_WALLS, *ends]).reshape(-1, 2)
+    owner = np.repeat(label, [2 * len(one) for one in ends])
+    for corner, own in zip(corners, owner, strict=True):
+        go_on(deadline)
+        near = label[owner[np.hypot(*(corners - corner).T) <= gap]]
+        label[np.isin(label, near)] = label[own]
     joined: dict[int, Draft] = {}
-    for one, of in zip(drafts, label, strict=True):
+    for one, of in zip(drafts, label.tolist(), strict=True):
         joined[of] = joined[of].with_also(one) if of in joined else one
     return list(joined.values())
 
 
-def _moves(removed: list[Draft], added: list[Draft], known: Segments) -> tuple[list[Draft], list[Draft], list[Draft]]:
+def _moves(
+    removed: list[Draft], added: list[Draft], known: Segments, deadline: Deadline
+) -> tuple[list[Draft], list[Draft], list[Draft]]:
     """Pair things that are gone with new ones of the same sides nearby; return moves, and what is left of both."""
     moves, taken = [], set()
     left = []
     for old in removed:
+        go_on(deadline)
         sides = known.lengths[list(old.segments)]
         middle = known.midpoints[list(old.segments)].mean(axis=0)
         near = []
@@ -271,22 +282,19 @@ def _fits(new: Floats, old: Floats) -> bool:
 
 def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Change | None:
     """Return a change with its evidence; None if too little shows it, or too much contradicts it."""
-    through = int(evidence.through[:, draft.gone].sum())
-    on = int(evidence.on[:, draft.there].sum())
-    against = int(evidence.on[:, draft.gone].sum() + evidence.through[:, draft.there].sum())
+    gone, there = evidence.rows_of(draft.gone), evidence.rows_of(draft.there)
+    through, contra, _ = evidence.counts[gone].sum(axis=0).tolist()
+    passed, on, _ = evidence.counts[there].sum(axis=0).tolist()
+    against = contra + passed
     if against > CONTRADICTING * (through + on + against):
         return None
-    agreeing = np.zeros(len(names), dtype=bool)
-    poses = []
-    for chunks, is_on in ((draft.gone, False), (draft.there, True)):
-        if len(chunks):
-            agreeing |= evidence.visits_of(chunks, on=is_on)
-            poses.append(evidence.places_of(chunks, on=is_on))
-    visits = np.flatnonzero(agreeing)
+    sides = [(rows, is_on) for rows, is_on in ((gone, False), (there, True)) if len(rows)]
+    visits = sorted({visit for rows, is_on in sides for visit in evidence.visits_of(rows, on=is_on)})
+    poses = [evidence.places_of(rows, on=is_on) for rows, is_on in sides]
     if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < DOOR_VISITS):
         return None
     doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
-    told = Evidence(through, on, min(poses), len(visits), names[int(visits[0])], names[int(visits[-1])])
+    told = Evidence(through, on, min(poses), len(visits), names[visits[0]], names[visits[-1]])
     return Change(
         draft.code, draft.segments, draft.new, draft.sigma, told, float(np.clip(1.0 - doubt, 0.01, MOST_CONFIDENCE))
     )

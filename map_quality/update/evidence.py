@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationResult
+from association import AssociationResult, Deadline
 from registration import Segments
 
-from .beams import Chunks, Followed, follow
+from .beams import NOTHING, Chunks, Followed, follow
 from .hanging import hanging_lines
 from .scans import Localized
 from .tuning import ENOUGH_VISITS, FEW, LEAST_BEAMS, LEAST_POSES, LEAST_VISITS, MOST
@@ -22,96 +22,137 @@ Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WallEvidence:
-    """Evidence of all scans about chunks of walls.
+class Judged:
+    """What the evidence shows about the chunks that beams met.
 
     Attributes
     ----------
     chunks : Chunks
-    through, on, before : (v, c)
-        Beams of each visit that pass through each chunk, that end on it, and that end a little before it, so that it
-        may be there and hidden.
-    sights : (k, 3)
-        Distinct rows of chunk, place, and scan that saw something; `place` numbers the squares of 0.5 m.
-    seen_on : (k,)
-        True if most beams of that scan at that chunk end on it; else they pass through.
+    seen : (s,)
+        Those that beams met, ascending.
+    gone : (s,)
+        They are not there: several visits and poses pass through, and no visit reads them.
+    there : (s,)
+        They are there: several visits and poses read them, and no visit passes through.
+    open : (s,)
+        Some beams pass through, and nothing reads them: gone if the chunk next to them is.
+    read : (s,)
+        Some visit reads them.
     """
 
     chunks: Chunks
-    through: Indices
-    on: Indices
-    before: Indices
-    sights: Indices
-    seen_on: Bools
+    seen: Indices
+    gone: Bools
+    there: Bools
+    open: Bools
+    read: Bools
 
-    @property
-    def gone(self) -> Bools:
-        """Chunks that are not there: several visits and poses pass through, and no visit reads them, (c,)."""
-        return self._decided(self.through, self.on, self.before, on=False)
+    def of_wall(self, wall: int) -> tuple[Bools, Bools, Bools, Bools]:
+        """Return which chunks of a wall are gone, there, open, and read; (c,) each."""
+        own = self.chunks.of_wall(wall)
+        low, high = np.searchsorted(self.seen, [own.start, own.stop])
+        out = np.zeros((4, own.stop - own.start), dtype=bool)
+        for row, flags in zip(out, (self.gone, self.there, self.open, self.read), strict=True):
+            row[self.seen[low:high] - own.start] = flags[low:high]
+        return out[0], out[1], out[2], out[3]
 
-    @property
-    def there(self) -> Bools:
-        """Chunks that are there: several visits and poses read them, and no visit passes through, (c,)."""
-        return self._decided(self.on, self.through, np.zeros_like(self.on), on=True)
 
-    @property
-    def open(self) -> Bools:
-        """Chunks that some beams pass through, and that nothing reads: gone if the chunk next to them is, (c,)."""
-        through, on = self.through.sum(axis=0), self.on.sum(axis=0)
-        hidden = shows(self.on + self.before, self.through).any(axis=0)
-        return np.asarray((through >= LEAST_BEAMS) & (on <= FEW * (through + on)) & ~hidden)
+@dataclass(frozen=True, slots=True, eq=False)
+class WallEvidence:
+    """Evidence of scans about chunks of walls: a row for each chunk that a scan saw something of.
 
-    @property
-    def read(self) -> Bools:
-        """Chunks that some visit reads, (c,)."""
-        return np.asarray((self.on >= LEAST_BEAMS).any(axis=0))
+    Attributes
+    ----------
+    chunks : Chunks
+    chunk : (r,)
+        Ascending.
+    scan, visit, place : (r,)
+        Number of the scan, of its visit, and of the square of 0.5 m that it was taken in.
+    counts : (r, 3)
+        Beams that pass through the chunk, that end on it, and that end a little before it, so that it may be there
+        and hidden.
+    """
 
-    def _decided(self, agree: Indices, against: Indices, hidden: Indices, *, on: bool) -> Bools:
+    chunks: Chunks
+    chunk: Indices
+    scan: Indices
+    visit: Indices
+    place: Indices
+    counts: Indices
+
+    def judge(self) -> Judged:
+        """Decide about each chunk."""
+        seen, at = np.unique(self.chunk, return_inverse=True)
+        chunk, cells = _by_visit(at, self.visit, self.counts)
+        through, on, before = cells.T
+        total, read, hidden = np.zeros((len(seen), 3), dtype=np.intp), *np.zeros((2, len(seen)), dtype=bool)
+        np.add.at(total, chunk, cells)
+        np.logical_or.at(read, chunk, on >= LEAST_BEAMS)
+        np.logical_or.at(hidden, chunk, shows(on + before, through))
+        passed, ended = total[:, 0], total[:, 1]
+        is_open = (passed >= LEAST_BEAMS) & (ended <= FEW * (passed + ended)) & ~hidden
+        rows, near = self._spread(seen, at)
+        gone, there = (self._decided(total, rows, near, on=is_on) for is_on in (False, True))
+        return Judged(self.chunks, seen, gone, there, is_open, read)
+
+    def _spread(self, seen: Indices, at: Indices) -> tuple[Indices, Indices]:
+        """Return each row for its chunk, and for the chunks of its wall next to it: rows, and positions in `seen`."""
+        adjoin = (np.diff(seen) == 1) & (np.diff(self.chunks.walls_of(seen)) == 0)
+        behind, ahead = np.append(adjoin, False)[at], np.insert(adjoin, 0, False)[at]
+        rows = np.arange(len(at))
+        return np.concatenate([rows, rows[behind], rows[ahead]]), np.concatenate([at, at[behind] + 1, at[ahead] - 1])
+
+    def _decided(self, total: Indices, rows: Indices, near: Indices, *, on: bool) -> Bools:
         """Decide about each chunk by its beams and those of the chunks next to it; it has some of its own."""
-        own = agree.sum(axis=0) > 0
-        near, other, all_other = (self._near(one) for one in (agree, against, against + hidden))
-        clear = other.sum(axis=0) <= FEW * (near + other).sum(axis=0)
-        visits, no_visits = shows(near, all_other).sum(axis=0), shows(all_other, near).any(axis=0)
-        poses = self.poses(on=on)
-        return np.asarray(own & clear & ~no_visits & are_enough(visits, poses))
+        size = len(total)
+        chunk, cells = _by_visit(near, self.visit[rows], self.counts[rows])
+        agree, other = cells[:, int(on)], cells[:, int(not on)]
+        against = other if on else other + cells[:, 2]
+        both, others = np.bincount(chunk, agree + other, size), np.bincount(chunk, other, size)
+        visits = np.bincount(chunk[shows(agree, against)], minlength=size)
+        contradicted = np.bincount(chunk[shows(against, agree)], minlength=size) > 0
+        sights = self._shown(rows, on=on)
+        poses = np.unique(np.stack([near[sights], self.place[rows][sights]]), axis=1)[0]
+        enough = are_enough(visits, np.bincount(poses, minlength=size))
+        return np.asarray((total[:, int(on)] > 0) & (others <= FEW * both) & ~contradicted & enough)
 
-    def _near(self, counts: Indices) -> Indices:
-        """Return the sums over each chunk and the chunks of its wall next to it, (v, c)."""
-        inner = np.ones(len(self.chunks), dtype=bool)
-        inner[self.chunks.first[:-1]] = False  # the first chunk of a wall has none before it
-        total = counts.copy()
-        total[:, 1:] += counts[:, :-1] * inner[1:]
-        total[:, :-1] += counts[:, 1:] * inner[1:]
-        return total
+    def _shown(self, rows: Indices, *, on: bool) -> Bools:
+        """Return which rows read their chunk, or pass through it."""
+        through, ended, _ = self.counts[rows].T
+        return np.asarray((through + ended > 0) & ((ended > through) == on))
 
-    def poses(self, *, on: bool) -> Indices:
-        """Return the number of places from which each chunk, or one next to it, is read, or passed through, (c,)."""
-        sights = self.sights[self.seen_on == on]
-        places = int(sights[:, 1].max(initial=0)) + 1
-        chunk, place = np.divmod(np.unique(sights[:, 0] * places + sights[:, 1]), places)
-        wall = np.repeat(np.arange(len(self.chunks.walls)), self.chunks.counts)
-        spread = [chunk * places + place]
-        for step in (-1, 1):
-            near = chunk + step
-            inside = (near >= 0) & (near < len(self.chunks))
-            inside[inside] = wall[near[inside]] == wall[chunk[inside]]
-            spread.append(near[inside] * places + place[inside])
-        return np.bincount(np.unique(np.concatenate(spread)) // places, minlength=len(self.chunks))
+    def rows_of(self, chunks: Indices) -> Indices:
+        """Return the rows of some chunks."""
+        begin, end = (np.searchsorted(self.chunk, chunks, side=side) for side in ("left", "right"))
+        count = end - begin
+        return np.repeat(end - np.cumsum(count), count) + np.arange(count.sum())
 
-    def places_of(self, chunks: Indices, *, on: bool) -> int:
-        """Return the number of places from which any of some chunks is read, or passed through."""
-        chosen = np.isin(self.sights[:, 0], chunks) & (self.seen_on == on)
-        return len(np.unique(self.sights[chosen, 1]))
+    def is_read(self, rows: Indices) -> bool:
+        """Return whether a visit reads any chunk of some rows."""
+        _, cells = _by_visit(self.chunk[rows], self.visit[rows], self.counts[rows])
+        return bool((cells[:, 1] >= LEAST_BEAMS).any())
 
-    def scans_of(self, chunks: Indices) -> set[int]:
-        """Return the numbers of the scans that saw something of some chunks."""
-        return set(self.sights[np.isin(self.sights[:, 0], chunks), 2].tolist())
+    def places_of(self, rows: Indices, *, on: bool) -> int:
+        """Return the number of places from which the chunks of some rows are read, or passed through."""
+        return len(np.unique(self.place[rows][self._shown(rows, on=on)]))
 
-    def visits_of(self, chunks: Indices, *, on: bool) -> Bools:
-        """Return which visits show that some chunks are there, or not there, (v,)."""
-        own, other = (self.on, self.through) if on else (self.through, self.on)
-        mine, others = own[:, chunks].sum(axis=1), other[:, chunks].sum(axis=1)
-        return shows(mine, others)
+    def scans_of(self, rows: Indices) -> set[int]:
+        """Return the numbers of the scans that read chunks of some rows, or passed through."""
+        return set(self.scan[rows][self.counts[rows, :2].any(axis=1)].tolist())
+
+    def visits_of(self, rows: Indices, *, on: bool) -> set[int]:
+        """Return the visits that show that the chunks of some rows are there, or not there."""
+        visits, cells = _by_visit(self.visit[rows], np.zeros_like(rows), self.counts[rows])
+        return set(visits[shows(cells[:, int(on)], cells[:, int(not on)])].tolist())
+
+
+def _by_visit(chunk: Indices, visit: Indices, counts: Indices) -> tuple[Indices, Indices]:
+    """Sum the beams of each visit at each chunk; return the chunk of each sum, and the sums (k, 3)."""
+    visits = int(visit.max(initial=0)) + 1
+    key, where = np.unique(chunk * visits + visit, return_inverse=True)
+    sums = np.zeros((len(key), 3), dtype=np.intp)
+    np.add.at(sums, where, counts)
+    return key // visits, sums
 
 
 def are_enough(visits: Indices | int, poses: Indices | int) -> Bools:
@@ -142,6 +183,7 @@ class Gatherer:
         Standard deviation of the walls, metres.
     oriented : bool
         True if a wall is seen from its left only.
+    deadline : Deadline
     kept : dict of int to (AssociationResult, Floats, Followed)
         By the number of a scan: its answer, the lines that it is no evidence for, and its beams at the map.
     """
@@ -149,9 +191,10 @@ class Gatherer:
     known: Segments
     sigma: float
     oriented: bool
+    deadline: Deadline
     kept: dict[int, tuple[AssociationResult, Floats, Followed]] = field(default_factory=dict)
 
-    def gather(self, new: Segments, found: Sequence[Localized], visits: int) -> Generator[None, None, WallEvidence]:
+    def gather(self, new: Segments, found: Sequence[Localized]) -> Generator[None, None, WallEvidence]:
         """Follow the beams of localized scans, one scan at a step, and return the evidence.
 
         Parameters
@@ -160,33 +203,30 @@ class Gatherer:
             Walls that may be there; the evidence has them behind those of the map.
         found : sequence of Localized
             Scans that give evidence.
-        visits : int
-            Number of all visits.
         """
-        chunks = Chunks.of(Segments.derived(np.concatenate([self.known.endpoints, new.endpoints])))
         at_map, at_new = Chunks.of(self.known), Chunks.of(new)
-        through, on, before = (np.zeros((visits, len(chunks)), dtype=np.intp) for _ in range(3))
         places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
-        sights, seen_on = [np.zeros((0, 3), dtype=np.intp)], [np.zeros(0, dtype=bool)]
+        chunk, counts, of_scan = [NOTHING], [np.zeros((0, 3), dtype=np.intp)], [np.zeros((0, 3), dtype=np.intp)]
         for one in found:
             lines, seen = self._at_map(at_map, one)
-            beyond = follow(at_new, one, lines, self.sigma, oriented=self.oriented)
-            seen = seen.and_behind(beyond, len(at_map))
-            through[one.visit, seen.chunks] += seen.through
-            on[one.visit, seen.chunks] += seen.on
-            before[one.visit, seen.chunks] += seen.before
-            told = seen.through + seen.on > 0
-            row = seen.chunks[told]
-            sights.append(np.stack([row, np.full_like(row, places[one.place]), np.full_like(row, one.number)], axis=1))
-            seen_on.append(seen.on[told] > seen.through[told])
+            beyond = follow(at_new, one, lines, self.sigma, self.deadline, oriented=self.oriented)
+            chunk += [seen.chunks, beyond.chunks + len(at_map)]
+            counts += [seen.counts, beyond.counts]
+            of_scan.append(
+                np.tile([one.number, one.visit, places[one.place]], (len(seen.chunks) + len(beyond.chunks), 1))
+            )
             yield
-        return WallEvidence(chunks, through, on, before, np.concatenate(sights), np.concatenate(seen_on))
+        chunks = Chunks.of(Segments.derived(np.concatenate([self.known.endpoints, new.endpoints])))
+        met = np.concatenate(chunk)
+        order = np.argsort(met, kind="stable")
+        scan, visit, place = np.concatenate(of_scan)[order].T
+        return WallEvidence(chunks, met[order], scan, visit, place, np.concatenate(counts)[order])
 
     def _at_map(self, chunks: Chunks, one: Localized) -> tuple[Floats, Followed]:
         """Return the lines that a scan is no evidence for, and its beams at the map."""
         kept = self.kept.get(one.number)
         if kept is None or kept[0] is not one.result:
             lines = hanging_lines(one, self.sigma)
-            kept = one.result, lines, follow(chunks, one, lines, self.sigma, oriented=self.oriented)
+            kept = one.result, lines, follow(chunks, one, lines, self.sigma, self.deadline, oriented=self.oriented)
             self.kept[one.number] = kept
         return kept[1], kept[2]

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, SoftPrior, associate
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    CancelledError,
+    Deadline,
+    MapIndex,
+    Scan,
+    SoftPrior,
+    associate,
+)
 from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
 
 from ..scale import Matched, errors_of
@@ -19,6 +28,7 @@ from .tuning import (
     HELD_BACK,
     LEAST_SCANS,
     LEAST_USABLE,
+    MOST_CELLS,
     MOST_OWN_SIGMA,
     MOST_SIGMA,
     MOST_TURN_SIGMA,
@@ -41,6 +51,26 @@ OF_OLD_MAPS = frozenset(("map_mismatch", "insufficient_evidence", "not_on_map", 
 
 class UpdateError(InputError):
     """A scan cannot be evidence of a change."""
+
+
+class TimeOverError(Exception):
+    """The deadline has passed; what is not verified is not proposed."""
+
+
+def go_on(deadline: Deadline) -> None:
+    """Raise CancelledError or TimeOverError if an update has to end."""
+    if deadline.cancelled:
+        raise CancelledError
+    if deadline.passed:
+        raise TimeOverError
+
+
+def blocks(rows: int, columns: int, deadline: Deadline) -> Iterator[slice]:
+    """Cut a table of pairs into blocks of rows of bounded size, and look at the deadline before each."""
+    step = max(1, MOST_CELLS // max(1, columns))
+    for begin in range(0, rows, step):
+        go_on(deadline)
+        yield slice(begin, min(rows, begin + step))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,14 +210,22 @@ def held_back(visits: Sequence[int]) -> list[bool]:
     return held
 
 
-def on_map(one: Localized, segments: Segments) -> Localized:
-    """Return a scan with its correspondences on another map; without those on walls that this does not have."""
-    if one.on is segments:
-        return one
-    places = {ends.tobytes(): k for k, ends in enumerate(segments.endpoints)}
-    there = [(pair, places.get(one.on.endpoints[pair.map].tobytes())) for pair in one.result.correspondences]
-    kept = tuple(replace(pair, map=place) for pair, place in there if place is not None)
-    return replace(one, result=replace(one.result, correspondences=kept), on=segments)
+def on_map(found: Sequence[Localized], old: MapIndex, new: MapIndex, kept: Indices) -> list[Localized]:
+    """Return scans with their correspondences on a changed map; without those on walls that this does not have.
+
+    `kept` has the old segment that each segment of the new map is, below 0 for those that are new. Scans were searched
+    in either map.
+    """
+    if old is new:
+        return list(found)
+    place = {old_segment: k for k, old_segment in enumerate(kept.tolist()) if old_segment >= 0}
+    out = []
+    for one in found:
+        pairs = one.result.correspondences
+        if one.on is old.segments:
+            pairs = tuple(replace(pair, map=place[pair.map]) for pair in pairs if pair.map in place)
+        out.append(replace(one, result=replace(one.result, correspondences=pairs), on=new.segments))
+    return out
 
 
 def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:

@@ -13,17 +13,19 @@ each pose out: a pose that hangs on one wall tells nothing of that wall.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_array, csr_array, diags_array
 
-from association import MapIndex
+from association import Deadline, MapIndex
 from registration import Segments
 
 from .result import Sharpened
-from .scans import Localized
+from .scans import Localized, blocks, go_on
 from .tuning import (
     ANGLE_FLOOR,
     CORNER,
@@ -32,6 +34,7 @@ from .tuning import (
     LEAST_POSES,
     LEAST_VISITS,
     LINE_FLOOR,
+    MOST_POSES,
     MOST_TILT,
     OUTLYING,
     SHARPER,
@@ -67,7 +70,7 @@ class _Pairs:
         return _Pairs(*(getattr(self, name)[rows] for name in self.__slots__))
 
 
-def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float) -> Sharpened:
+def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline: Deadline) -> Sharpened:
     """Estimate the position of the walls that many scans see.
 
     Parameters
@@ -75,34 +78,40 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float) -> Sharpe
     index : MapIndex
         That the scans were searched in.
     found : sequence of Localized
-        Scans that give evidence.
+        Scans that give evidence; of more than `MOST_POSES` as many, evenly chosen.
     sigma : float
         Declared standard deviation of the map's lines, metres.
+    deadline : Deadline
 
     Returns
     -------
     Sharpened
         Of walls that several visits and places see, and whose position becomes clearly better known.
     """
+    found = found[:: max(1, math.ceil(len(found) / MOST_POSES))]
     known = Segments.derived(index.segments.endpoints[: index.directed])
-    wall_of = np.asarray(index.wall_of_piece[: index.directed], dtype=np.intp)
-    walls, wall_of = np.unique(wall_of, return_inverse=True)
-    middles, lengths = _extents(known, wall_of, len(walls))
+    wall_of = np.array(index.wall_of_piece[: index.directed], dtype=np.intp)
+    seen = np.unique([pair.map for one in found for pair in one.result.correspondences]).astype(np.intp)
+    pieces = np.flatnonzero(np.isin(wall_of, wall_of[seen]))
+    own, (walls, number) = known.take(pieces), np.unique(wall_of[pieces], return_inverse=True)
+    middles, lengths = _extents(own, number, len(walls))
+    wall_of[pieces] = number  # those that no scan sees stay as they are
     pairs = _pairs_of(known, wall_of, middles, found)
     prior = np.stack([np.full(len(walls), sigma), np.minimum(MOST_TILT, 2.0 * sigma / lengths)], axis=1)
-    shift, covariance = _solve(pairs, prior)
+    shift, covariance = _solve(pairs, prior, deadline)
     off = np.abs(pairs.residual - np.einsum("ij,ij->i", pairs.of_wall, shift[pairs.wall]))
     inliers = off <= OUTLYING * np.sqrt(pairs.variance + sigma**2)
-    shift, covariance = _solve(pairs.take(inliers), prior)
-    spread = _deviations(known, wall_of, middles, covariance)
+    shift, covariance = _solve(pairs.take(inliers), prior, deadline)
+    spread = _deviations(own, number, middles, covariance)
     widest = np.zeros(len(walls))
-    np.maximum.at(widest, wall_of, spread)
+    np.maximum.at(widest, number, spread)
     better = _seen_often(pairs, found, len(walls)) & (widest <= SHARPER * sigma)
     better &= np.abs(shift[:, 0]) <= OUTLYING * sigma
-    moved = np.flatnonzero(better[wall_of])
-    ends = _moved(known, wall_of, middles, np.where(better[:, None], shift, 0.0))
-    ends = _joined(known, ends, better[wall_of])
-    return Sharpened(moved, ends[moved], spread[moved])
+    mine = np.flatnonzero(better[number])
+    moved, ends = pieces[mine], known.endpoints.copy()
+    ends[moved] = _moved(own, number, middles, shift)[mine]
+    ends = _joined(known, ends, moved)
+    return Sharpened(moved, ends[moved], spread[mine])
 
 
 def _extents(known: Segments, wall_of: Indices, count: int) -> tuple[Floats, Floats]:
@@ -153,29 +162,41 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
     return _Pairs(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Pairs.__slots__))
 
 
-def _solve(pairs: _Pairs, prior: Floats) -> tuple[Floats, Floats]:
-    """Return the shift of each wall, offset and tilt (n, 2), and its covariance (n, 2, 2); poses are marginal."""
-    count = 2 * len(prior)
-    information, right = np.diag(1.0 / np.square(prior).ravel()), np.zeros(count)
-    weight = 1.0 / pairs.variance
-    columns = 2 * pairs.wall[:, None] + np.arange(2)
-    order = np.argsort(pairs.scan, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(pairs.scan[order])) + 1):
-        w, pose, wall = weight[rows], pairs.of_pose[rows], pairs.of_wall[rows]
-        own, where = np.unique(columns[rows].ravel(), return_inverse=True)
-        jacobian = np.zeros((len(rows), len(own)))
-        jacobian[np.arange(len(rows))[:, None], where.reshape(-1, 2)] = wall
-        residual = pairs.residual[rows]
-        x, y = FREE_POSE
-        of_pose = (pose * w[:, None]).T @ pose + np.diag(1.0 / np.square([x, x, y]))
-        both, at_wall, at_pose = (pose * w[:, None]).T @ jacobian, jacobian.T @ (w * residual), pose.T @ (w * residual)
-        gain = np.linalg.solve(of_pose, np.column_stack([both, at_pose]))
-        information[np.ix_(own, own)] += (jacobian * w[:, None]).T @ jacobian - both.T @ gain[:, :-1]
-        right[own] += at_wall - both.T @ gain[:, -1]
-    covariance = np.linalg.inv(information)
-    blocks = covariance.reshape(len(prior), 2, len(prior), 2)
-    of_walls: Floats = np.asarray(blocks[np.arange(len(prior)), :, np.arange(len(prior)), :], dtype=np.float64)
-    return np.asarray((covariance @ right).reshape(-1, 2)), of_walls
+def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Floats]:
+    """Return the shift of each wall, offset and tilt (n, 2), and its covariance (n, 2, 2); poses are marginal.
+
+    The walls, each a block of its own, are taken out first: the dense matrix that remains has the size of the poses.
+    """
+    go_on(deadline)
+    weight, numbers = 1.0 / pairs.variance, np.unique(pairs.scan, return_inverse=True)[1]
+    size = 3 * (int(numbers.max(initial=-1)) + 1)
+    of_wall = _sparse(pairs.of_wall, pairs.wall, prior.size)
+    of_pose = _sparse(pairs.of_pose, numbers, size)
+    at_wall, at_pose = of_wall.T @ (weight * pairs.residual), of_pose.T @ (weight * pairs.residual)
+    blocks_of = np.zeros((len(prior), 2, 2))
+    np.add.at(blocks_of, pairs.wall, (weight[:, None] * pairs.of_wall)[:, :, None] * pairs.of_wall[:, None, :])
+    own = np.linalg.inv(blocks_of + np.square(1.0 / prior)[:, :, None] * np.eye(2))
+    inverse = bsr_array((own, np.arange(len(own)), np.arange(len(own) + 1)))
+    weighted = diags_array(weight) @ of_pose
+    both = (of_wall.T @ weighted).tocsr()
+    gain = (inverse @ both).tocsr()
+    x, y = FREE_POSE
+    free = np.diag(np.tile(1.0 / np.square([x, x, y]), size // 3))
+    of_poses = np.linalg.inv(free + (of_pose.T @ weighted - both.T @ gain).toarray())
+    shift = inverse @ at_wall - gain @ (of_poses @ (at_pose - gain.T @ at_wall))
+    covariance = np.empty((len(prior), 2, 2))
+    for part in blocks(len(prior), 2 * size, deadline):
+        rows = gain[2 * part.start : 2 * part.stop]
+        through, direct = (np.asarray(one).reshape(-1, 2, size) for one in (rows @ of_poses, rows.toarray()))
+        covariance[part] = own[part] + np.einsum("kis,kjs->kij", through, direct)
+    return np.asarray(shift).reshape(-1, 2), covariance
+
+
+def _sparse(rows: Floats, block: Indices, columns: int) -> csr_array:
+    """Return a sparse matrix whose rows have their values in one block of columns each."""
+    count, width = rows.shape
+    at = width * block[:, None] + np.arange(width)
+    return csr_array((rows.ravel(), at.ravel(), width * np.arange(count + 1)), shape=(count, columns))
 
 
 def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: Floats) -> Floats:
@@ -206,21 +227,24 @@ def _moved(known: Segments, wall_of: Indices, middles: Floats, shift: Floats) ->
     return out
 
 
-def _joined(known: Segments, ends: Floats, moved: Bools) -> Floats:
+def _joined(known: Segments, ends: Floats, moved: Indices) -> Floats:
     """Return the ends with corners closed again: walls that moved end where they cross the wall that they met."""
     new, out = Segments.derived(ends), ends.copy()
-    cells: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for k, corner in enumerate(np.round(known.endpoints.reshape(-1, 2) / CORNER).astype(int).tolist()):
-        cells.setdefault((corner[0], corner[1]), []).append((k // 2, 2 * (k % 2)))
-    for members in cells.values():
-        if len(members) != 2 or members[0][0] == members[1][0]:
+    _, cell = np.unique(np.round(known.endpoints.reshape(-1, 2) / CORNER), axis=0, return_inverse=True)
+    order = np.argsort(cell.ravel(), kind="stable")
+    first, count = np.unique(cell.ravel()[order], return_index=True, return_counts=True)[1:]
+    corners = np.stack([order[first[count == 2]], order[first[count == 2] + 1]], axis=1)
+    walls = corners // 2
+    is_moved = np.zeros(len(known), dtype=bool)
+    is_moved[moved] = True
+    for (a, b), both in zip(walls.tolist(), corners.tolist(), strict=True):
+        if a == b or not (is_moved[a] or is_moved[b]):
             continue
-        a, b = members[0][0], members[1][0]
         normals = np.stack([new.normals[a], new.normals[b]])
         if abs(float(np.linalg.det(normals))) < CORNER_SINE:
             continue
         point = np.linalg.solve(normals, [new.offsets[a], new.offsets[b]])
-        for wall, at in members:
-            if moved[wall]:
-                out[wall, at : at + 2] = point
+        for corner in both:
+            if is_moved[corner // 2]:
+                out[corner // 2, 2 * (corner % 2) : 2 * (corner % 2) + 2] = point
     return out

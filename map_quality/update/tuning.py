@@ -18,6 +18,7 @@ OFF_SCALE, SURE_OF_SCALE = 0.005, 0.0025  # fractions, drawn; lengths of a visit
 HELD_BACK = 10  # one scan in so many gives no evidence, and tests the new map
 NEXT_HELD_BACK = 7  # by so many later in the next visit: a robot may pass the same places in the same order
 MOST_BEAMS = 720  # of a scan, time
+MOST_CELLS = 400_000  # pairs of a table that is in memory at once
 USUAL_SIGMA = 0.02  # m; of the walls of a map that does not declare it
 
 # --- Evidence of beams ------------------------------------------------------------------------------------------------
@@ -26,6 +27,7 @@ CHUNK = 0.2  # m; walls are judged in pieces of about this length
 LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are no evidence
 LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
+MOST_PASSED = 32  # walls that one beam is evidence of, the nearest; memory
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
 HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
 PLACE = 0.5  # m; scans from the same square of this side count as one pose
@@ -70,6 +72,7 @@ SAME_LENGTH = 0.15  # m; by which a side of a moved thing may differ
 LEAST_BLUR = 0.008  # m; of a map's declared sigma below which its walls stay as they are
 SHARPER = 0.7  # times the declared sigma; the deviation of a wall above which it stays as it is
 LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one scan that do not average out
+MOST_POSES = 1000  # of scans that are estimated with the walls; memory and time
 MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
 FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
 OUTLYING = 4.0  # times the deviation; a line of a scan farther off its wall does not count

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Collection, Generator, Sequence
@@ -10,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from association import CancelledError, Deadline, MapIndex
+from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from registration import InvalidArgumentError, Segments
 
 from .additions import candidates, unexplained
@@ -22,9 +23,11 @@ from .odometry import Carrying
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
 from .scans import (
     Localized,
+    TimeOverError,
     UpdateError,
     VisitScan,
     choose_evidence,
+    go_on,
     held_back,
     is_vouched,
     on_map,
@@ -36,6 +39,7 @@ from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 
 Floats = NDArray[np.float64]
+Drafts = Sequence[tuple[Draft, Change]]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
 
 
@@ -113,26 +117,17 @@ def updating(
     begun = _Update.of(index, scans, deadline or Deadline())
     names, _ = visit_numbers(scans)
     first = yield from begun.localize()
-    latest, proposed = list(first), None
-    shown: list[tuple[str, tuple[int, ...], int]] = []
     chosen, refused = choose_evidence(names, first, begun.sigma)
-    for number in range(ROUNDS):
-        drafts, evidence = yield from begun.draft(chosen, names)
-        before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
-        if begun.deadline.passed:
-            break
-        if shown == before or number == ROUNDS - 1:
-            proposed = yield from begun.verify(drafts, evidence, first)
-            break
-        latest = yield from begun.search_others(drafts, first, latest)
-        chosen, _ = choose_evidence(names, latest, begun.sigma)
-    sharper = (yield from begun.sharpen(proposed or Proposed(), first, names)) or proposed
-    return begun.proposal(sharper or Proposed(), first, refused, accept, refuse)
+    proposed = Proposed()
+    with contextlib.suppress(TimeOverError):
+        proposed = yield from begun.propose(chosen, first, names)
+        proposed = yield from begun.sharpen(proposed, first, names)
+    return begun.proposal(proposed, first, refused, accept, refuse)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Update:
-    """An update in the making."""
+    """An update in the making; its steps raise TimeOverError when the deadline passes."""
 
     index: MapIndex
     scans: list[VisitScan]  # with the poses that odometry carries to them
@@ -145,7 +140,7 @@ class _Update:
         """Begin an update."""
         known = Segments.derived(index.segments.endpoints[: index.directed])
         sigma, oriented = USUAL_SIGMA if index.sigma is None else index.sigma, len(index.segments) == index.directed
-        return cls(index, list(scans), deadline, Gatherer(known, sigma, oriented))
+        return cls(index, list(scans), deadline, Gatherer(known, sigma, oriented, deadline))
 
     @property
     def known(self) -> Segments:
@@ -156,11 +151,6 @@ class _Update:
     def sigma(self) -> float:
         """Of its walls, metres."""
         return self.gatherer.sigma
-
-    @property
-    def is_blurred(self) -> bool:
-        """Return whether the map declares that its walls are to be sharpened."""
-        return self.index.sigma is not None and self.index.sigma >= LEAST_BLUR
 
     def localize(self) -> Generator[None, None, list[Localized]]:
         """Search all scans that there is time for: each alone, and those that are not usable by odometry."""
@@ -182,93 +172,102 @@ class _Update:
         yield from Carrying(self.index, self.scans, found, self.deadline, at).carry()
         return found
 
+    def propose(
+        self, chosen: Sequence[Localized], first: Sequence[Localized], names: Sequence[str]
+    ) -> Generator[None, None, Proposed]:
+        """Draft changes until they show no more scans, and verify them."""
+        latest = first
+        shown: list[tuple[str, tuple[int, ...], int]] = []
+        for number in range(ROUNDS):
+            drafts, evidence = yield from self.draft(chosen, names)
+            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
+            if shown == before or number == ROUNDS - 1:
+                break
+            latest = yield from self.search_others(drafts, first, latest)
+            chosen, _ = choose_evidence(names, latest, self.sigma)
+        return (yield from self.verify(drafts, evidence, first))
+
     def draft(
         self, chosen: Sequence[Localized], names: Sequence[str]
-    ) -> Generator[None, None, tuple[list[tuple[Draft, Change]], WallEvidence]]:
+    ) -> Generator[None, None, tuple[Drafts, WallEvidence]]:
         """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
-        known = self.known
-        new, sigmas = candidates(unexplained(chosen, known), known)
-        evidence = yield from self.gatherer.gather(Segments.derived(new), chosen, len(names))
-        drafts = draft_changes(evidence, known, sigmas, self.sigma)
-        told = [(one, change_of(one, evidence, names)) for one in drafts]
+        known, deadline = self.known, self.deadline
+        new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
+        evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
+        told = []
+        for one in draft_changes(evidence, known, sigmas, self.sigma, deadline):
+            go_on(deadline)
+            told.append((one, change_of(one, evidence, names)))
         return [(one, change) for one, change in told if change is not None], evidence
 
     def verify(
-        self, drafts: Sequence[tuple[Draft, Change]], evidence: WallEvidence, first: Sequence[Localized]
-    ) -> Generator[None, None, Proposed | None]:
-        """Search all scans on the new map; drop changes that lower the score of their scans, or move their poses.
-
-        Returns
-        -------
-        Proposed or None
-            The changes that remain; None if none remain, or if there is no time to verify them.
-        """
+        self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]
+    ) -> Generator[None, None, Proposed]:
+        """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
         found, changed = list(first), self._changed(drafts)
         for _ in range(DROPS):
             new = self._index(drafts) if drafts else None
             if new is None:
-                return None
+                break
             found = yield from self._search_all(new, found, changed)
-            if self.deadline.passed:
-                return None
             dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
             dropped = dropped or self._blamed(drafts, first, found)
             if not dropped:
-                if not keeps_usable(first, found):
-                    return None
-                return Proposed(tuple(one for one, _ in drafts), tuple(change for _, change in drafts), tuple(found))
+                kept = drafts if keeps_usable(first, found) else []
+                return Proposed(tuple(change for _, change in kept), tuple(found) if kept else ())
             changed = self._changed([drafts[k] for k in dropped])
             drafts = [one for k, one in enumerate(drafts) if k not in dropped]
-        return None
+        return Proposed()
 
-    def _blamed(
-        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], found: Sequence[Localized]
-    ) -> list[int]:
+    def _blamed(self, drafts: Drafts, first: Sequence[Localized], found: Sequence[Localized]) -> list[int]:
         """Return the changes that are seen by usable scans which fit the new map less; none if these are few."""
         lost = lost_scans(first, found)
         if len(lost) <= most_lost(len(first)):
             return []
         walls = [self._changed([one]) for one in drafts]
-        seen = np.array([[sees(one, scan, self.sigma) for scan in lost] for one in walls])
+        seen = np.array([[sees(one, scan, self.sigma, self.deadline) for scan in lost] for one in walls])
         return blamed(seen, most_lost(len(first)))
 
     def sharpen(
         self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
-    ) -> Generator[None, None, Proposed | None]:
+    ) -> Generator[None, None, Proposed]:
         """Estimate the walls from all scans, and search all scans on the sharper map.
 
         Returns
         -------
-        Proposed or None
-            None if the map is sharp enough, if the sharper one fits the scans less, or if there is no time to try.
+        Proposed
+            The same if the map is sharp enough, or if the sharper one fits the scans less.
         """
-        if not self.is_blurred or self.deadline.passed:
-            return None
+        if self.index.sigma is None or self.index.sigma < LEAST_BLUR:
+            return proposed
         found = proposed.found or tuple(first)
         chosen, _ = choose_evidence(names, found, self.sigma)
         if not chosen:
-            return None
-        index = self._indexed(apply(self.known, proposed.changes))
-        better = sharpen(index, [on_map(one, index.segments) for one in chosen], self.sigma)
-        old = kept_indices(len(self.known), proposed.changes)[better.segments]
+            return proposed
+        kept = kept_indices(len(self.known), proposed.changes)
+        index = self._indexed(apply(self.known, proposed.changes)) if proposed.changes else self.index
+        better = sharpen(index, on_map(chosen, self.index, index, kept), self.sigma, self.deadline)
+        old = kept[better.segments]
         mine = old >= 0
-        sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
         if not mine.any():
-            return None
+            return proposed
+        sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
         new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
         again = yield from self._search_all(new, first, None)
-        if self.deadline.passed:
-            return None
         if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
-            return None
+            return proposed
         return replace(proposed, found=tuple(again), sharpened=sharpened)
 
     def _indexed(self, segments: Segments) -> MapIndex:
-        index = self.index
-        return MapIndex.build(segments, index.sigma, oriented=self.gatherer.oriented, points=index.points)
+        index, oriented = self.index, self.gatherer.oriented
+        try:
+            return MapIndex.build(segments, index.sigma, oriented=oriented, points=index.points, deadline=self.deadline)
+        except IndexingEndedError:
+            go_on(self.deadline)
+            raise
 
     def search_others(
-        self, drafts: Sequence[tuple[Draft, Change]], first: Sequence[Localized], latest: Sequence[Localized]
+        self, drafts: Drafts, first: Sequence[Localized], latest: Sequence[Localized]
     ) -> Generator[None, None, list[Localized]]:
         """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
 
@@ -279,7 +278,7 @@ class _Update:
             return list(latest)
         changed, found = self._changed(drafts), []
         for one, now in zip(first, latest, strict=True):
-            again = not one.precise and not self.deadline.passed and sees(changed, one, self.sigma)
+            again = not one.precise and sees(changed, one, self.sigma, self.deadline)
             found.append((yield from self._search(new, one)) if again else now)
         yield from Carrying(new, list(self.scans), found, self.deadline).carry()
         return found
@@ -293,27 +292,25 @@ class _Update:
         """
         found: list[Localized] = []
         for one in before:
-            if self.deadline.passed:
-                return found
-            again = changed is None or one.held_back or sees(changed, one, self.sigma)
+            again = changed is None or one.held_back or sees(changed, one, self.sigma, self.deadline)
             found.append((yield from self._search(index, one)) if again else one)
+        go_on(self.deadline)
         return found
 
-    def _changed(self, drafts: Sequence[tuple[Draft, Change]]) -> Chunks:
+    def _changed(self, drafts: Drafts) -> Chunks:
         """Return the walls that changes take away, and those that they bring."""
         old = sorted({k for _, change in drafts for k in change.segments})
         ends = [self.known.endpoints[old], *(change.new for _, change in drafts)]
         return Chunks.of(Segments.derived(np.concatenate(ends)))
 
-    def _index(self, drafts: Sequence[tuple[Draft, Change]]) -> MapIndex | None:
+    def _index(self, drafts: Drafts) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
         segments = apply(self.known, [change for _, change in drafts])
         return self._indexed(segments) if len(segments) else None
 
     def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
         """Search one scan in another map, unless that is the map of its last search."""
-        if self.deadline.cancelled:
-            raise CancelledError
+        go_on(self.deadline)
         before = self.latest.get(one.number)
         if before is not None and np.array_equal(before.on.endpoints, index.segments.endpoints):
             return replace(before, on=index.segments)

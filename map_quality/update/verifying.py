@@ -22,15 +22,12 @@ class Proposed:
 
     Attributes
     ----------
-    drafts : tuple of Draft
     changes : tuple of Change
-        The same with their evidence.
     found : tuple of Localized
         All scans, searched on the new map; empty where nothing has changed.
     sharpened : Sharpened
     """
 
-    drafts: tuple[Draft, ...] = ()
     changes: tuple[Change, ...] = ()
     found: tuple[Localized, ...] = ()
     sharpened: Sharpened = NOT_SHARPENED
@@ -43,7 +40,7 @@ def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
 
 def is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
     """Return whether a change leaves the poses of the scans that saw it, and does not lower their score."""
-    concerned = evidence.scans_of(draft.chunks)
+    concerned = evidence.scans_of(evidence.rows_of(draft.chunks))
     gain = 0.0
     for before, after in zip(first, found, strict=True):
         if before.number not in concerned or not before.located:

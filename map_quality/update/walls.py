@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +10,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .evidence import WallEvidence, are_enough, shows
+from association import Deadline
+
+from .beams import Chunks
+from .evidence import Judged, WallEvidence, are_enough
+from .scans import go_on
 from .tuning import (
     FEW_ON_THING,
-    LEAST_BEAMS,
     LEAST_CUT,
     LEAST_GONE,
     LEAST_GONE_OF_THING,
@@ -51,66 +55,62 @@ def runs(chosen: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def find_cuts(evidence: WallEvidence, walls: int) -> list[Cut]:
+def find_cuts(evidence: WallEvidence, judged: Judged, walls: int, deadline: Deadline) -> list[Cut]:
     """Return which of the first so many walls are gone, whole or in part."""
-    gone, read, open_ = evidence.gone, evidence.read, evidence.open
-    cuts = []
-    whole = _gone_things(evidence, walls)
-    for wall in range(walls):
-        if wall in whole:
-            own = evidence.chunks.of_wall(wall)
-            passed = evidence.through[:, own].any(axis=0)
-            cuts.append(Cut(wall, own.start + np.flatnonzero(passed), np.zeros((0, 4))))
-            continue
-        own = evidence.chunks.of_wall(wall)
-        if not gone[own].any():
-            continue
-        cut = _cut(evidence, wall, gone[own], read[own], open_[own])
-        if cut is not None:
-            cuts.append(cut)
-    return cuts
+    chunks = evidence.chunks
+    cuts = {cut.wall: cut for cut in _gone_things(evidence, walls, deadline)}
+    for wall in np.unique(chunks.walls_of(judged.seen[judged.gone])).tolist():
+        if wall < walls and wall not in cuts:
+            go_on(deadline)
+            gone, _, open_, read = judged.of_wall(wall)
+            cut = _cut(chunks, wall, gone, read, open_)
+            if cut is not None:
+                cuts[wall] = cut
+    return [cuts[wall] for wall in sorted(cuts)]
 
 
-def _gone_things(evidence: WallEvidence, walls: int) -> set[int]:
-    """Return the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
+def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iterator[Cut]:
+    """Yield the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
 
     A thing that beams pass through is not solid, so its other sides are gone, too, whether they were seen or not.
     """
-    ends = evidence.chunks.walls.endpoints[:walls]
-    corners = np.round(ends.reshape(-1, 2) / LOOP_GAP).astype(np.int64)
+    chunks = evidence.chunks
+    corners = np.round(chunks.walls.endpoints[:walls].reshape(-1, 2) / LOOP_GAP).astype(np.int64)
     _, corner = np.unique(corners, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 2)
-    lengths = evidence.chunks.walls.lengths
     at = np.bincount(corner.ravel())
     joined = coo_array((np.ones(walls), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
     _, label = connected_components(joined, directed=False)
-    out: set[int] = set()
-    for loop in np.unique(label[corner[:, 0]]):
-        mine = np.flatnonzero(label[corner[:, 0]] == loop)
-        if len(mine) < 3 or lengths[mine].sum() > THING or (at[np.unique(corner[mine])] != 2).any():
+    loop_of = label[corner[:, 0]]
+    order = np.argsort(loop_of, kind="stable")
+    passed = chunks.walls_of(evidence.chunk[evidence.counts[:, 0] > 0])
+    for loop in np.unique(loop_of[passed[passed < walls]]):
+        go_on(deadline)
+        mine = order[np.searchsorted(loop_of, loop, sorter=order) : np.searchsorted(loop_of, loop, "right", order)]
+        if len(mine) < 3 or chunks.walls.lengths[mine].sum() > THING or (at[np.unique(corner[mine])] != 2).any():
             continue
-        chunks = np.concatenate([np.arange(len(evidence.chunks))[evidence.chunks.of_wall(int(k))] for k in mine])
-        if _is_gone_whole(evidence, chunks):
-            out.update(mine.tolist())
-    return out
+        own = [np.arange(chunks.first[wall], chunks.first[wall + 1]) for wall in mine]
+        if _is_gone_whole(evidence, np.concatenate(own)):
+            for wall, part in zip(mine.tolist(), own, strict=True):
+                rows = evidence.rows_of(part)
+                gone = np.unique(evidence.chunk[rows][evidence.counts[rows, 0] > 0])
+                yield Cut(wall, gone, np.zeros((0, 4)))
 
 
 def _is_gone_whole(evidence: WallEvidence, chunks: Indices) -> bool:
     """Return whether beams of several visits and poses pass through a good part of a thing, and nothing reads it."""
-    through, on = evidence.through[:, chunks], evidence.on[:, chunks]
-    if on.sum() > FEW_ON_THING * (through.sum() + on.sum()) or shows(on.sum(axis=1), through.sum(axis=1)).any():
+    rows = evidence.rows_of(chunks)
+    through, on, _ = evidence.counts[rows].sum(axis=0)
+    if on > FEW_ON_THING * (through + on) or evidence.visits_of(rows, on=True) or evidence.is_read(rows):
         return False
-    if (on >= LEAST_BEAMS).any():
-        return False
-    visits = shows(through.sum(axis=1), on.sum(axis=1)).sum()
-    passed = float((through.sum(axis=0) > 0).mean())
-    poses = evidence.places_of(chunks, on=False)
-    return bool(are_enough(visits, poses) and passed >= LEAST_GONE_OF_THING)
+    passed = len(np.unique(evidence.chunk[rows][evidence.counts[rows, 0] > 0])) / len(chunks)
+    visits, poses = evidence.visits_of(rows, on=False), evidence.places_of(rows, on=False)
+    return bool(are_enough(len(visits), poses) and passed >= LEAST_GONE_OF_THING)
 
 
-def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
+def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
     """Return what is gone of a wall; None where that is too little to be sure of."""
-    first, length = int(evidence.chunks.first[wall]), float(evidence.chunks.walls.lengths[wall])
+    first, length = int(chunks.first[wall]), float(chunks.walls.lengths[wall])
     step = length / len(gone)
     if gone.mean() >= LEAST_GONE and not (read & ~gone).any():
         return Cut(wall, first + np.flatnonzero(gone), np.zeros((0, 4)))
@@ -128,6 +128,6 @@ def _cut(evidence: WallEvidence, wall: int, gone: Bools, read: Bools, open_: Boo
             out[begin:end] = True
     if not out.any():
         return None
-    place, along = evidence.chunks.walls.endpoints[wall, :2], evidence.chunks.walls.directions[wall]
+    place, along = chunks.walls.endpoints[wall, :2], chunks.walls.directions[wall]
     left = [np.concatenate([place + begin * step * along, place + end * step * along]) for begin, end in runs(~out)]
     return Cut(wall, first + np.flatnonzero(out & gone), np.array(left).reshape(-1, 4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from association import Deadline
 from map_quality.update.additions import SeenLines, candidates
 from map_quality.update.beams import Chunks
 from map_quality.update.changes import draft_changes
@@ -25,14 +26,14 @@ def seen(*lines: list[float]) -> SeenLines:
 
 def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
     """Return the walls that two visits add from three places; beams pass through those at `passed`, their y."""
-    new, sigmas = candidates(seen(*lines), MAP)
+    new, sigmas = candidates(seen(*lines), MAP, Deadline())
     chunks = Chunks.of(Segments.derived(np.concatenate([MAP.endpoints, new])))
     wall = np.repeat(np.arange(len(chunks.walls)), chunks.counts)
     on = np.full(len(wall), True) if passed is None else np.abs(chunks.walls.midpoints[wall, 1] - passed) > 0.06
-    counts = np.tile(9 * on, (2, 1)), np.tile(9 * ~on, (2, 1))
-    sights = np.array([(chunk, place, place) for chunk in range(len(wall)) for place in range(3)])
-    evidence = WallEvidence(chunks, counts[1], counts[0], np.zeros_like(counts[0]), sights, np.repeat(on, 3))
-    drafts = draft_changes(evidence, MAP, sigmas, 0.005)
+    chunk, scan = np.divmod(np.arange(6 * len(wall)), 6)
+    counts = np.stack([9 * ~on[chunk], 9 * on[chunk], 0 * chunk], axis=1)
+    evidence = WallEvidence(chunks, chunk, scan, scan % 2, scan % 3, counts)
+    drafts = draft_changes(evidence, MAP, sigmas, 0.005, Deadline())
     return np.concatenate([one.new for one in drafts if one.code == "added"])
 
 

@@ -8,10 +8,8 @@ import numpy as np
 
 from association import Deadline, MapIndex
 from map_quality.update.beams import Chunks, beams_in_map, follow
-from map_quality.update.evidence import WallEvidence
 from map_quality.update.scans import Localized, search
 from map_quality.update.tuning import DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, THROUGH
-from registration import Segments
 
 from .hall import PILLAR, RACK, segments, visit
 
@@ -56,32 +54,9 @@ def test_beams_are_counted_as_one_by_one() -> None:
     for one in localized():
         for oriented in (False, True):
             seen, expected = (
-                follow(chunks, one, NO_LINES, SIGMA, oriented=oriented),
+                follow(chunks, one, NO_LINES, SIGMA, Deadline(), oriented=oriented),
                 counted(chunks, one, oriented=oriented),
             )
             assert seen.chunks.tolist() == np.flatnonzero(expected.sum(axis=0)).tolist()
-            assert np.array_equal([seen.through, seen.on, seen.before], expected[:, seen.chunks])
+            assert np.array_equal(seen.counts.T, expected[:, seen.chunks])
             assert expected.any(axis=1).all()
-
-
-def test_a_chunk_counts_the_places_that_see_it_or_one_next_to_it_on_its_wall() -> None:
-    rng = np.random.default_rng(5)
-    chunks = Chunks.of(Segments.from_array([[0.0, k, length, k] for k, length in enumerate([0.2, 0.6, 1.4, 0.3])]))
-    sights = np.stack([rng.integers(len(chunks), size=40), rng.integers(9, size=40), np.arange(40)], axis=1)
-    seen_on, nothing = rng.random(40) < 0.6, np.zeros((1, len(chunks)), dtype=np.intp)
-    evidence = WallEvidence(chunks, nothing, nothing, nothing, sights, seen_on)
-    wall = np.repeat(np.arange(4), chunks.counts)
-    for on in (False, True):
-        expected = [
-            len(
-                {
-                    place
-                    for (other, place, _), seen in zip(sights.tolist(), seen_on, strict=True)
-                    if seen == on and abs(other - k) <= 1 and wall[other] == wall[k]
-                }
-            )
-            for k in range(len(chunks))
-        ]
-        assert evidence.poses(on=on).tolist() == expected
-    none = WallEvidence(chunks, nothing, nothing, nothing, sights[:0], seen_on[:0])
-    assert none.poses(on=True).tolist() == [0] * len(chunks)

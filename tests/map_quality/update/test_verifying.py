@@ -47,10 +47,10 @@ def localized(on: Segments, today: Segments) -> list[Localized]:
 def test_the_removal_of_a_rack_is_better_only_if_it_is_gone(today: Segments, better: bool) -> None:
     first, after = localized(HALL, today), localized(EMPTY, today)
     chosen = [one for one in first if one.precise]
-    evidence = done(Gatherer(HALL, 0.005, True).gather(Segments.derived(NOTHING), chosen, 2))
-    rack = np.concatenate([np.arange(len(evidence.chunks))[evidence.chunks.of_wall(k)] for k in range(12, 16)])
+    evidence = done(Gatherer(HALL, 0.005, True, Deadline()).gather(Segments.derived(NOTHING), chosen))
+    rack = np.arange(evidence.chunks.first[12], evidence.chunks.first[16])
     draft = Draft("removed", (12, 13, 14, 15), NOTHING, np.zeros(0), rack, rack[:0])
-    assert len(evidence.scans_of(rack)) > 5
+    assert len(evidence.scans_of(evidence.rows_of(rack))) > 5
     assert is_better(draft, evidence, first, after) is better
 
 
@@ -76,11 +76,11 @@ def test_a_scan_sees_a_wall_if_a_beam_meets_it() -> None:
     assert one.usable
     rack, pillar, away = (Chunks.of(Segments.derived(HALL.endpoints[rows])) for rows in ([12], [17], [5]))
     behind = Chunks.of(Segments.from_array(np.array([[13.5, 2.0, 13.5, 3.0]])))
-    assert sees(rack, one, 0.005)
-    assert sees(pillar, one, 0.005) or sees(away, one, 0.005)
-    assert not sees(behind, one, 0.005)
+    assert sees(rack, one, 0.005, Deadline())
+    assert sees(pillar, one, 0.005, Deadline()) or sees(away, one, 0.005, Deadline())
+    assert not sees(behind, one, 0.005, Deadline())
     lost = replace(one, result=replace(one.result, covariance=None))
-    assert sees(behind, lost, 0.005)  # it may be anywhere
+    assert sees(behind, lost, 0.005, Deadline())  # it may be anywhere
 
 
 @pytest.mark.parametrize(
@@ -114,11 +114,14 @@ def test_changes_replace_remove_and_append_segments_in_their_order() -> None:
 
 def test_correspondences_go_over_to_another_map_with_the_same_walls() -> None:
     one = localized(HALL, HALL)[0]
-    matched = [pair.map for pair in one.result.correspondences]
-    gone = matched[-1]
-    other = np.delete(HALL.endpoints, gone, axis=0)[::-1]
-    moved = on_map(one, Segments.derived(np.ascontiguousarray(other)))
-    kept = [(pair.scan, pair.map) for pair in one.result.correspondences if pair.map != gone]
-    assert [pair.scan for pair in moved.result.correspondences] == [scan for scan, _ in kept]
-    assert np.array_equal(moved.on.endpoints[[pair.map for pair in moved.result.correspondences]],
-                          HALL.endpoints[[wall for _, wall in kept]])  # fmt: skip
+    old = MapIndex.build(HALL, 0.005)
+    one = replace(one, on=old.segments)
+    gone = one.result.correspondences[-1].map
+    kept = np.delete(np.arange(len(HALL)), gone)[::-1]
+    new = MapIndex.build(Segments.from_array(HALL.endpoints[kept]), 0.005)
+    (moved,) = on_map([one], old, new, kept)
+    pairs = [pair for pair in one.result.correspondences if pair.map != gone]
+    assert [(pair.scan, kept[pair.map]) for pair in moved.result.correspondences] == [
+        (pair.scan, pair.map) for pair in pairs
+    ]
+    assert moved.on is new.segments
