@@ -21,7 +21,7 @@ from registration import RigidTransform
 
 from .contract import Json
 from .errors import CommandError, NoSuchMapError, RefusedError
-from .frames import Frames, odometry_of
+from .frames import Frames
 from .inputs import line_map_of, needing_formats
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
@@ -54,7 +54,7 @@ class Tally:
     reasons: Counter[str] = field(default_factory=Counter)
     warnings: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)  # ms
-    usable: list[StampedPose] = field(default_factory=list)
+    rounds: dict[int, list[StampedPose]] = field(default_factory=dict)  # usable poses, by the round of their clock
     on_map: dict[str, tuple[list[RigidTransform], list[RigidTransform]]] = field(default_factory=dict)  # usable, others
     refused: CommandError | None = None  # the last
     stays: Stays = field(default_factory=Stays)
@@ -64,7 +64,7 @@ class Tally:
         """The number of scans so far."""
         return sum(self.verdicts.values())
 
-    def take(self, stamp_ns: int, found: Found | CommandError) -> None:
+    def take(self, one: LoggedScan, found: Found | CommandError) -> None:
         """Count an answer, and keep its pose."""
         from formats import StampedPose
 
@@ -76,9 +76,9 @@ class Tally:
         self.reasons.update(one["code"] for one in found.reasons[:1])
         self.warnings.update(found.warnings)
         self.times.append(found.timing_ms["total"])
-        self.stays.take(stamp_ns, found)
+        self.stays.take(one.stamp_ns, found)
         if found.pose is not None and found.usable:
-            self.usable.append(StampedPose(stamp_ns, found.pose))
+            self.rounds.setdefault(one.round, []).append(StampedPose(one.stamp_ns, found.pose))
             self.on_map.setdefault(found.map_id or "", ([], []))[0].append(found.pose)
         elif found.pose is not None:
             self.on_map.setdefault(found.map_id or "", ([], []))[1].append(found.pose)
@@ -146,7 +146,7 @@ def replay(
         taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
             for one, found in located(locator, taken, frames, scans.mode):
-                tally.take(one.stamp_ns, found)
+                tally.take(one, found)
                 if as_json:
                     print_json(_line(one, found, frames, several="maps" in told))
         except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
@@ -154,9 +154,7 @@ def replay(
                 raise
             broken = error
     if out is not None:
-        from formats import write_tum
-
-        write_tum(tally.usable, out)
+        _write_poses(tally, out, sys.stderr if as_json else sys.stdout)
     if picture is not None:
         _draw(documents_of(told, server), tally, picture)
     _tell_log(opened_log, frames, sys.stderr if as_json else sys.stdout)
@@ -183,8 +181,7 @@ def located(
         except RefusedError as error:
             yield logged, error
             continue
-        odometry = odometry_of(one)
-        prior = None if tracker is None else tracker.prior(odometry)
+        prior = None if tracker is None else tracker.prior(one)
         try:
             found = locator.locate(one, prior, None if tracker is None or prior is None else tracker.map_id)
         except RefusedError as error:
@@ -195,7 +192,7 @@ def located(
             continue
         refusals = None
         if tracker is not None:
-            tracker.learn(found, odometry)
+            tracker.learn(found, one)
         yield one, found
 
 
@@ -227,6 +224,20 @@ def _line(one: LoggedScan, found: Found | CommandError, frames: Frames, *, sever
         "error": None if taken else str(found),
         **({"map_id": taken and taken.map_id} if several else {}),
     }
+
+
+def _write_poses(tally: Tally, out: Path, where: TextIO) -> None:
+    """Write the usable poses in the order of their stamps; those after a clock was set back to a file of their own."""
+    from formats import write_tum
+
+    first, *others = sorted(tally.rounds.items()) or [(0, [])]
+    for number, (_, poses) in enumerate([first, *others], 1):
+        file = out if number == 1 else out.with_stem(f"{out.stem}-{number}")
+        in_order = {one.stamp_ns: one for one in sorted(poses, key=lambda one: one.stamp_ns)}
+        write_tum(in_order.values(), file)
+        if others:
+            seconds = f"{min(in_order) / 1e9:.3f} to {max(in_order) / 1e9:.3f}"
+            print(f"{'poses':10}part {number} of the log, stamps {seconds}, in {file}", file=where)
 
 
 def _draw(documents: dict[str, Json], tally: Tally, picture: Path) -> None:
@@ -267,7 +278,7 @@ def _tell(tally: Tally) -> None:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
     if tally.warnings:
         print_table(("warning", "scans"), tally.warnings.most_common())
-    if len(tally.usable) < FEW * tally.count or "map_scale" in tally.warnings:
+    if sum(map(len, tally.rounds.values())) < FEW * tally.count or "map_scale" in tally.warnings:
         print_rows([("hint", HINT)])
     if tally.refused is not None:
         print_rows([("refused", str(tally.refused))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,14 @@ from linefix import SoftPrior
 from map_quality.update.odometry import odometry_deviations
 from registration import RigidTransform
 
+from .frames import odometry_of
 from .locators import Found
 
+if TYPE_CHECKING:
+    from formats import LoggedScan
+
 LOST = 5.0  # m; a prior wider than this is dropped
+FASTEST, FASTEST_TURN = 1.0, 1.0  # m/s and rad/s; deviations of a motion that odometry does not show
 
 
 @dataclass(slots=True)
@@ -26,41 +32,43 @@ class Tracker:
 
     _pose: RigidTransform | None = None
     _odometry: RigidTransform | None = None  # when that pose was found
-    _last: RigidTransform | None = None  # of the scan before
+    _last: LoggedScan | None = None  # the last scan of which odometry is known
     _driven: float = 0.0
     _turned: float = 0.0
+    _unknown: float = 0.0  # s without odometry
     map_id: str | None = None  # of several maps the one that the last usable pose is on
 
-    def prior(self, odometry: RigidTransform | None) -> SoftPrior | None:
-        """Return the prior of the next scan's pose, None without one.
-
-        Parameters
-        ----------
-        odometry : RigidTransform or None
-            odom_from_base at its time; of the sensor where its poses are located.
-        """
-        if odometry is None or self._last is None:
-            self._pose = None if odometry is None else self._pose
+    def prior(self, scan: LoggedScan) -> SoftPrior | None:
+        """Return the prior of the next scan's pose, None without one."""
+        odometry, last = odometry_of(scan), self._last
+        if odometry is None:
+            return None
+        before = None if last is None else odometry_of(last)
+        if last is None or before is None or last.part != scan.part:
+            self._pose = None
         else:
-            step = self._last.inverse().compose(odometry)
+            step = before.inverse().compose(odometry)
             self._driven += math.hypot(step.x, step.y)
             self._turned += abs(step.theta)
-        self._last = odometry
-        if self._pose is None or self._odometry is None or odometry is None:
+            self._unknown += scan.unknown_s - last.unknown_s
+        self._last = scan
+        if self._pose is None or self._odometry is None:
             return None
         sigma, angle = odometry_deviations(self._driven, self._turned)
+        sigma, angle = sigma + FASTEST * self._unknown, angle + FASTEST_TURN * self._unknown
         if sigma > LOST:
             return None
         here = self._pose.compose(self._odometry.inverse().compose(odometry))
         return SoftPrior(here, np.diag([sigma**2, sigma**2, angle**2]))
 
-    def learn(self, found: Found, odometry: RigidTransform | None) -> None:
+    def learn(self, found: Found, scan: LoggedScan) -> None:
         """Update the last usable pose with the answer to that scan."""
+        odometry = odometry_of(scan)
         if "prior_contradicted" in found.warnings:
             self._pose = None
-        elif found.usable:
+        elif found.usable and odometry is not None:
             self._pose, self._odometry, self.map_id = found.pose, odometry, found.map_id
-            self._driven = self._turned = 0.0
+            self._driven = self._turned = self._unknown = 0.0
 
 
 @dataclass(slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from formats.logs.transforms import between
+from formats.logs.tracks import between
 from registration import IDENTITY
 
 from .messages import TFMessage, TransformStamped

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -136,7 +137,9 @@ def _scans(log: Path, source: LogOptions) -> list[LoggedScan]:
     read = opened(log, options_of(source.topic, source.tf_namespace))
     taken = thinned(scans_of(read), source.scans)
     print_notes(read, sys.stderr)
-    return taken
+    # Odometry connects the scans of one part only: that with most of them.
+    most = Counter(one.part for one in taken).most_common(1)
+    return [one if one.part == most[0][0] else replace(one, pose=None) for one in taken]
 
 
 def thinned(found: Iterable[LoggedScan], most: int) -> list[LoggedScan]:

@@ -96,7 +96,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
         if scan.pose is not None and not moves:
             notes.add_assumed("no_odometry", "no odometry was found: in all scans the robot is at 0, 0, 0")
             scan = replace(scan, pose=None, pose_frame="")
-        yield scan
+        yield stamps.placed(scan)
     if "scans" not in notes.read and first:
         raise none_usable(name, notes, first)
     if "scans" not in notes.read:

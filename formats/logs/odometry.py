@@ -11,7 +11,9 @@ import numpy as np
 
 from registration import RigidTransform, wrap_angle
 
-from .transforms import NS, Floats, Track, Transforms, planar
+from ..report import Notes, shown
+from .tracks import NS, Floats, Known, Track
+from .transforms import Transforms, planar
 from .trees import ODOM, OdometryTopic
 from .tuning import MOVED, SAMPLES
 
@@ -62,15 +64,20 @@ class Odometry:
         """True where all poses are equal."""
         return not self._moving
 
-    def at(self, stamp: int) -> Floats | None:
-        """Return outer_from_frame at a time, nanoseconds, (4, 4); None where it is not known."""
-        inner = self._tree.along(self._path, stamp)
+    @property
+    def moving(self) -> tuple[Track, ...]:
+        """The transforms that are not fixed."""
+        return self._moving
+
+    def known(self, stamp: int, received: int) -> Known | None:
+        """Return outer_from_frame of something with a stamp and a time of reception, nanoseconds; None if unknown."""
+        inner = self._tree.known(self._path, stamp, received)
         if inner is None or self._messages is None:
             return inner
-        outer = self._messages.at(stamp)
-        return None if outer is None else outer @ inner
+        outer = self._messages.known(stamp, received)
+        return None if outer is None else outer.after(inner)
 
-    def speed(self, begin: int, end: int, mount: Floats) -> Speed | None:
+    def speed(self, begin: int, end: int, mount: Floats, received: int) -> Speed | None:
         """Return how fast a sensor moved during a scan; None where its poses do not give it.
 
         Parameters
@@ -79,8 +86,10 @@ class Odometry:
             Of the scan, nanoseconds.
         mount : (4, 4)
             frame_from_sensor.
+        received : int
+            When the scan was received.
         """
-        windows = [track.window(begin, end) for track in self._moving]
+        windows = [track.window(begin, end, received) for track in self._moving]
         known = [one for one in windows if one is not None]
         if len(known) < len(windows):
             return None
@@ -88,11 +97,35 @@ class Odometry:
         last = min((one[1] for one in known), default=end)
         if last <= first:
             return None
-        places = [self.at(first), self.at(last)]
-        if places[0] is None or places[1] is None:
+        a, b = self.known(first, received + first - begin), self.known(last, received + last - begin)
+        if a is None or b is None or a.part != b.part:
             return None
-        step, _ = planar(np.linalg.inv(places[0] @ mount) @ places[1] @ mount)
+        step, _ = planar(np.linalg.inv(a.matrix @ mount) @ b.matrix @ mount)
         return _speed(step, (last - first) / NS)
+
+    def note_doubts(self, notes: Notes) -> None:
+        """Note where odometry contradicts itself, is missing, or begins again."""
+        for track in self._moving:
+            topics = " and ".join(shown(one) for one in sorted(track.topics))
+            if track.jumps:
+                notes.add_assumed(
+                    "odometry_jumps",
+                    f"impossible steps of odometry on {topics}, the first {track.jumps[0]}: two publishers, or a "
+                    "reset. Odometry near them is not used",
+                    len(track.jumps),
+                )
+            if track.longest_gap:
+                notes.add_assumed(
+                    "odometry_gap",
+                    f"odometry on {topics} is missing for up to {track.longest_gap / NS:.1f} s; scans in gaps have no "
+                    "pose",
+                )
+            if track.part_count > 1:
+                notes.add_assumed(
+                    "odometry_parts",
+                    f"the stamps of odometry on {topics} jump back; each of {track.part_count} parts has its own "
+                    "odometry",
+                )
 
 
 def _speed(step: RigidTransform, seconds: float) -> Speed:

@@ -16,11 +16,13 @@ from ..report import Notes, shown
 from .bags import opened
 from .lasers import laser_of
 from .scan import Log, LoggedScan, LogOptions, none_usable
-from .sensors import Sensor, Sensors, note_tilt, time_increment_of
+from .sensors import Place, Sensor, Sensors, note_tilt, time_increment_of
 from .stamps import Stamps
 from .topics import scan_connections
+from .tracks import NS
 from .transforms import stamp_of
 from .trees import read_frames
+from .tuning import CLOCKS_APART_NS
 
 
 def read_bag(path: Path, options: LogOptions) -> Log:
@@ -47,7 +49,13 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             try:
                 laser = laser_of(message, notes)
                 stamp = stamps.of(stamp_of(message.header), received)
-                scan = _placed(connection.topic, laser, time_increment_of(message, notes), stamp, sensor, notes)
+                place = sensor.place(stamp, received)
+                _note_place(sensor, place, stamp, received, notes)
+                increment = time_increment_of(message, notes)
+                motion = sensor.motion(increment, len(laser.ranges), stamp, received, notes)
+                laser = replace(laser, motion=motion)
+                scan = _placed(connection.topic, laser, increment, stamp, sensor, place)
+                scan = stamps.placed(scan, place.part)
             except UprightFrameError as error:
                 first = first or str(error)
                 notes.add_dropped("upright_frame", f"scans in the frame {error}", 1)
@@ -56,24 +64,42 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
                 first = first or error.message
                 notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
                 continue
-            if scan.pose is None and sensor.odometry is not None:
-                notes.add_dropped("no_pose", "scans without a pose in the log (they are included)", 1)
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
         if "scans" not in notes.read:
             raise none_usable(bag.name, notes, first)
 
 
-def _placed(
-    topic: str, laser: LaserScan, time_increment: float, stamp: int, sensor: Sensor, notes: Notes
-) -> LoggedScan:
-    """Return a scan with where its sensor was, and how it moved."""
-    place = sensor.place(stamp)
+def _note_place(sensor: Sensor, place: Place, stamp: int, received: int, notes: Notes) -> None:
     note_tilt(sensor, place, notes)
-    motion = sensor.motion(time_increment, len(laser.ranges), stamp, notes)
+    if place.pose is not None or sensor.odometry is None:
+        return
+    notes.add_dropped("no_pose", "scans without a pose in the log (they are included)", 1)
+    apart = sensor.clock_offset(stamp, received)
+    if abs(apart) * NS > CLOCKS_APART_NS:
+        notes.add_assumed(
+            "clocks",
+            f"scans whose stamps are {abs(apart):.1f} s {'behind' if apart > 0.0 else 'ahead of'} those of odometry "
+            "that was received with them: their clocks differ, and odometry is not used for them",
+            1,
+        )
+
+
+def _placed(
+    topic: str, laser: LaserScan, time_increment: float, stamp: int, sensor: Sensor, place: Place
+) -> LoggedScan:
+    """Return a scan with where its sensor was."""
     outer = sensor.odometry.outer if place.pose is not None and sensor.odometry is not None else ""
-    base = sensor.base if place.mount is not None else ""
-    moved = replace(laser, motion=motion)
     return LoggedScan(
-        stamp, topic, shown(sensor.frame), moved, time_increment, place.pose, outer, place.mount, place.flipped, base
+        stamp,
+        topic,
+        shown(sensor.frame),
+        laser,
+        time_increment,
+        place.pose,
+        outer,
+        place.mount,
+        place.flipped,
+        sensor.base if place.mount is not None else "",
+        unknown_s=place.unknown_ns / NS,
     )

@@ -65,6 +65,13 @@ class LoggedScan:
         The robot's own frame, which `mount` is in.
     flipped : bool
         True if the sensor is mounted upside down: y becomes -y in its data before `pose` or `mount` apply.
+    part : int
+        Poses of scans of different parts are not comparable: the clock was set back, or odometry jumped in between.
+    unknown_s : float
+        Seconds up to this scan in which odometry is not known. The uncertainty of the motion between two scans of a
+        part grows with the difference.
+    round : int
+        The number of times that the clock of the scans was set back before.
     """
 
     stamp_ns: int
@@ -77,6 +84,9 @@ class LoggedScan:
     mount: RigidTransform | None = None
     flipped: bool = False
     base_frame: str = ""
+    part: int = 0
+    unknown_s: float = 0.0
+    round: int = 0
 
     @property
     def stamp(self) -> float:

@@ -16,7 +16,8 @@ from ..errors import UprightFrameError
 from ..report import Notes, shown
 from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
-from .transforms import NS, Floats, Transforms, planar
+from .tracks import NS, Floats
+from .transforms import Transforms, planar
 from .trees import BagFrames
 from .tuning import FASTEST, MOST_TILT, SAID_TILT
 
@@ -71,12 +72,18 @@ class Place:
     flipped : bool
     tilt : float
         Of the scan plane, radians; 0 where it is not known.
+    part : tuple of int
+        Of odometry, as of `Known`.
+    unknown_ns : int
+        As of `Known`.
     """
 
     pose: RigidTransform | None
     mount: RigidTransform | None
-    flipped: bool
-    tilt: float
+    flipped: bool = False
+    tilt: float = 0.0
+    part: tuple[int, ...] = ()
+    unknown_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,29 +107,35 @@ class Sensor:
     _tree: Transforms
     _mounting: tuple[str, ...]  # the frames from its own to `base`, else to the outermost
 
-    def place(self, stamp: int) -> Place:
-        """Return where it was at a time, nanoseconds.
+    def place(self, stamp: int, received: int) -> Place:
+        """Return where it was at the stamp of a scan that was received at a time, both in nanoseconds.
 
         Raises
         ------
         UprightFrameError
             When its scan plane is not horizontal, and no mount is given.
         """
-        by_log = self._tree.along(self._mounting, stamp) if len(self._mounting) > 1 or self.base else None
-        outer = None if self.odometry is None else self.odometry.at(stamp)
+        by_log = self._tree.along(self._mounting, stamp, received) if len(self._mounting) > 1 or self.base else None
+        known = None if self.odometry is None else self.odometry.known(stamp, received)
+        outer, since = (None, ()) if known is None else (known.matrix, (known.part, known.unknown_ns))
         if self.given is not None:
             flipped = by_log is not None and tilt_of(by_log) <= MOST_TILT and planar(by_log)[1]
             pose = None if outer is None else planar(outer @ self.given)[0]
-            return Place(pose, planar(self.given)[0], flipped, 0.0)
+            return Place(pose, planar(self.given)[0], flipped, 0.0, *since)
         pose = None if outer is None else planar(outer)[0]
         upright = outer if by_log is None else by_log
         if upright is None:
-            return Place(None, None, False, 0.0)
+            return Place(None, None)
         above = self.odometry.outer if self.odometry is not None and by_log is None else self._mounting[-1]
         mount, flipped = mounted(upright, self.frame, above)
-        return Place(pose, mount if self.base and by_log is not None else None, flipped, tilt_of(upright))
+        return Place(pose, mount if self.base and by_log is not None else None, flipped, tilt_of(upright), *since)
 
-    def motion(self, increment: float, beams: int, begin: int, notes: Notes) -> Motion | None:
+    def clock_offset(self, stamp: int, received: int) -> float:
+        """Return how many seconds longer after its stamp a scan was received than odometry was; 0 without odometry."""
+        moving = () if self.odometry is None else self.odometry.moving
+        return max(((received - stamp - one.latency(stamp, received)) / NS for one in moving), key=abs, default=0.0)
+
+    def motion(self, increment: float, beams: int, begin: int, received: int, notes: Notes) -> Motion | None:
         """Return how the sensor moved during a scan; None where that is not known.
 
         Parameters
@@ -130,15 +143,15 @@ class Sensor:
         increment : float
             From beam to beam, seconds; 0: not known.
         beams : int
-        begin : int
-            Time of the first beam, nanoseconds.
+        begin, received : int
+            Times of the first beam, and of the scan's reception, nanoseconds.
         notes : Notes
         """
         if not increment:
             return None
         mount = np.eye(4) if self.given is None else self.given
         end = begin + round(increment * beams * NS)
-        speed = None if self.odometry is None else self.odometry.speed(begin, end, mount)
+        speed = None if self.odometry is None else self.odometry.speed(begin, end, mount, received)
         if speed is None or not max(math.hypot(speed.vx, speed.vy), abs(speed.omega)) <= FASTEST:
             notes.add_assumed("motion", "scans with a time_increment, but without the motion of the sensor", 1)
             return None
@@ -200,11 +213,11 @@ class Sensors:
         wanted = self._options.pose_frame
         if wanted is not None:
             path = tree.path(wanted, frame)
-            return None if path is None or len(path) < 2 else Odometry.of_tree(tree, path)
+            return None if path is None or len(path) < 2 else self._doubted(Odometry.of_tree(tree, path))
         paths = [tree.path(outer, frame) or [frame] for outer in outer_frames(tree, frame)]
         moving = next((path for path in paths if moves(tree, path)), None)
         if moving is not None:
-            return Odometry.of_tree(tree, moving)
+            return self._doubted(Odometry.of_tree(tree, moving))
         above = tree.above(frame)
         base = base_of(above)
         fitting = self._frames.odometry_of(topic, namespace, above, base)
@@ -213,6 +226,10 @@ class Sensors:
             return None
         found = Odometry.of_messages(tree, tree.path(fitting[0].child or base or frame, frame) or [frame], fitting[0])
         self._note_messages(found, [one.topic for one in fitting[1:]])
+        return self._doubted(found)
+
+    def _doubted(self, found: Odometry) -> Odometry:
+        found.note_doubts(self._notes)
         return found
 
     def _note_missing(self, frame: str, paths: list[list[str]]) -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import bisect
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration import RigidTransform
 from registration.limits import MAX_COORDINATE
@@ -19,14 +16,11 @@ from registration.limits import MAX_COORDINATE
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_TRANSFORMS
 from ..report import shown
-from .tuning import REFIXED, STALE_NS, UNIT, WINDOW_NS
-
-Floats = NDArray[np.float64]
+from .tracks import NS, Floats, Known, Track
+from .tuning import UNIT
 
 MAX_FRAMES = 1000
 LONGEST_CHAIN = 64  # frames from the sensor to the outermost
-NS = 1_000_000_000
-ROUNDING = 1e-6  # m and rad; by which values differ that are equal
 
 
 def stamp_of(header: Any) -> int:
@@ -76,100 +70,6 @@ def matrix_of(position: Any, orientation: Any) -> Floats:
     return matrix
 
 
-@dataclass(slots=True)
-class Track:
-    """Values of one transform over time.
-
-    Attributes
-    ----------
-    static : bool
-        True: the last value holds at every time.
-    refixed : bool
-        True: static values differ.
-    moves : bool
-        True: values that are not static differ by more than rounding.
-    """
-
-    static: bool
-    refixed: bool = False
-    moves: bool = False
-    _stamps: list[int] = field(default_factory=list)
-    _matrices: list[Floats] = field(default_factory=list)
-    _sorted: bool = True
-
-    def __len__(self) -> int:
-        return len(self._stamps)
-
-    def add(self, stamp: int, matrix: Floats, *, static: bool) -> None:
-        """Add a value; a static one replaces the static one before, and is left out where there are others."""
-        if static and not self.static:
-            return
-        if self.static and not static:
-            self._stamps.clear()
-            self._matrices.clear()
-        self.static = static
-        if static:
-            before = self._matrices[-1] if self._matrices else matrix
-            self.refixed = self.refixed or not np.allclose(before, matrix, rtol=0.0, atol=REFIXED)
-            self._stamps[:], self._matrices[:] = [stamp], [matrix]
-            return
-        self._sorted = self._sorted and (not self._stamps or stamp >= self._stamps[-1])
-        self.moves = self.moves or (
-            bool(self._matrices) and not bool(abs(matrix - self._matrices[0]).max() <= ROUNDING)
-        )
-        self._stamps.append(stamp)
-        self._matrices.append(matrix)
-
-    def at(self, stamp: int) -> Floats | None:
-        """Return the value at a time, nanoseconds, between two values in proportion; None where it is not known."""
-        if self.static:
-            return self._matrices[-1]
-        stamps = self.stamps
-        after = bisect.bisect_left(stamps, stamp)
-        if after in (0, len(stamps)):
-            end = min(after, len(stamps) - 1)
-            return self._matrices[end] if abs(stamps[end] - stamp) <= STALE_NS else None
-        fraction = (stamp - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
-        return between(self._matrices[after - 1], self._matrices[after], fraction)
-
-    @property
-    def stamps(self) -> Sequence[int]:
-        """Times of the values in order, nanoseconds."""
-        if not self._sorted:
-            order = sorted(range(len(self._stamps)), key=self._stamps.__getitem__)
-            self._stamps = [self._stamps[k] for k in order]
-            self._matrices = [self._matrices[k] for k in order]
-            self._sorted = True
-        return self._stamps
-
-    def window(self, begin: int, end: int) -> tuple[int, int] | None:
-        """Return two times in or around a scan between which the values give its speed; None where none do.
-
-        Parameters
-        ----------
-        begin, end : int
-            Of the scan, nanoseconds.
-        """
-        stamps = self.stamps
-        first = max(0, bisect.bisect_right(stamps, begin) - 1)
-        last = min(len(stamps) - 1, bisect.bisect_left(stamps, end))
-        if first == last:
-            first, last = max(0, first - 1), min(len(stamps) - 1, last + (first == 0))
-        a, b = stamps[first], stamps[last]
-        if not 0 < b - a <= WINDOW_NS + end - begin or a > end + WINDOW_NS or b < begin - WINDOW_NS:
-            return None
-        within = max(a, begin), min(b, end)
-        return within if 2 * (within[1] - within[0]) >= end - begin else (a, b)
-
-
-def between(a: Floats, b: Floats, fraction: float) -> Floats:
-    """Interpolate two transforms that are near each other, (4, 4) each; the axes are made orthonormal again."""
-    mixed = (1.0 - fraction) * a + fraction * b
-    u, _, vt = np.linalg.svd(mixed[:3, :3])
-    mixed[:3, :3] = u @ vt
-    return mixed
-
-
 class Transforms:
     """The frames of one tree, and where they are in one another. A frame may have several parents.
 
@@ -184,8 +84,18 @@ class Transforms:
         self._parents: dict[str, dict[str, Track]] = {}
         self._count = 0
 
-    def add(self, parent: str, child: str, stamp: int, matrix: Floats, *, static: bool) -> None:
-        """Add one value.
+    def add(
+        self,
+        parent: str,
+        child: str,
+        stamp: int,
+        matrix: Floats,
+        *,
+        static: bool,
+        received: int | None = None,
+        topic: str = "",
+    ) -> None:
+        """Add one value, with when and where it was received.
 
         Raises
         ------
@@ -213,7 +123,7 @@ class Transforms:
             )
         tracks = self._parents.setdefault(child, {})
         track = tracks.pop(parent) if parent in tracks else Track(static)
-        track.add(stamp, matrix, static=static)
+        track.add(stamp, matrix, static=static, received=received, topic=topic)
         tracks[parent] = track  # the last one that was added stands last
 
     def knows(self, frame: str) -> bool:
@@ -251,32 +161,25 @@ class Transforms:
             frame = came_from[frame]
         return back[::-1]
 
-    def lookup(self, outer: str, inner: str, stamp: int) -> Floats | None:
-        """Return outer_from_inner at a time; None where it is not known.
-
-        Parameters
-        ----------
-        outer, inner : str
-            Frames; the outer one has to be above the inner.
-        stamp : int
-            Nanoseconds.
-
-        Returns
-        -------
-        (4, 4) or None
-        """
-        path = self.path(outer, inner)
-        return None if path is None else self.along(path, stamp)
-
-    def along(self, path: Sequence[str], stamp: int) -> Floats | None:
+    def along(self, path: Sequence[str], stamp: int, received: int | None = None) -> Floats | None:
         """Return the transform from the first frame of a path to its last, (4, 4); None where it is not known then."""
         matrix = np.eye(4)
         for child, parent in pairwise(path):
-            step = self._parents[child][parent].at(stamp)
+            step = self._parents[child][parent].at(stamp, received)
             if step is None:
                 return None
             matrix = step @ matrix
         return matrix
+
+    def known(self, path: Sequence[str], stamp: int, received: int | None) -> Known | None:
+        """Return `along` where each step is known as odometry."""
+        known = Known(np.eye(4))
+        for child, parent in pairwise(path):
+            step = self._parents[child][parent].known(stamp, received)
+            if step is None:
+                return None
+            known = step.after(known)
+        return known
 
     def _outwards(self, frame: str) -> dict[str, str | None]:
         """Return each frame above one, and the frame below from which it is reached first; nearest first."""

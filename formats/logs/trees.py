@@ -9,7 +9,8 @@ from typing import Any
 from ..errors import IncompleteFileError, MalformedFileError
 from ..report import Notes, shown
 from .bags import ODOMETRY, OLD_TRANSFORMS, SCAN, TRANSFORMS, Bag
-from .transforms import Floats, Track, Transforms, matrix_of, stamp_of
+from .tracks import Floats, Track
+from .transforms import Transforms, matrix_of, stamp_of
 
 STATIC, MOVING = "tf_static", "tf"
 ODOM = "odom"
@@ -152,15 +153,11 @@ def read_frames(bag: Bag, notes: Notes) -> BagFrames:
     single = {one for one in namespaces.values() if one}
     merged = len(single) == 1 and all(within(topic, next(iter(single))) for topic in scans)
     wanted = [one for one in bag.connections(TRANSFORMS, OLD_TRANSFORMS) if one.topic in namespaces]
-    for connection, message in bag.messages(wanted):
+    for connection, received, message in bag.received(wanted):
         namespace = next(iter(single)) if merged else namespaces[connection.topic]
         tree = frames.trees.setdefault(namespace, Transforms(bag.name))
-        static = connection.topic.rpartition("/")[2] == STATIC
         for one in message.transforms:
-            parent, child, transform = one.header.frame_id, one.child_frame_id, one.transform
-            matrix = _matrix(transform.translation, transform.rotation, f"{parent} to {child}", notes)
-            if matrix is not None:
-                _added(tree, parent, child, stamp_of(one.header), matrix, notes, static=static)
+            _add(tree, connection.topic, received, one, notes)
         notes.add_read("transforms", "messages of tf", 1)
     frames.odometry += _odometry(bag, notes)
     for tree in frames.trees.values():
@@ -178,7 +175,7 @@ def _namespaces(bag: Bag) -> dict[str, str]:
 
 def _odometry(bag: Bag, notes: Notes) -> Iterable[OdometryTopic]:
     found: dict[tuple[str, str, str], OdometryTopic] = {}
-    for connection, message in bag.messages(bag.connections(ODOMETRY)):
+    for connection, received, message in bag.received(bag.connections(ODOMETRY)):
         pose, child = message.pose.pose, message.child_frame_id.strip("/")
         matrix = _matrix(pose.position, pose.orientation, f"odometry on {connection.topic}", notes)
         if matrix is None:
@@ -186,7 +183,7 @@ def _odometry(bag: Bag, notes: Notes) -> Iterable[OdometryTopic]:
         key = (connection.topic, message.header.frame_id.strip("/") or ODOM, child)
         if key not in found:
             found[key] = OdometryTopic(*key, Track(static=False))
-        found[key].track.add(stamp_of(message.header), matrix, static=False)
+        found[key].track.add(stamp_of(message.header), matrix, received=received, topic=connection.topic)
         notes.add_read("odometry", "messages of odometry", 1)
     return found.values()
 
@@ -199,11 +196,14 @@ def _matrix(position: Any, orientation: Any, what: str, notes: Notes) -> Floats 
         return None
 
 
-def _added(
-    tree: Transforms, parent: str, child: str, stamp: int, matrix: Floats, notes: Notes, *, static: bool
-) -> None:
+def _add(tree: Transforms, topic: str, received: int, one: Any, notes: Notes) -> None:
+    parent, child, transform = one.header.frame_id, one.child_frame_id, one.transform
+    matrix = _matrix(transform.translation, transform.rotation, f"{parent} to {child}", notes)
+    if matrix is None:
+        return
+    static = topic.rpartition("/")[2] == STATIC
     try:
-        tree.add(parent, child, stamp, matrix, static=static)
+        tree.add(parent, child, stamp_of(one.header), matrix, static=static, received=received, topic=topic)
     except MalformedFileError as error:
         what = f"{shown(parent) or 'a frame without a name'} to {shown(child) or 'a frame without a name'}"
         notes.add_dropped("broken_frame", f"invalid transforms, the last one {what}: {error.message}", 1)

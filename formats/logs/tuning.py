@@ -3,6 +3,12 @@
 import math
 
 MOVED = 0.05  # m and rad; a frame that stays within it does not move: half of what tracking allows at rest
+MOST_GAP_NS = 500_000_000  # between two values of odometry that it is interpolated between, and around jumps of it
+MOST_PERIODS = 3  # the same, in periods of odometry: two messages that are lost
+USUAL_GAP_NS = 200_000_000  # the same, at least: at 2 m/s^2 the middle is 1 cm off
+PART_NS = 300_000_000  # a stamp that is so far before the last one begins a new part; messages out of order are nearer
+CLOCKS_APART_NS = 500_000_000  # by which times from stamp to reception differ where clocks do; buffers delay by less
+JITTER = 0.1  # m and rad that two values may differ at any times: stamps of one batch
 STALE_NS = 500_000_000  # a moving transform holds no longer than this before its first and after its last value
 WINDOW_NS = 500_000_000  # between the values that a speed is taken from, the duration of the scan aside
 FASTEST = 10.0  # m/s and rad/s; a robot indoors that seems to be faster has odometry that jumps

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import linefix
 from cli.locators import Found
 from cli.tracking import LOST, Tracker
+from formats import LoggedScan
 from registration import RigidTransform
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
@@ -110,9 +112,27 @@ def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = N
     return Found("ok", usable, 0.9, pose, None, [], warnings, {})
 
 
+def test_poses_after_a_clock_was_set_back_are_in_a_file_of_their_own(
+    linefix: Linefix, folder: Path, truth: list[RigidTransform]
+) -> None:
+    (folder / "twice.log").write_text(2 * (folder / "drive.log").read_text())
+    ended = linefix("replay", "twice.log", "--map", "floor.json", "--every", "2", "--out", "poses.tum")
+    assert ended.code == 0, ended.err
+    for name in ("poses.tum", "poses-2.tum"):
+        stamps = [float(row.split()[0]) for row in (folder / name).read_text().splitlines()]
+        assert len(stamps) >= SCANS // 4
+        assert stamps == sorted(set(stamps))
+    assert "part 2 of the log, stamps 10" in ended.out
+
+
+def scan_at(pose: RigidTransform | None, **odometry: Any) -> LoggedScan:
+    return LoggedScan(0, "/scan", "laser", linefix.LaserScan(0.0, 0.1, [1.0]), pose=pose, **odometry)
+
+
 def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
     tracker, at = Tracker(), RigidTransform(2.0, 1.0, 0.5)
-    before, after = ODOM_FROM_MAP.compose(at), ODOM_FROM_MAP.compose(RigidTransform(3.0, 1.2, 0.9))
+    before = scan_at(ODOM_FROM_MAP.compose(at))
+    after = scan_at(ODOM_FROM_MAP.compose(RigidTransform(3.0, 1.2, 0.9)))
     assert tracker.prior(before) is None
     tracker.learn(answer(at, usable=False), before)
     assert tracker.prior(before) is None
@@ -130,16 +150,29 @@ def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
 
 def test_what_is_known_gets_less_with_the_way_and_ends() -> None:
     tracker, here = Tracker(), RigidTransform(0.0, 0.0, 0.0)
-    tracker.prior(here)
-    tracker.learn(answer(here), here)
+    tracker.prior(scan_at(here))
+    tracker.learn(answer(here), scan_at(here))
     sigmas = []
     for k in range(1, 100):
-        prior = tracker.prior(RigidTransform(float(k % 2), 0.0, 0.0))  # to and fro
+        prior = tracker.prior(scan_at(RigidTransform(float(k % 2), 0.0, 0.0)))  # to and fro
         if prior is None:
             break
         sigmas.append(math.sqrt(prior.covariance[0][0]))
     assert sigmas == sorted(sigmas)
     assert LOST - 0.2 < sigmas[-1] <= LOST
-    tracker.learn(answer(here), here)
-    assert tracker.prior(None) is None
-    assert tracker.prior(here) is None
+
+
+def test_what_odometry_does_not_know_widens_the_prior_and_another_part_ends_it() -> None:
+    tracker, here = Tracker(), RigidTransform(0.0, 0.0, 0.0)
+    tracker.prior(scan_at(here))
+    tracker.learn(answer(here), scan_at(here))
+    assert tracker.prior(scan_at(None)) is None
+    sigmas = []
+    for unknown_s in (0.0, 1.0, 3.0):
+        prior = tracker.prior(scan_at(here, unknown_s=unknown_s))
+        assert prior is not None
+        sigmas.append(math.sqrt(prior.covariance[0][0]))
+    assert sigmas[1] > sigmas[0] + 0.9
+    assert sigmas[2] > sigmas[1] + 1.8
+    assert tracker.prior(scan_at(here, unknown_s=3.0, part=1)) is None
+    assert tracker.prior(scan_at(here, unknown_s=3.0)) is None

@@ -1,0 +1,123 @@
+"""Odometry of a log is used where it is known: not in gaps, across clocks that were set back, or where it jumps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from formats import LoggedScan, read_log
+
+from .robots import Robots, codes, fixed, read
+from .test_logs import SECOND
+
+TENTH = SECOND // 10
+BEGUN = 100 * SECOND
+Value = tuple[int, int, float]  # received, stamp, x
+
+
+def drive(first: int, last: int, *, back: int = 0, speed: float = 1.0, since: int = 0) -> list[Value]:
+    """Return values of tenths of a second; `back` is by how much the clock was set back."""
+    return [(BEGUN + k * TENTH, BEGUN + k * TENTH - back, speed * 0.1 * (k - since)) for k in range(first, last)]
+
+
+class Recorded(Robots):
+    """A bag whose messages are received at a time that is set."""
+
+    now = 0
+
+    def write(self, topic: str, kind: str, ns: int, message: Any) -> None:
+        super().write(topic, kind, self.now, message)
+
+
+def recorded(
+    folder: Path, values: Sequence[Value], scans: Sequence[tuple[int, int]], *, messages: bool
+) -> tuple[list[LoggedScan], dict[str, int], str]:
+    """Write values of odometry, as transforms or as messages, and scans; return what is read, and its notes."""
+    bag = Recorded("mcap", folder)
+    fixed(bag, "base_link", "laser")
+    for bag.now, stamp, x in sorted([*values, *((*one, math.nan) for one in scans)], key=lambda one: one[0]):
+        if math.isnan(x):
+            bag.scan(stamp)
+        elif messages:
+            bag.says(stamp, x)
+        else:
+            bag.transform("/tf", stamp, "odom", "base_link", (x, 0.0, 0.0))
+    found, log = read(bag)
+    return found, codes(log), " ".join(note.message for note in log.report.assumed)
+
+
+def at(*tenths: float, back: int = 0, late: int = 0) -> list[tuple[int, int]]:
+    return [(BEGUN + round(k * TENTH) + late, BEGUN + round(k * TENTH) - back) for k in tenths]
+
+
+def xs(found: Sequence[LoggedScan]) -> list[float | None]:
+    return [None if one.pose is None else round(one.pose.x - 0.2, 3) for one in found]  # of the base
+
+
+@pytest.mark.parametrize("messages", [False, True])
+@pytest.mark.parametrize(("seconds", "known"), [(0.2, True), (0.4, False), (1.0, False), (8.0, False)])
+def test_odometry_is_unknown_in_a_gap(tmp_path: Path, messages: bool, seconds: float, known: bool) -> None:
+    lost = round(10 * seconds)
+    values = [*drive(0, 21), *drive(20 + lost, 40 + lost)]
+    found, notes, told = recorded(tmp_path, values, at(5.5, 20.5, 30.5 + lost), messages=messages)
+    assert xs(found) == pytest.approx([0.55, 2.05 if known else None, 3.05 + seconds])
+    assert [one.part for one in found] == [0, 0, 0]
+    assert found[2].unknown_s == pytest.approx(0.0 if known else seconds)
+    assert ("odometry_gap" in notes, "no_pose" in notes) == (not known, not known)
+    assert known or f"missing for up to {seconds:.1f} s" in told
+
+
+@pytest.mark.parametrize("messages", [False, True])
+def test_odometry_is_unknown_before_its_first_and_after_its_last_value(tmp_path: Path, messages: bool) -> None:
+    found, *_ = recorded(tmp_path, drive(10, 21), at(9.5, 10.5, 20.0, 20.5), messages=messages)
+    assert xs(found) == [None, 1.05, 2.0, None]
+
+
+@pytest.mark.parametrize("messages", [False, True])
+@pytest.mark.parametrize("seconds", [0.5, 1.5, 3.0, 100.0])
+def test_a_clock_that_is_set_back_begins_a_part_of_the_log(tmp_path: Path, messages: bool, seconds: float) -> None:
+    back = round(seconds * SECOND)
+    values = [*drive(0, 41), *drive(41, 80, back=back, speed=-0.5)]
+    scans = [*at(10.5, 30.5), *at(50.5, 70.5, back=back)]
+    found, notes, told = recorded(tmp_path, values, scans, messages=messages)
+    assert xs(found) == pytest.approx([1.05, 3.05, -2.525, -3.525])
+    assert [one.part for one in found] == [0, 0, 1, 1]
+    assert notes["odometry_parts"] == 0
+    assert "each of 2 parts" in told
+
+
+@pytest.mark.parametrize("messages", [False, True])
+def test_two_publishers_that_contradict_each_other_are_named(tmp_path: Path, messages: bool) -> None:
+    other = [(received + TENTH // 5, stamp + TENTH // 5, x - 1.0) for received, stamp, x in drive(20, 60)]
+    found, notes, told = recorded(tmp_path, [*drive(0, 60), *other], at(5, 30, 30.1, 30.5, 50), messages=messages)
+    assert xs(found) == [0.5, None, None, None, None]
+    assert notes["odometry_jumps"] > 70
+    assert f"on {'/odom' if messages else '/tf'}, the first 1.0" in told
+    assert "0.020 s at stamp 102.0" in told
+
+
+def test_odometry_that_is_reset_begins_a_part(tmp_path: Path) -> None:
+    values = [*drive(0, 41), *drive(41, 80, since=41)]
+    found, *_ = recorded(tmp_path, values, at(30, 40.5, 60), messages=True)
+    assert xs(found) == [3.0, None, 1.9]
+    assert found[0].part != found[2].part
+
+
+@pytest.mark.parametrize("seconds", [0.8, 99.0, -0.8])
+def test_a_laser_with_another_clock_is_named(tmp_path: Path, seconds: float) -> None:
+    scans = at(20, 30, back=round(seconds * SECOND))
+    found, notes, told = recorded(tmp_path, drive(0, 60), scans, messages=False)
+    assert xs(found) == [None, None]
+    assert notes["clocks"] == 2
+    assert f"{abs(seconds):.1f} s {'behind' if seconds > 0 else 'ahead of'} those of odometry" in told
+
+
+def test_a_carmen_log_has_parts_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "robot.log"
+    rows = [(1.0, 100.0), (1.5, 100.5), (9.5, 100.9), (9.7, 101.4), (9.8, 51.4), (9.9, 51.9)]
+    path.write_text("".join(f"FLASER 2 1.0 2.0 {x} 0 0 {x} 0 0 {t} host {t}\n" for x, t in rows))
+    assert [one.part for one in read_log(path)] == [0, 0, 1, 1, 2, 2]
