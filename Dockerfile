@@ -49,7 +49,7 @@ RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir 
 # Kernels for any processor of its kind, x86-64 or arm64. Its name is part of their digest, so it is the same at run time.
 ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
-RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
+RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from linefix.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
     && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli linefix_client \
     && chmod -R u=rwX,go=rX /opt/linefix
@@ -77,7 +77,7 @@ ENV PATH=/opt/linefix/bin:$PATH \
     LINEFIX_PORT=8000 \
     LINEFIX_DATA_DIR=/data
 # Once through as at a start: leaves the bytecode of what is used of Python itself, which its slim image comes without.
-RUN python -c "import uvicorn.protocols.http.h11_impl, uvloop, service.serving, service.app; from service.work.warmup import warm_up; warm_up()"
+RUN python -c "import uvicorn.protocols.http.h11_impl, uvloop, service.serving, service.app; from linefix.warmup import warm_up; warm_up()"
 ENV PYTHONDONTWRITEBYTECODE=1
 USER linefix
 WORKDIR /data

@@ -41,7 +41,7 @@ layers: $(VENV)/.ready
 
 # Kernels before tests: the processes would compile the same ones side by side.
 kernels: $(VENV)/.ready
-	$(BIN)/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
+	$(BIN)/python -c "from linefix.compiling import compile_kernels; compile_kernels()"
 
 JOBS ?= 3  # tests of the service wait as much as they work
 
@@ -130,8 +130,8 @@ audit: $(VENV)/.ready  ## look the pinned packages up in the published advisorie
 PIN := -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header
 
 lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is made of them
-	$(BIN)/python $(PIN) --generate-hashes --extra formats pyproject.toml requirements/image.in -o requirements/runtime.txt
-	$(BIN)/python $(PIN) --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python $(PIN) --generate-hashes --extra formats --extra service pyproject.toml requirements/image.in -o requirements/runtime.txt
+	$(BIN)/python $(PIN) --extra service --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python $(PIN) --generate-hashes -c requirements/dev.txt --group build -o requirements/build.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group docs -o requirements/docs.txt

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import MapIndex, Scan, associate
+from linefix.warmup import warm_up
 from registration import Correspondences, JointSums, MeasuredSegments, RigidTransform, Segments
-from service.work.warmup import warm_up
 from simulation import OfficePlan
 
 from .collection import FLOOR_PLANS, SIGMA

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from service.serving import ONE_THREAD, serve
+from service.serving import EXTRA, ONE_THREAD, needed, serve
 
 from .errors import CommandError
 
+DEFECT = "a defect of linefix; please report it"
 INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number the end by a signal
 
 
@@ -32,6 +33,10 @@ def run(arguments: list[str]) -> int:
         return code
     except CommandError as error:
         return _ended(error.exit_code, str(error))
+    except ModuleNotFoundError as error:
+        if error.name in EXTRA:
+            return _ended(2, needed(error))
+        return _ended(1, f"{DEFECT}: {error}")
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -42,7 +47,7 @@ def run(arguments: list[str]) -> int:
         named = f"{error.filename}: " if error.filename else ""
         return _ended(2, f"{named}{error.strerror or error}")
     except Exception as error:
-        return _ended(1, f"a defect of linefix; please report it: {type(error).__name__}: {error}")
+        return _ended(1, f"{DEFECT}: {type(error).__name__}: {error}")
 
 
 def _ended(code: int, message: str) -> int:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from service.work.warmup import warm_up
+from linefix.warmup import warm_up
 
 from .contract import Json
 from .errors import RefusedError, WrongUseError

@@ -6,7 +6,7 @@ import asyncio
 import gc
 import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import FastAPI
@@ -14,6 +14,8 @@ from fastapi.routing import APIRoute
 from starlette.middleware.cors import CORSMiddleware
 
 from compiled import compiled_fraction, is_complete
+from linefix.compiling import start_compiler
+from linefix.warmup import warm_up
 
 from .admission.budget import ByteBudget
 from .admission.entrance import Entrance
@@ -46,7 +48,6 @@ from .importing.reader import Bounds
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
 from .maps.lookup import MapLookup
-from .parsing.errors import ParserEndedError
 from .parsing.parser_process import ParserProcess
 from .settings import Settings
 from .telemetry.metrics import Metrics, RefusalTally
@@ -54,8 +55,6 @@ from .telemetry.traces import traces_of_environment
 from .thread_pool import Threads
 from .version import VERSION
 from .work.association import Associator
-from .work.compiling import compile_kernels
-from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
 Started = Callable[[Services], None]
@@ -228,12 +227,12 @@ async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and log the progress."""
     logger.info("compiling the kernels, which takes one to two minutes; later starts load them from the cache")
     following = asyncio.create_task(_follow_compiling(services))
+    compiler = start_compiler()
     try:
-        with suppress(ParserEndedError):  # if that process ends early, this one compiles the missing kernels
-            await services.parse_threads.run(partial(services.parser.call, compile_kernels))
+        await services.parse_threads.run(compiler.wait)  # if it ends early, this process compiles the missing kernels
     finally:
         following.cancel()
-    services.parser.close()
+        compiler.kill()
     services.readiness.compiled = None
 
 

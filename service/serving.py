@@ -34,6 +34,7 @@ HANG = 30  # s without an answer after which one of several workers is replaced
 SWITCH_SECONDS = 0.001
 GARBAGE = (20_000, 10, 10)  # few objects of a request are cyclic; by default Python looks after each 700 objects
 COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client: the folder of the counts that workers share
+EXTRA = ("fastapi", "fastapi_offline", "prometheus_client", "pydantic_settings", "sqlalchemy", "starlette", "uvicorn")
 NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
 
 
@@ -42,8 +43,11 @@ def serve(arguments: Sequence[str]) -> int:
     gc.disable()  # until the service is ready
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    from .settings import SettingsError, read_settings
-
+    try:
+        from .settings import SettingsError, read_settings
+    except ModuleNotFoundError as error:
+        print(f"linefix: {needed(error)}", file=sys.stderr)
+        return 2
     try:
         settings = read_settings(arguments)
     except SettingsError as error:
@@ -52,6 +56,11 @@ def serve(arguments: Sequence[str]) -> int:
     for name in unknown_settings():
         print(f"linefix: {name} in the environment is not a setting", file=sys.stderr)
     return run(settings)
+
+
+def needed(error: ModuleNotFoundError) -> str:
+    """Return what to install where a package of the extra is missing."""
+    return f'the service needs the package {error.name}: in a checkout, pip install ".[service]"'
 
 
 def unknown_settings() -> list[str]:

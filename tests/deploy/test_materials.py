@@ -132,6 +132,23 @@ import cli.program
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
+def test_without_the_extra_of_the_service_commands_name_it() -> None:
+    """And libraries need none of it."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    missing = [line.partition(">")[0].partition("[")[0].replace("-", "_") for line in extras["service"]]
+    code = f"""
+import sys
+for name in {[*missing, "starlette"]}:
+    sys.modules[name] = None
+import registration, vectorization, association, simulation, map_quality, linefix.public, linefix.documents
+from cli.entry import main
+main()
+"""
+    ended = subprocess.run([sys.executable, "-c", code, "serve"], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert 'pip install ".[service]"' in ended.stderr
+
+
 @pytest.mark.parametrize("name", ["cyclonedds", "rich-click"])
 def test_a_licence_that_the_bill_leaves_out_is_the_one_in_its_metadata(name: str) -> None:
     """The table has what the installed package declares, under another spelling."""

@@ -13,7 +13,7 @@ import orjson
 import pytest
 
 from linefix.documents import examples
-from service.work.warmup import room_ranges
+from linefix.warmup import room_ranges
 from tests.running import client_of, until
 
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)

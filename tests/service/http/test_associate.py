@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from linefix.documents import examples
-from service.work.warmup import ROOM, room_ranges
+from linefix.warmup import ROOM, room_ranges
 
 TURN = [-math.pi + math.tau * i / 720 for i in range(720)]
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from linefix.documents.requests import VectorizeOptions
-from service.work.warmup import ROOM, room_ranges
+from linefix.warmup import ROOM, room_ranges
 from vectorization import VectorizationOptions
 
 TURN = np.linspace(-math.pi, math.pi, 240, endpoint=False)

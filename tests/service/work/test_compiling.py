@@ -12,7 +12,7 @@ import pytest
 from tests.running import family_of, is_running, until
 
 SOON = 10.0  # s; half of what its part would take on an idle machine
-COMPILE = "from service.work.compiling import compile_kernels; compile_kernels()"
+COMPILE = "from linefix.compiling import compile_kernels; compile_kernels()"
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) == 1, reason="one core compiles alone")

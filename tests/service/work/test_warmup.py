@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from linefix.documents import examples
-from service.work.warmup import warm_up
+from linefix.warmup import warm_up
 from tests.running import until
 
 LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}

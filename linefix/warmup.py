@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -65,7 +63,6 @@ SYMMETRIC_ROOM = np.array(
 
 
 THINGS = np.array([[1.0, 2.0], [-2.0, 1.0]])  # too small for walls
-STANDARD_INPUT = 0
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 
@@ -184,15 +181,3 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
         hit = (np.abs(cross) > 1e-12) & (along > 0.0) & (share >= 0.0) & (share <= 1.0)
         nearest = np.where(hit, np.minimum(nearest, along), nearest)
     return nearest
-
-
-def _end_with_the_other() -> None:
-    """End when the parent process has ended and so closed this one's standard input, however that went."""
-    while os.read(STANDARD_INPUT, 1):
-        pass
-    os._exit(1)
-
-
-if __name__ == "__main__":
-    threading.Thread(target=_end_with_the_other, daemon=True).start()
-    warm_up_second_half()
