@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from registration.values import value
+from dataclasses import dataclass
 
 from .context import SearchContext
 from .deadline import Deadline
@@ -17,7 +17,7 @@ from .verdict.verdict import Verdict, judge
 DEFAULT_OPTIONS = AssociationOptions()
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Stages:
     """The stages of an answer: the scan that was searched, its explanations, the verdict, and the answer."""
 

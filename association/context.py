@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from registration import RigidTransform
 from registration.layout import POSE, Floats, Records
 from registration.observability import most_parallel_up_to
-from registration.values import value
 
 from .deadline import Deadline
 from .index.joint import JointIndex
@@ -48,7 +47,7 @@ def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
     return terms.tobytes()
 
 
-@value(frozen=True)
+@dataclass(frozen=True)
 class SearchContext:
     """A search's map, scan, prior and options, and the arrays of them that the kernels take.
 

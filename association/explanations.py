@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from registration import RegistrationResult, RigidTransform
 from registration.layout import Floats
-from registration.values import value
 
 from .consensus.acceptance import Accepted, accept, register_accepted
 from .consensus.consensus_set import ConsensusSet
@@ -22,7 +22,7 @@ from .search.search import Effort, search
 from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, SUGGESTED
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Answer:
     """The best explanation, estimated.
 
@@ -47,7 +47,7 @@ class Answer:
     covariance: Floats
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Explanations:
     """The explanations of a scan, and how the search for them went.
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import Ambiguity, RegistrationDiagnostics, RigidTransform
-from registration.values import value
 
 Floats = NDArray[np.float64]
 ReasonCode = Literal[
@@ -50,7 +49,7 @@ class Status(StrEnum):
     OK = "ok"
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Correspondence:
     """A scan segment found on a map segment.
 

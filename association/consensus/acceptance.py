@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform, register
 from registration.layout import Floats
-from registration.values import value
 from registration.weights import MIN_WEIGHT
 
 from ..context import SearchContext
@@ -23,7 +23,7 @@ from .tuning import LEAST_KNOWN_VARIANCE, MAX_OTHERS, MIN_EXTENT, MOST_UNDER, PA
 Indices = NDArray[np.intp]
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Accepted:
     """A consensus set in the map's own segments.
 
@@ -52,7 +52,7 @@ class Accepted:
         return list(map(int, self.pairs[:, 1] % index.directed))
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class _Chain:
     """The pieces of walls that continue one another, by where they begin along the first of them.
 

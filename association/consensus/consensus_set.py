@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,9 @@ from numpy.typing import NDArray
 from registration import RigidTransform
 from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
-from registration.values import value
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class BeamEvidence:
     """The evidence of the beams at a pose, (m,) each.
 
@@ -34,7 +34,7 @@ class BeamEvidence:
     passed: Floats
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class ConsensusSet:
     """A pose with the correspondences that support it, and its score: one explanation of the scan.
 

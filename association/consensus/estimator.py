@@ -14,13 +14,13 @@ centre of all of it, so that the origin of the scan frame does not matter.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from registration import RigidTransform, wrap_angle
 from registration.kernels import MAX_DEVIATION
 from registration.layout import Floats, Records
-from registration.values import value
 
 from ..context import SearchContext
 from .consensus_set import ConsensusSet
@@ -67,7 +67,7 @@ def _prior(known: float | None) -> Floats:
     return out
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Leverages:
     """The pose without each of the walls, (m,) each, at the sensor's place.
 
@@ -91,7 +91,7 @@ class Leverages:
     directions: Floats
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """A pose with its covariance, and what it was estimated together with.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration.layout import Floats, Records
-from registration.values import value
 
 from ..context import SearchContext
 from ..layout import OBSERVATION
@@ -19,7 +19,7 @@ from .tuning import LEAST_KNOWN_VARIANCE
 Indices = NDArray[np.intp]
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Observations:
     """Scan lines on walls, (n,) each; of several views each line as each view shows it.
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from registration import Segments
 from registration.layout import Floats
-from registration.values import value
 
 from ..deadline import Deadline
 from ..errors import InvalidMapError
@@ -36,7 +35,7 @@ STAGGER = 3.0  # m, geometry
 POSES_A_MAP = 2  # geometry; so many poses are kept for each map at least, so that each map can be listed
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class MapPart:
     """One of several maps.
 

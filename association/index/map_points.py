@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from registration.layout import Floats
-from registration.values import value
 
 from ..errors import InvalidMapError
 from .tuning import MAX_MAP_SIGMA
@@ -18,7 +18,7 @@ POINT_SIGMA = 0.05  # m, if a map does not state it; the contract
 POINTS_REACH = 40.0  # m; less than half the gap between two maps of a joint index
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class MapPoints:
     """Objects that a map shows as points: evidence for single beams, never part of a hypothesis.
 

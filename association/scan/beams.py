@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import Beams as Ranges
 from registration.layout import Floats, Records
-from registration.values import value
 
 from ..layout import BEAM
 from ..tuning import FAR, FARTHER, MAX_RAYS, MOST_BEAMS, RAY_SPACING
@@ -18,7 +18,7 @@ from .tuning import END_MARGIN
 Indices = NDArray[np.intp]
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class BeamSet:
     """Beams from known places.
 

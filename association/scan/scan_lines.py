@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from registration import MeasuredSegments
 from registration.layout import Records
-from registration.values import value
 
 from ..layout import GATES, LINE_PARTS, MODEL, SIGHTING, VARIANCES, Indices, as_records, record
 from ..options import AssociationOptions
@@ -38,7 +38,7 @@ _FIELDS = len(LINE_PARTS.names or ())
 JOINTS = np.array([[CUT_LATERAL, CUT_COSINE], [LINE_LATERAL, LINE_COSINE]])
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class ScanLines:
     """A scan as the kernels take it.
 

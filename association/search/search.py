@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from registration.layout import Floats, Records
-from registration.values import value
 
 from ..consensus.kernels.distinct import pick_distinct
 from ..consensus.kernels.scoring import score_poses
@@ -44,7 +43,7 @@ from .tuning import (
 )
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Candidates:
     """The poses that a search found.
 
@@ -58,7 +57,7 @@ class Candidates:
     report: SearchReport
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Effort:
     """The limits of a search.
 

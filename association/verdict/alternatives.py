@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -11,7 +12,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from registration.layout import Floats, Records
-from registration.values import value
 
 from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
@@ -38,7 +38,7 @@ from .tuning import (
 )
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Comparison:
     """An explanation compared with others, (k,) each.
 
@@ -91,7 +91,7 @@ def compare(
     return Comparison(others, gaps, counted)
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class _Evidence:
     """The score of each explanation at each place in view.
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-
-from registration.values import value
 
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.estimator import Estimate
@@ -98,7 +97,7 @@ class Features(NamedTuple):
     null_gap: float
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Described:
     """An answer as the verdict describes it: its features, its comparison with others, and the null score, nats."""
 

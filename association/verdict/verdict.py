@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from registration import RigidTransform
-from registration.values import value
 
 from ..context import SearchContext
 from ..explanations import Answer, Explanations
@@ -23,7 +22,7 @@ from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied
 NEUTRAL = 0.5  # prior probability at which it is judged whether a scan is of the map at all
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """The verdict on the best explanation: whether it is right, and may be used.
 

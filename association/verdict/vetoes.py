@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-
-from registration.values import value
+from dataclasses import dataclass
 
 from ..consensus.tuning import CONTRADICTION
 from ..result import ReasonCode
 from .tuning import FAR_FROM_PRIOR
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Findings:
     """The numbers that vetoes decide by.
 
@@ -38,7 +37,7 @@ class Findings:
     unobservable: bool = False
 
 
-@value(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Veto:
     """A condition under which an answer is not usable, and the reason that it gives."""
 

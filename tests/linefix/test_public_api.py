@@ -6,11 +6,17 @@ import doctest
 import inspect
 import subprocess
 import sys
+from dataclasses import FrozenInstanceError, fields, is_dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import association
 import linefix
+import map_quality
+import registration
+import vectorization
 from linefix import checking, explaining, locating, ranges, updating
 
 ROOT = Path(linefix.__file__).parent.parent
@@ -46,6 +52,30 @@ def test_every_name_says_what_it_is(name: str) -> None:
     described = inspect.getdoc(member)
     assert described
     assert not described.startswith(f"{name}(")
+
+
+VALUES = [
+    pytest.param(member, id=f"{package.__name__}.{name}")
+    for package in (registration, vectorization, association, map_quality, linefix)
+    for name in package.__all__
+    if inspect.isclass(member := getattr(package, name)) and is_dataclass(member) and name != "Deadline"
+]
+
+
+@pytest.mark.parametrize("kind", VALUES)
+def test_assigning_to_a_value_fails(kind: type) -> None:
+    """A deadline alone can change: another thread cancels it."""
+    assert is_dataclass(kind)
+    for field in fields(kind):
+        with pytest.raises(FrozenInstanceError):
+            setattr(object.__new__(kind), field.name, 99)
+
+
+def test_assigning_to_a_correspondence_of_an_answer_fails() -> None:
+    room = [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 6], [3, 6, 0, 6], [0, 6, 0, 0]]
+    answer = linefix.locate(room, registration.Segments.from_array(np.array(room, float)))
+    with pytest.raises(FrozenInstanceError):
+        answer.correspondences[0].map = 99  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
