@@ -27,8 +27,11 @@ def fields(*groups: tuple[type, str]) -> np.dtype[Any]:
 
 
 # A scan line on a wall, as the estimator takes it: centroid and direction in the scan frame, left normal and offset of
-# the wall, when it was seen from -0.5 to 0.5 of the sweep, and how that changes along it, 1/m.
-OBSERVATION = fields((_F, "centroid_x centroid_y dx dy normal_x normal_y offset time pace"))
+# the wall, when it was seen from -0.5 to 0.5 of the sweep, and how that changes along it, 1/m; second moment of its
+# points along it, and variance of its offset by the scan's sigma, m^2; numbers of the wall and of the view.
+OBSERVATION = fields(
+    (_F, "centroid_x centroid_y dx dy normal_x normal_y offset time pace spread variance"), (_I, "wall of_view")
+)
 
 # A point or a direction, and both ends of a segment.
 POINT = fields((_F, "x y"))
@@ -91,9 +94,6 @@ TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any
 # set takes at least which reaches that. A flag: poses outside the window of a hard prior are dropped.
 RULE = fields((_F, "kept_fraction best_value least_value least_freedom"), (_I, "within"))
-# A base: two scan lines that fix a pose, of which the first slides along chains; its merit, the logarithm of the lesser
-# gain, to a power, over the cost of its search.
-BASE = fields((_I, "sliding crossing"), (_F, "merit"))
 # A pose proposed from a base: the pose; cosine and sine of its heading; from the sensor to the point about which it may
 # turn, in the scan frame, rotated, and the variance of that rotation.
 HYPOTHESIS = np.dtype([*POSE.descr, *fields((_F, "cosine sine lever_x lever_y angle_variance")).descr])

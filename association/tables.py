@@ -167,10 +167,12 @@ class ScoreRules(NamedTuple):
     ----------
     rule : (1,) of `RULE`
     parallel : (k,) chi-square of their angles up to which so many lines are parallel
+    packed : whether poses that are kept are to come first
     """
 
     rule: Records
     parallel: Floats
+    packed: bool
 
 
 class ScoreWork(NamedTuple):
@@ -196,6 +198,37 @@ class ScoreWork(NamedTuple):
         """Return the arrays for a scan of so many lines on a map of so many walls."""
         held, wall_sums = np.zeros(lines, HELD), np.zeros(walls, WALL_SUMS)
         return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), record(JOINT_SUMS))
+
+
+class Model(NamedTuple):
+    """The estimator's model of a consensus set.
+
+    Attributes
+    ----------
+    seen : (n,) of `OBSERVATION`
+    ties, own : (m,)
+        As of `Observations`.
+    sensor : (2,)
+        The sensor's place in the scan frame, metres.
+    places : (v, 2)
+        Of the views, metres.
+    root, began : (3 v, u), (u,)
+        As `root` and `found` of `Views`.
+    active : (k,)
+        The unknowns that are solved for.
+    information : (k, k)
+        On these, before anything is seen.
+    """
+
+    seen: Records
+    ties: Floats
+    own: Floats
+    sensor: Floats
+    places: Floats
+    root: Floats
+    began: Floats
+    active: Integers
+    information: Floats
 
 
 class Samples(NamedTuple):

@@ -25,37 +25,24 @@ class Observations:
 
     Attributes
     ----------
-    row : int
-        The scan line.
-    wall : int
-        Number of the wall among `walls`.
     lines : (n,) of `OBSERVATION`
-    spreads, variances : float64
-        Second moment of the points along the line; variance of its offset by the scan's sigma, m^2.
-    view : int
     walls : (m,)
         The walls of the map that are matched, each once, in the order of their ties.
-    ties : (m,)
-        Place of each in its group of linked walls, as of `Place.ties`.
+    ties, own : (m,)
+        Place of each in its group of linked walls, as of `Place.ties`; how far it is one of its own next to the one
+        before it, 0 to 1.
     sensor : (2,)
         The sensor's place in the scan frame.
     views : Views or None
         If the poses of views are uncertain.
     """
 
-    row: Indices
-    wall: Indices
     lines: Records
-    spreads: Floats
-    variances: Floats
-    view: Indices
     walls: Indices
     ties: Floats
+    own: Floats
     sensor: Floats
     views: Views | None
-
-    def __len__(self) -> int:
-        return len(self.row)
 
     @property
     def timed(self) -> bool:
@@ -67,39 +54,35 @@ def observations_of(context: SearchContext, matches: Records) -> Observations | 
     """Return the observations of matches, (n,) of `MATCH`; None where nothing is matched."""
     views, rows = context.scan.views, context.lines.rows
     matched = matches["wall"] >= 0
+    if not matched.any():
+        return None
     if views is not None and views.uncertain:
         seen = context.lines.sightings
         seen = seen[matched[seen["row"]]]
-        row, view, variances = seen["row"], seen["sensor"], np.maximum(seen["variance"], LEAST_KNOWN_VARIANCE)
+        row, view, variances = seen["row"], seen["sensor"], seen["variance"]
     else:
-        row, views = np.flatnonzero(matched), None
-        seen, view = rows[row], np.zeros(len(row), np.intp)
-        variances = np.maximum(1.0 / seen["weight"] - ROUGHNESS**2, LEAST_KNOWN_VARIANCE)
-    if not len(row):
-        return None
-    of_line = matches["wall"][row]
+        row, view, views = np.flatnonzero(matched), 0, None
+        seen = rows[row]
+        variances = 1.0 / seen["weight"] - ROUGHNESS**2
+    of_line, index = matches["wall"][row], context.index
     walls = np.unique(of_line)
-    walls = walls[np.lexsort((walls, context.index.ties[walls]))]
-    place = np.zeros(int(walls.max()) + 1, np.intp)
+    walls = walls[np.argsort(index.ties[walls], kind="stable")]
+    ties, place = index.ties[walls], np.zeros(int(walls.max()) + 1, np.intp)
     place[walls] = np.arange(len(walls))
-    on = context.index.walls.rows[of_line]
-    lines = np.zeros(len(row), OBSERVATION)
-    for name in ("centroid_x", "centroid_y", "dx", "dy"):
+    on, lines = index.walls.rows[of_line], np.zeros(len(row), OBSERVATION)
+    for name in ("centroid_x", "centroid_y", "dx", "dy", "spread"):
         lines[name] = seen[name]
     lines["normal_x"], lines["normal_y"], lines["offset"] = -on["dy"], on["dx"], on["offset"] + matches["shift"][row]
-    _set_times(context, lines)
-    return Observations(
-        row=row,
-        wall=place[of_line],
-        lines=lines,
-        spreads=seen["spread"],
-        variances=variances,
-        view=view,
-        walls=walls,
-        ties=context.index.ties[walls],
-        sensor=np.array(context.sensor),
-        views=views,
+    lines["variance"], lines["wall"], lines["of_view"] = (
+        np.maximum(variances, LEAST_KNOWN_VARIANCE),
+        place[of_line],
+        view,
     )
+    _set_times(context, lines)
+    own = np.ones(len(walls))
+    after = np.flatnonzero((ties[1:] >= 0.0) & (ties[:-1] >= 0.0)) + 1
+    own[after] = 1.0 - np.exp(2.0 * (ties[after - 1] - ties[after]))
+    return Observations(lines, walls, ties, own, np.array(context.sensor), views)
 
 
 def _set_times(context: SearchContext, lines: Records) -> None:

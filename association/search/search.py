@@ -15,7 +15,7 @@ from ..consensus.kernels.distinct import pick_distinct
 from ..consensus.kernels.scoring import score_poses
 from ..context import SearchContext
 from ..deadline import CancelledError
-from ..layout import BASE, ESTIMATE, HYPOTHESIS, MATCH, RULE, SET_SCORE, record
+from ..layout import ESTIMATE, HYPOTHESIS, MATCH, RULE, SET_SCORE, record
 from ..options import AssociationOptions
 from ..result import SearchReport
 from ..tables import ScoreRules
@@ -37,9 +37,7 @@ from .tuning import (
     SLIDE_LINES,
     SLIDE_SPACING,
     SLIDE_SPACING_FOR_BEAMS,
-    TELLING,
     TELLING_LINES,
-    UNTELLING,
 )
 
 
@@ -144,18 +142,18 @@ class _BestPoses:
 
     @property
     def best_value(self) -> float:
+        """The best value so far, nats."""
         return float(self.rule["best_value"][0])
 
-    def offer(self, poses: Records, values: Floats, best_value: float) -> None:
-        """Take poses that were scored; those of value 0 were rejected."""
-        self.rule["best_value"][0] = best_value
-        good = np.flatnonzero(values > 0.0)
-        while len(good):
-            taken = good[: len(self._poses) - self._held]
-            end = self._held + len(taken)
-            self._poses[self._held : end], self._values[self._held : end] = poses[taken], values[taken]
-            self._held, good = end, good[len(taken) :]
-            if self._held == len(self._poses):
+    def offer(self, poses: Records, values: Floats) -> None:
+        """Take poses with their values."""
+        taken = 0
+        while taken < len(values):
+            count = min(len(values) - taken, len(self._values) - self._held)
+            own, given = slice(self._held, self._held + count), slice(taken, taken + count)
+            self._poses[own], self._values[own] = poses[given], values[given]
+            self._held, taken = self._held + count, taken + count
+            if self._held == len(self._values):
                 self._prune()
 
     def _prune(self) -> None:
@@ -170,7 +168,8 @@ class _BestPoses:
 
     def result(self) -> tuple[Records, Floats]:
         """Return the distinct ones with their values, the best first."""
-        self._prune()
+        if self._held:
+            self._prune()
         return self._poses[: self._held], self._values[: self._held]
 
 
@@ -227,55 +226,39 @@ class _Search:
 
     def _search_bases(self, best: _BestPoses, rule: StoppingRule) -> bool:
         """Search bases, the best first, until the stopping rule ends it; return whether none was left."""
-        scan, effort = self.scan, self.effort
-        bases, telling = self._bases()
-        merits, sliding, crossing = bases["merit"].copy(), bases["sliding"], bases["crossing"]
-        ordered = self.context.options.sampling == "ordered"
-        if not ordered:
-            merits = random_order(merits, self.context.options.seed)
-        fade = math.log(REUSE) if ordered else 0.0
-        if len(bases) == 0:
+        scan, effort, options, m = self.scan, self.effort, self.context.options, self.lines
+        merits, telling, costs = np.empty((m, m)), np.empty((m, m), np.bool_), np.empty(m)
+        index = self.context.index
+        number = rank_bases(scan, BASE_LINES, index.chains, index.area, merits, telling, costs)
+        fade = math.log(REUSE)
+        if options.sampling == "random":
+            merits, fade = random_order(merits, options.seed), 0.0
+        if not number:
             rule.missed = 0.0
         gains = np.ascontiguousarray(scan["gain"])
-        of_line = [np.flatnonzero((sliding == i) | (crossing == i)) for i in range(self.lines)]
-        for _ in range(len(bases)):
-            k = int(merits.argmax())
-            i, j = int(sliding[k]), int(crossing[k])
-            merits[k] = -math.inf
+        needed = known = -1.0
+        for _ in range(number):
+            i, j = divmod(int(merits.argmax()), m)
+            merits[i, j] = -math.inf
             if fade:
-                merits[of_line[i]] += fade
-                merits[of_line[j]] += fade
-            if not self._propose(partial(sweep_base, self.question, i, j, self.sweep), gains, best):
+                for k in (i, j):
+                    merits[k] += fade
+                    merits[:, k] += fade
+            sliding, crossing = (i, j) if costs[i] <= costs[j] else (j, i)
+            if not self._propose(partial(sweep_base, self.question, sliding, crossing, self.sweep), gains, best):
                 return False
             self.bases += 1
-            fraction = best.rule["kept_fraction"][0]
-            best.rule["least_freedom"][0] = rule.least_freedom(fraction * best.best_value)
-            needed = effort.complete_above * best.best_value
-            needed += rule.least_freedom(needed)
-            if telling[k]:
+            if best.best_value != known:
+                known = best.best_value
+                best.rule["least_freedom"] = rule.least_freedom(effort.kept_fraction * known)
+                needed = effort.complete_above * known
+                needed += rule.least_freedom(needed)
+            if telling[i, j]:
                 rule.searched(i, j, needed, effort.allowed)
             done = rule.bound < needed or rule.missed <= effort.allowed
-            if best.best_value >= effort.enough or (effort.allowed >= 0.0 and done):
+            if known >= effort.enough or (effort.allowed >= 0.0 and done):
                 return False
         return True
-
-    def _bases(self) -> tuple[Records, Floats]:
-        """Return the bases, (k,) of `BASE`, and whether each is precise enough to find the rest of its set."""
-        scan, m, index = self.scan, self.lines, self.context.index
-        room = np.empty(m * (m - 1) // 2, BASE)
-        bases = room[: rank_bases(scan, m, index.chains, index.area, room)]
-        weights = scan["gain"] / max(1e-9, float(scan["gain"].sum()))
-        x, y = float(weights @ scan["x"]), float(weights @ scan["y"])
-        square = float(weights @ ((scan["x"] - x) ** 2 + (scan["y"] - y) ** 2))
-        a, b = scan[bases["sliding"]], scan[bases["crossing"]]
-        variance = a["angle_variance"] * b["angle_variance"] / (a["angle_variance"] + b["angle_variance"])
-        off = square + (0.5 * (a["x"] + b["x"]) - x) ** 2 + (0.5 * (a["y"] + b["y"]) - y) ** 2
-        telling = variance * off <= TELLING**2
-        bases["merit"] += np.where(telling, 0.0, math.log(UNTELLING))
-        if m > BASE_LINES:
-            chosen = telling | (np.maximum(bases["sliding"], bases["crossing"]) < BASE_LINES)
-            bases, telling = bases[chosen], telling[chosen]
-        return bases, telling
 
     def _search_parallel(self, slides: _BestPoses, spacing: float) -> None:
         """Lay the longest of parallel lines on every chain, where these may gain more than the best pose does."""
@@ -300,7 +283,7 @@ class _Search:
     def _propose(self, propose: Callable[[int, Records], tuple[int, int]], gains: Floats, best: _BestPoses) -> bool:
         """Propose poses, reject most of them, score the rest; return False where the deadline passes."""
         context, place, raster = self.context, self.context.index.tables.place, self.context.index.tables.raster
-        rules = ScoreRules(best.rule, context.parallel)
+        rules = ScoreRules(best.rule, context.parallel, True)
         first, chains = 0, len(self.sweep.chains)
         while first < chains:
             if context.deadline.passed:
@@ -315,8 +298,8 @@ class _Search:
             self.hypotheses += count
             kept = reject(self.question, raster, gains, self.posed, count, best.rule, self.poses) if count else 0
             if kept:
-                poses, scores = self.poses[:kept], self.scores[:kept]
-                value, refined = score_poses(self.question, place, poses, rules, scores, self.matches, context.work)
+                some = self.poses[:kept]
+                refined, good = score_poses(self.question, place, some, rules, self.scores, self.matches, context.work)
                 self.verified += refined
-                best.offer(poses, scores["value"] * (scores["score"] > 0.0), value)
+                best.offer(some[:good], self.scores["value"][:good])
         return True

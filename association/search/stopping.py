@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from functools import cache, lru_cache
 
 import numpy as np
@@ -43,15 +44,16 @@ class StoppingRule:
     """
 
     def __init__(self, scan: Records, lines: int, *, drawn: bool) -> None:
-        gains: list[float] = scan["gain"].tolist()
+        self._gains = np.ascontiguousarray(scan["gain"])
+        gains: list[float] = self._gains.tolist()
         self._lines, self._drawn = lines, drawn
         self._left, self.bound = gains[:lines], math.fsum(gains)
-        self._best_gains = np.cumsum(np.sort(scan["gain"][:lines])[::-1])
+        self._total = self.bound
+        self._best_gains = np.cumsum(np.sort(self._gains[:lines])[::-1])
         self._beyond = math.fsum(gains[lines:])
         order = np.argsort(-scan["freedom"], kind="stable")
-        self._freedoms = scan["freedom"][order].tolist()
-        self._rests = (self.bound - np.cumsum(scan["gain"][order])).tolist()
-        self._gains = np.ascontiguousarray(scan["gain"])
+        self._freedoms: list[float] = [*scan["freedom"][order].tolist(), 0.0]
+        self._taken: list[float] = np.cumsum(self._gains[order]).tolist()
         self._samples: Samples | None = None
         if lines > 1 and not drawn:
             orders, ranks = _orders(lines)
@@ -61,10 +63,7 @@ class StoppingRule:
 
     def least_freedom(self, needed: float) -> float:
         """Return the least freedom that a consensus set takes whose gains reach `needed`, nats."""
-        for freedom, rest in zip(self._freedoms, self._rests, strict=True):
-            if rest < needed:
-                return float(freedom)
-        return 0.0
+        return self._freedoms[bisect_right(self._taken, self._total - needed)]
 
     def searched(self, one: int, other: int, needed: float, allowed: float) -> None:
         """Note that a base was searched: estimate the probability of having missed a set that gains `needed`, nats.
@@ -88,4 +87,6 @@ class StoppingRule:
 
 def random_order(merits: Floats, seed: int) -> Floats:
     """Return merits with Gumbel noise: the greatest first are draws without replacement with a probability by merit."""
-    return np.asarray(merits + np.random.default_rng(seed).gumbel(size=len(merits)))
+    noise, some = np.zeros_like(merits), np.isfinite(merits)
+    noise[some] = np.random.default_rng(seed).gumbel(size=int(some.sum()))
+    return np.asarray(merits + noise)

@@ -17,15 +17,15 @@ from .matching import match_lines
 from .pairs import change_pair, copy_sums, scale_wall, solve_pose
 from .wall_errors import eliminate, infer, list_walls, residual_of_wall
 
-REJECTED, UNFIT, SOLVED, CHANGED = 0, 1, 2, 3  # what refinement leaves of a pose; a changed set is not solved yet
+UNFIT, SOLVED, CHANGED = 0, 1, 2  # what refinement leaves of a pose; a changed set is not solved yet
 
 
 @kernel
 def score_poses(
     question: Question, place: Place, poses: Records, rules: ScoreRules, scores: Records, matches: Records,
     work: ScoreWork,
-) -> tuple[float, int]:  # fmt: skip
-    """Refine poses with their consensus sets, and score these; return the best value, and how many poses were refined.
+) -> tuple[int, int]:  # fmt: skip
+    """Refine poses with their consensus sets, and score these; return how many were refined, and how many were kept.
 
     A pose that cannot reach the floor of `rules` gets the score 0. The score is the sum of gains less half of the
     chi-square, walls' own errors eliminated, less the log-determinant; the value is the score and the prior.
@@ -35,8 +35,10 @@ def score_poses(
     question : Question
     place : Place
     poses : (k,) of `ESTIMATE`
-        Each with the covariance that gates are widened by; replaced by the refined ones.
+        Each with the covariance that gates are widened by; replaced by the refined ones. If `rules` want it, those
+        that are kept come first, and their values.
     rules : ScoreRules
+        The best value is written.
     scores : (k,) of `SET_SCORE`
         Written.
     matches : (k, n) or (1, n) of `MATCH`
@@ -44,21 +46,25 @@ def score_poses(
     work : ScoreWork
     """
     prior = question.terms[0].prior
+    gates = question.terms[0].gates
+    scan = question.scan
     rule = rules.rule[0]
-    best_value = rule.best_value
+    soft = prior.kind != NO_PRIOR and prior.kind != HARD_PRIOR
     refined = 0
+    kept = 0
     for k in range(len(poses)):
         pose = poses[k]
         out = scores[k]
         found = matches[k if len(matches) > 1 else 0]
         out.score = 0.0
         out.value = 0.0
-        soft = prior.kind != NO_PRIOR and prior.kind != HARD_PRIOR
         bonus = prior_value(prior, pose) if soft else 0.0
-        least = max(rule.kept_fraction * best_value, rule.least_value)
+        least = max(rule.kept_fraction * rule.best_value, rule.least_value)
         floor = least - bonus + rule.least_freedom if least > 0.0 else 0.0
+        if match_lines(scan, gates, place, pose, found, floor, work.scratch[0]) < 0.0:
+            continue
+        refined += 1
         left = refine(question, place, pose, found, floor, rules.parallel, work)
-        refined += left != REJECTED
         if left >= SOLVED:
             score_set(question, place, pose, found, floor, left == CHANGED, rules.parallel, out, work)
         forget(work.held, work.wall_sums)
@@ -75,16 +81,20 @@ def score_poses(
             out.value = out.score + bonus
             if out.score < least - bonus:
                 out.score = 0.0
-            elif out.score > 0.0:
-                best_value = max(best_value, out.value)
-    return best_value, refined
+        if out.score > 0.0:
+            rule.best_value = max(rule.best_value, out.value)
+            if rules.packed:
+                poses[kept] = pose
+                scores[kept].value = out.value
+            kept += 1
+    return refined, kept
 
 
 @kernel
 def refine(
     question: Question, place: Place, pose: Record, found: Records, floor: float, parallel: Floats, work: ScoreWork
 ) -> int:
-    """Match the scan lines, change the set to those that match, solve for the pose; again, up to `ROUNDS` times."""
+    """Change the set to the lines that match, solve for the pose, and match again; up to `ROUNDS` times."""
     scan = question.scan
     terms = question.terms[0]
     model = terms.model
@@ -100,9 +110,6 @@ def refine(
     rounds = 0
     last = False
     while True:
-        threshold = floor if rounds == 0 or last else 0.0
-        if match_lines(scan, terms.gates, place, pose, found, threshold, scratch) < 0.0:
-            return REJECTED if rounds == 0 else UNFIT
         changed = change_set(scan, place.walls, found, work.held, work.wall_sums, scratch)
         if plain.count == 0.0:
             return UNFIT
@@ -114,6 +121,8 @@ def refine(
         moved = solve_pose(scratch.sums, angles, parallel[int(plain.count)], model, pose, scratch.solution)
         rounds += 1
         last = rounds == ROUNDS or not moved
+        if match_lines(scan, terms.gates, place, pose, found, floor if last else 0.0, scratch) < 0.0:
+            return UNFIT
 
 
 @kernel
