@@ -10,8 +10,9 @@ import numpy as np
 from registration import Ambiguity
 
 from .consensus.acceptance import accept, correspondences, register_accepted
-from .consensus.beams import cast, passed_walls
+from .consensus.beams import cast
 from .consensus.consensus_set import ConsensusSet
+from .consensus.kernels.rays import passed_walls
 from .consensus.tuning import BLOCKING_RAYS
 from .context import SearchContext
 from .explanations import Answer, Explanations
@@ -143,7 +144,7 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
     index, matched = context.index, answer.best.matched
     rays = context.rays_to_lines
     table = cast(context, rays, answer.best.estimate)
-    _, walls, to_matched, _ = passed_walls(rays, table, matched[None])
+    _, walls, to_matched, _ = passed_walls(rays.rows, rays.line, rays.sensor, table, answer.best.matches[None])
     own = set(answer.best.matches["wall"][matched].tolist())
     missing: set[int] = set()
     for wall in walls[2.0 * to_matched >= BLOCKING_RAYS].tolist():

@@ -43,6 +43,7 @@ DEFINITION = (
     "association/consensus/tuning.py",
     "association/consensus/beams.py",
     "association/consensus/kernels/*.py",
+    "association/verdict/kernels/*.py",
 )
 """The code that gives the features their values, and the score that they depend on."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -10,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform, register
-from registration.layout import Floats
+from registration.layout import POSE, Floats
 from registration.weights import MIN_WEIGHT
 
 from ..context import SearchContext
 from ..index.map_index import MapIndex
+from ..layout import record
 from ..options import Estimator, Rotation
 from ..result import Correspondence
 from .consensus_set import ConsensusSet
-from .tuning import LEAST_KNOWN_VARIANCE, MAX_OTHERS, MIN_EXTENT, MOST_UNDER, PAIRS_COMPARED
+from .kernels.acceptance import lay_segments, weigh_pairs
+from .tuning import MAX_OTHERS
 
 Indices = NDArray[np.intp]
 
@@ -34,83 +35,22 @@ class Accepted:
         mean nothing.
     overlaps : (k,) float64
         Fraction of the scan segment's length that lies on the map.
-    others : tuple of tuple of int
-        Other map segments that each scan segment lies on.
+    others : (k, m) intp
+        Other map segments that each scan segment lies on, and -1 behind them.
     """
 
     pairs: Indices
     overlaps: Floats
-    others: tuple[tuple[int, ...], ...]
+    others: Indices
 
     @property
     def scan_indices(self) -> list[int]:
         """Scan index of each pair."""
-        return list(map(int, self.pairs[:, 0]))
+        return [int(i) for i in self.pairs[:, 0].tolist()]
 
     def map_indices(self, index: MapIndex) -> list[int]:
         """Return the map index of each pair, as sent."""
-        return list(map(int, self.pairs[:, 1] % index.directed))
-
-
-@dataclass(frozen=True, slots=True)
-class _Chain:
-    """The pieces of walls that continue one another, by where they begin along the first of them.
-
-    `gaps` sums up the length without pieces before each; `reach` is how far those up to each reach.
-    """
-
-    direction: Floats
-    pieces: list[int]
-    walls: list[int]
-    lows: list[float]
-    highs: list[float]
-    reach: list[float]
-    gaps: list[float]
-
-    @classmethod
-    def of(cls, index: MapIndex, wall: int) -> _Chain:
-        rows, pieces = index.walls.rows, index.pieces
-        walls, w = [], int(pieces.firsts[wall])
-        direction = np.array([rows[w]["dx"], rows[w]["dy"]])
-        while w >= 0:
-            walls.append(w)
-            w = int(rows[w]["after"])
-        items = [pieces.items[pieces.starts[w] : pieces.starts[w + 1]] for w in walls]
-        own, of_wall = np.concatenate(items), np.repeat(walls, [len(one) for one in items])
-        ends = pieces.ends[own]
-        one = ends["x1"] * direction[0] + ends["y1"] * direction[1]
-        other = ends["x2"] * direction[0] + ends["y2"] * direction[1]
-        lows, highs = np.minimum(one, other), np.maximum(one, other)
-        order = np.argsort(lows, kind="stable")
-        lows, highs = lows[order], highs[order]
-        reach = np.maximum.accumulate(highs)
-        gaps = np.cumsum(np.maximum(0.0, np.concatenate([[0.0], lows[1:] - reach[:-1]])))
-        columns = (own[order], of_wall[order], lows, highs, reach, gaps)
-        return cls(direction, *(column.tolist() for column in columns))
-
-    def bare_up_to(self, x: float) -> float:
-        """Return the length without pieces from the first of them to an abscissa, negative before it, metres."""
-        k = bisect_right(self.lows, x)
-        return self.gaps[k - 1] + max(0.0, x - self.reach[k - 1]) if k else x - self.lows[0]
-
-    def lay(self, low: float, high: float, own: int) -> tuple[int, float, tuple[int, ...]]:
-        """Return the piece that a segment between two abscissae lies on most, its overlap, and the other pieces.
-
-        One that covers over half of it and is of its own wall comes first; of equal ones the first of the map.
-        """
-        end = bisect_right(self.lows, high)
-        begin = max(bisect_right(self.reach, low), end - MOST_UNDER)
-        if begin >= end:  # beside all of them: the nearest one
-            begin, end = max(0, min(begin, len(self.lows) - 1) - 1), min(len(self.lows), max(end, 1) + 1)
-        overlaps = {k: min(self.highs[k], high) - max(self.lows[k], low) for k in range(begin, end)}
-        half = 0.5 * (high - low)
-        most = min(overlaps, key=lambda k: (overlaps[k] <= half or self.walls[k] != own, -overlaps[k], self.pieces[k]))
-        covered = 0.0
-        if overlaps[most] > 0.0:
-            bare = self.bare_up_to(high) - self.bare_up_to(low)
-            covered = max(0.0, 1.0 - bare / max(high - low, MIN_EXTENT))
-        others = [self.pieces[k] for k, overlap in overlaps.items() if overlap > 0.0 and k != most]
-        return self.pieces[most], covered, tuple(others[:MAX_OTHERS])
+        return [int(i) for i in (self.pairs[:, 1] % index.directed).tolist()]
 
 
 def accept(context: SearchContext, best: ConsensusSet, pose: RigidTransform) -> Accepted:
@@ -120,33 +60,15 @@ def accept(context: SearchContext, best: ConsensusSet, pose: RigidTransform) -> 
     frame from scan frame.
     """
     index, row_of = context.index, context.lines.row_of
-    wall_of = best.matches["wall"][row_of]
-    segments = np.flatnonzero(wall_of >= 0)
-    walls = wall_of[segments]
-    ends = pose.apply(context.scan.measured.segments.endpoints[segments].reshape(-1, 2, 2))
-    pieces, overlaps = np.empty(len(segments), np.intp), np.empty(len(segments))
-    others: list[tuple[int, ...]] = [()] * len(segments)
-    first = index.pieces.starts[walls]
-    rows = index.walls.rows[walls]
-    single = (index.pieces.starts[walls + 1] - first == 1) & (rows["before"] < 0) & (rows["after"] < 0)
-    # Most walls are one piece of the map.
-    pieces[single] = index.pieces.items[first[single]]
-    along = np.sort(ends[..., 0] * rows["dx"][:, None] + ends[..., 1] * rows["dy"][:, None], axis=1)
-    covered = np.minimum(along[:, 1], rows["end"]) - np.maximum(along[:, 0], rows["begin"])
-    overlaps = np.clip(covered / np.maximum(along[:, 1] - along[:, 0], MIN_EXTENT), 0.0, 1.0)
-    chains = index.chains_of_pieces
-    for k in np.flatnonzero(~single).tolist():
-        wall = int(walls[k])
-        key = int(index.pieces.firsts[wall])
-        chain: _Chain = chains.get(key) or chains.setdefault(key, _Chain.of(index, wall))
-        low, high = sorted((ends[k] @ chain.direction).tolist())
-        pieces[k], overlaps[k], more = chain.lay(low, high, wall)
-        others[k] = tuple(other % index.directed for other in more)
+    on = best.matches["wall"][row_of]
+    segments = np.flatnonzero(on >= 0)
+    on, overlaps, others = on[segments], np.empty(len(segments)), np.empty((len(segments), MAX_OTHERS), np.intp)
+    ends = context.scan.measured.segments.endpoints[segments]
+    at = record(POSE, x=pose.x, y=pose.y, theta=pose.theta)
+    lay_segments(ends, on, at, index.walls.rows, index.pieces, overlaps, others)
     several = np.bincount(row_of, minlength=len(best.matches))[row_of[segments]] > 1
-    kept = np.flatnonzero((overlaps >= context.gates["least_overlap"][0]) | ~several)
-    return Accepted(
-        np.stack([segments[kept], pieces[kept]], axis=1), overlaps[kept], tuple(others[k] for k in kept.tolist())
-    )
+    kept = (overlaps >= context.gates["least_overlap"][0]) | ~several
+    return Accepted(np.stack([segments, on], axis=1)[kept], overlaps[kept], others[kept])
 
 
 def register_accepted(
@@ -177,43 +99,17 @@ def _options(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
 
 def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:
     """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have."""
-    rows = context.lines.row_of[accepted.pairs[:, 0]]
-    walls = best.matches["wall"][rows]
-    ties = context.index.ties[walls]
-    if len(set(walls.tolist())) == len(walls) and not (ties >= 0.0).any():
-        return None
-    given = Correspondences.of(context.index.segments, context.scan.measured, accepted.pairs)
-    alone = _not_shown_before(given, rows) / np.maximum(given.variances, LEAST_KNOWN_VARIANCE**2)
-    together = np.empty(len(alone))
-    step = max(1, PAIRS_COMPARED // max(1, len(alone)))
-    for begin in range(0, len(alone), step):
-        here, there = ties[begin : begin + step, None], walls[begin : begin + step, None]
-        tied = (here >= 0.0) & (ties >= 0.0)
-        one_wall = np.where(there == walls, 1.0, np.where(tied, np.exp(-np.abs(here - ties)), 0.0))
-        together[begin : begin + step] = one_wall @ alone
-    weights: Floats = alone / (1.0 + wall_sigma**2 * together)
-    return np.where(weights >= MIN_WEIGHT, weights, 0.0)
-
-
-def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
-    """Return the fraction of each scan segment that no longer one of its line covers, (n,), of equal ones the first."""
-    fractions = np.ones(len(rows))
-    for row in np.flatnonzero(np.bincount(rows) > 1).tolist():
-        members = np.flatnonzero(rows == row)
-        members = members[np.argsort(-given.lengths[members], kind="stable")]
-        along = given.directions[members[0]]
-        middles, reach = given.midpoints[members] @ along, 0.5 * given.lengths[members]
-        edges = np.unique(np.concatenate([middles - reach, middles + reach]))
-        free = np.diff(edges)
-        for member, low, high in zip(members.tolist(), middles - reach, middles + reach, strict=True):
-            own = slice(*np.searchsorted(edges, (low, high)).tolist())
-            fractions[member] = float(free[own].sum()) / max(high - low, MIN_EXTENT)
-            free[own] = 0.0
-    return fractions
+    measured, rows = context.scan.measured, context.lines.row_of[accepted.pairs[:, 0]]
+    walls, weights = best.matches["wall"][rows], np.empty(len(rows))
+    ties, ends = context.index.ties[walls], measured.segments.endpoints[accepted.pairs[:, 0]]
+    variances = Correspondences.of(context.index.segments, measured, accepted.pairs).variances
+    shared = weigh_pairs(rows, walls, ties, ends, variances, wall_sigma**2, weights)
+    return np.where(weights >= MIN_WEIGHT, weights, 0.0) if shared else None
 
 
 def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:
     """Report the consensus set by scan index."""
     columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
     values = (column.tolist() for column in columns)
-    return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, accepted.others))
+    others = (tuple(k % index.directed for k in some if k >= 0) for some in accepted.others.tolist())
+    return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, others))

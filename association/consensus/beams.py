@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from registration.layout import Floats, Records
 
 from ..context import SearchContext
-from ..layout import SHOWN, Flags, Integers
+from ..layout import SHOWN
 from ..scan.beams import BeamSet
 from ..tuning import MOST_LOOKED_AT
-from .consensus_set import BeamEvidence
-from .kernels.rays import cast_beams
+from .kernels.rays import cast_beams, passed_walls
 from .tuning import (
     BEAMS_PASSED,
     BEAMS_READ,
@@ -21,10 +22,27 @@ from .tuning import (
     CERTAIN,
     LEAST_INCIDENCE,
     NEAR,
-    SIGHT_TOLERANCE,
     SURE_LENGTH,
     WALL_BEHIND,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class BeamEvidence:
+    """The evidence of the beams at poses, (k, m) each.
+
+    Attributes
+    ----------
+    across : float64
+        By how much a beam reads farther than the map shows, metres across the wall; nan where the map shows no wall, or
+        the beam nothing.
+    read, passed : float64
+        Degree to which a beam reads the wall that it should, and to which it passed through it, 0 to 1.
+    """
+
+    across: Floats
+    read: Floats
+    passed: Floats
 
 
 def cast(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
@@ -62,12 +80,7 @@ def evidence_of(context: SearchContext, beams: BeamSet, table: Records, wider: f
         across = np.where(known, off, np.nan)
         read = np.where(known, np.exp(-0.5 * (across / (NEAR * wider)) ** 2), 0.0)
         passed = np.where(across > CERTAIN * wider, np.minimum(1.0, lengths[table["wall"]] / SURE_LENGTH), 0.0)
-    return BeamEvidence(table, across, read, passed)
-
-
-def at_pose(evidence: BeamEvidence, k: int) -> BeamEvidence:
-    """Return the evidence at one of several poses."""
-    return BeamEvidence(evidence.shown[k], evidence.across[k], evidence.read[k], evidence.passed[k])
+    return BeamEvidence(across, read, passed)
 
 
 def score_of_beams(beams: BeamSet, evidence: BeamEvidence) -> Floats:
@@ -76,41 +89,9 @@ def score_of_beams(beams: BeamSet, evidence: BeamEvidence) -> Floats:
     return np.asarray((BEAMS_READ * evidence.read - BEAMS_PASSED * evidence.passed) @ beams.weights / total)
 
 
-def passed_walls(beams: BeamSet, table: Records, matched: Flags) -> tuple[Integers, Integers, Floats, Floats]:
-    """Return the walls that rays to lines pass through well before their end, and how many rays do.
-
-    Parameters
-    ----------
-    beams : BeamSet
-        Rays to lines.
-    table : (k, m) of `SHOWN`
-    matched : (k, n) bool
-        Which lines are matched at each pose.
-
-    Returns
-    -------
-    poses, walls : (p,)
-    to_matched, to_clutter : (p,) float64
-        Rays to matched lines and to others, at most from any one view.
-    """
-    passes = (table["wall"] >= 0) & (beams.line >= 0)
-    passes &= beams.rows["range"] - SIGHT_TOLERANCE > table["distance"]
-    pose, beam = np.nonzero(passes)
-    wall, sensor = table["wall"][pose, beam], beams.sensor[beam]
-    walls, sensors = int(wall.max(initial=0)) + 1, int(sensor.max(initial=0)) + 1
-    keys, place = np.unique((pose * walls + wall) * sensors + sensor, return_inverse=True)
-    to_matched = np.bincount(place, matched[pose, beams.line[beam]], len(keys))
-    to_clutter = np.bincount(place, None, len(keys)) - to_matched
-    pairs, of = np.unique(keys // sensors, return_inverse=True)
-    counts = np.zeros((2, len(pairs)))
-    np.maximum.at(counts[0], of, to_matched)
-    np.maximum.at(counts[1], of, to_clutter)
-    return pairs // walls, pairs % walls, counts[0], counts[1]
-
-
-def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matched: Flags) -> Floats:
+def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matches: Records) -> Floats:
     """Return the penalty of lines of sight at each pose, (k,) nats: for walls that should have blocked the view."""
-    poses, walls, to_matched, to_clutter = passed_walls(beams, table, matched)
+    poses, walls, to_matched, to_clutter = passed_walls(beams.rows, beams.line, beams.sensor, table, matches)
     rows = context.index.obstacles.walls[walls]
     lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
     rays = np.minimum(1.0, to_matched / BLOCKING_RAYS) + np.minimum(1.0, to_clutter / BLOCKING_RAYS)

@@ -14,27 +14,6 @@ from registration.layout import Floats, Records
 
 
 @dataclass(frozen=True, slots=True)
-class BeamEvidence:
-    """The evidence of the beams at a pose, (m,) each.
-
-    Attributes
-    ----------
-    shown : Records
-        Of `SHOWN`: what the map shows each beam.
-    across : float64
-        By how much a beam reads farther than the map shows, metres across the wall; nan where the map shows no wall, or
-        the beam nothing.
-    read, passed : float64
-        Degree to which a beam reads the wall that it should, and to which it passed through it, 0 to 1.
-    """
-
-    shown: Records
-    across: Floats
-    read: Floats
-    passed: Floats
-
-
-@dataclass(frozen=True, slots=True)
 class ConsensusSet:
     """A pose with the correspondences that support it, and its score: one explanation of the scan.
 
@@ -53,7 +32,6 @@ class ConsensusSet:
     matches : (n,) of `MATCH`
     parts : (n,)
         Weight of each match, 0 to 1: one that scores little counts in part.
-    evidence : BeamEvidence
     """
 
     estimate: Records
@@ -63,7 +41,6 @@ class ConsensusSet:
     by_pairs: float
     matches: Records
     parts: Floats
-    evidence: BeamEvidence
 
     @property
     def pose(self) -> RigidTransform:

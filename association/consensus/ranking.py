@@ -12,8 +12,8 @@ from ..layout import MATCH, RULE, SET_SCORE, record
 from ..options import MapsPrior
 from ..tables import ScoreRules
 from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, FEW_KEPT, INSIDE
-from .beams import at_pose, cast, evidence_of, penalty_of_sight, score_of_beams
-from .consensus_set import BeamEvidence, ConsensusSet
+from .beams import cast, evidence_of, penalty_of_sight, score_of_beams
+from .consensus_set import ConsensusSet
 from .kernels.distinct import pick_distinct
 from .kernels.scoring import score_poses
 from .tuning import (
@@ -76,9 +76,9 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
     if not len(keep):
         return []
     if context.with_beams:
-        estimates, scores, matches, evidence, more = _with_ranges(context, estimates, scores, matches)
+        estimates, scores, matches, more = _with_ranges(context, estimates, scores, matches)
     else:
-        estimates, scores, matches, evidence, more = _with_sight(context, estimates, scores, matches)
+        estimates, scores, matches, more = _with_sight(context, estimates, scores, matches)
     totals = scores["score"] + more
     posteriors = totals + scores["value"] - scores["score"] + _map_priors(context, estimates)
     ranked = np.where(totals > 0.0, np.maximum(posteriors, 1e-9), 0.0)
@@ -98,7 +98,6 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
             by_pairs=float(scores["score"][k]),
             matches=matches[k],
             parts=parts[k],
-            evidence=at_pose(evidence, k),
         )
         for k in order.tolist()
     ]
@@ -106,7 +105,7 @@ def rank(context: SearchContext, poses: Records) -> list[ConsensusSet]:
 
 def _with_ranges(
     context: SearchContext, estimates: Records, scores: Records, matches: Records
-) -> tuple[Records, Records, Records, BeamEvidence, Floats]:
+) -> tuple[Records, Records, Records, Floats]:
     """Return the finalists by a few beams, with the terms of all beams."""
     finalists = LATE_FINALISTS if context.deadline.passed else BEAM_FINALISTS
     beams, prior = context.beams, scores["value"] - scores["score"]
@@ -118,12 +117,12 @@ def _with_ranges(
         by_few += np.where(scores["inside"] > 0, INSIDE, 0.0)
     best = first[np.argsort(-by_few[first], kind="stable")[:finalists]]
     evidence = evidence_of(context, beams, cast(context, beams, estimates[best]))
-    return estimates[best], scores[best], matches[best], evidence, score_of_beams(beams, evidence)
+    return estimates[best], scores[best], matches[best], score_of_beams(beams, evidence)
 
 
 def _with_sight(
     context: SearchContext, estimates: Records, scores: Records, matches: Records
-) -> tuple[Records, Records, Records, BeamEvidence, Floats]:
+) -> tuple[Records, Records, Records, Floats]:
     """Return the poses that are not far behind, with their penalties of lines of sight."""
     order = np.argsort(-scores["value"], kind="stable")
     near = scores["value"][order] >= scores["value"][order[0]] - FAR_BEHIND
@@ -131,8 +130,7 @@ def _with_sight(
     kept = np.sort(order[near])
     estimates, scores, matches = estimates[kept], scores[kept], matches[kept]
     table = cast(context, context.beams, estimates)
-    penalty = penalty_of_sight(context, context.beams, table, matches["wall"] >= 0)
-    return estimates, scores, matches, evidence_of(context, context.beams, table), -penalty
+    return estimates, scores, matches, -penalty_of_sight(context, context.beams, table, matches)
 
 
 def _map_priors(context: SearchContext, estimates: Records) -> Floats | float:

@@ -30,7 +30,6 @@ START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
 # Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
 # of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.
 RANKED_AT_ONCE = 200_000
-PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at a time; 2 MB for each table
 
 # --- Estimation: the pose with the error of the map's walls -----------------------------------------------------------
 

@@ -165,11 +165,6 @@ class MapIndex:
         return self
 
     @cached_property
-    def chains_of_pieces(self) -> dict[int, Any]:
-        """The pieces of linked walls that acceptance has put together, by the first wall."""
-        return {}
-
-    @cached_property
     def undirected(self) -> MapIndex:
         """The same map with every segment in both directions; itself where it was built so."""
         return self._undirected(None)

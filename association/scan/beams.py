@@ -78,7 +78,8 @@ def rays_to_lines(seen: Records, viewpoints: Floats, weights: Floats) -> BeamSet
     ranges = np.hypot(way[:, 0], way[:, 1])
     rows = _rows(begins, way / np.maximum(ranges, 1e-12)[:, None], ranges)
     farthest = float((ranges + 0.5 * one["length"]).max(initial=0.0))
-    return BeamSet(rows, one["row"], one["sensor"], weights[one["sensor"]], max(FAR, FARTHER * farthest))
+    line, sensor = np.ascontiguousarray(one["row"]), np.ascontiguousarray(one["sensor"])
+    return BeamSet(rows, line, sensor, weights[sensor], max(FAR, FARTHER * farthest))
 
 
 def together(one: BeamSet, other: BeamSet) -> BeamSet:

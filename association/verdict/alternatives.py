@@ -7,33 +7,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from registration.layout import Floats, Records
+from registration.layout import Floats
 
 from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score
 from ..consensus.tuning import BEAMS_PASSED, BEAMS_READ, BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, NEAR, SIGHT_TOLERANCE
 from ..context import SearchContext
-from ..layout import ESTIMATE, Indices
 from ..scan.beams import together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
+from .kernels.things import compare_things
 from .tuning import (
     AS_SCORED,
     COMPARED,
     COUNTED,
-    LEAST_OF_BEAM,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
     MOST_AS_SCORED,
-    OF_A_THING,
     TEMPERATURE,
-    THING_WIDTH,
-    THINGS_APART,
     UNCOUNTED,
 )
 
@@ -85,84 +78,38 @@ def compare(
     priors = np.array([one.posterior - one.score for one in sets])
     ratios = posteriors[1:] / posteriors[0] if posteriors[0] > 0.0 else np.ones(len(others))
     counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
-    evidence = _Evidence.of(context, sets, wall_sigma)
-    gaps = np.array([evidence.gap(0, k) for k in range(1, len(sets))]) + priors[0] - priors[1:]
+    gaps = _gaps(context, sets, wall_sigma) + priors[0] - priors[1:]
     gaps += AS_SCORED * np.minimum(posteriors[0] - posteriors[1:], MOST_AS_SCORED)
     return Comparison(others, gaps, counted)
 
 
-@dataclass(frozen=True, slots=True)
-class _Evidence:
-    """The score of each explanation at each place in view.
-
-    Attributes
-    ----------
-    values : (k, m) nats
-    distances : (k, m) metres from the sensor, where the thing is that a value speaks of
-    begins, ways : (m, 2) from where each place is seen, and its direction; in the scan frame
-    """
-
-    values: Floats
-    distances: Floats
-    begins: Floats
-    ways: Floats
-
-    @classmethod
-    def of(cls, context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> _Evidence:
-        sigma = _loose_sigma(context, wall_sigma)
-        loose = context if sigma is None else context.with_scan(
-            context.scan, ScanLines.of(context.scan, sigma, context.options, context.lines.given)
-        )  # fmt: skip
-        wider = 1.0 if sigma is None else max(1.0, LOOSE_BEAMS * math.hypot(sigma, MODEL_OFFSET) / NEAR)
-        estimates = np.empty(len(sets), ESTIMATE)
-        for k, one in enumerate(sets):
-            estimates[k] = one.estimate[0]
-        _, matches = score(loose, estimates)
-        lines = context.rays_to_lines
-        of_lines = _of_lines(context, matches, np.bincount(lines.line, minlength=matches.shape[1]))
-        of_rays = of_lines[:, lines.line]
-        beams = together(lines, context.beams) if context.with_beams else lines
-        table = cast(context, beams, estimates)
-        ranges = beams.rows["range"]
-        distances = np.where(np.isfinite(ranges), ranges, beams.reach) + np.zeros((len(sets), 1))
-        passes = (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
-        distances[passes] = table["distance"][passes]
-        if context.with_beams:
-            own = slice(len(lines), None)
-            read = evidence_of(context, context.beams, table[:, own], wider)
-            weights = context.beams.weights / max(1e-9, float(context.beams.weights.sum()))
-            values = np.hstack([of_rays, weights * (BEAMS_READ * read.read - BEAMS_PASSED * read.passed)])
-        else:
-            rows = context.index.obstacles.walls
-            lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])[table["wall"]]
-            values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
-        begins = np.stack([beams.rows["x"], beams.rows["y"]], axis=1)
-        ways = np.stack([beams.rows["dx"], beams.rows["dy"]], axis=1)
-        return cls(values, distances, begins, ways)
-
-    def gap(self, one: int, other: int) -> float:
-        """Return by how much one explanation has more evidence than another, each thing within its limit, nats."""
-        more = self.values[one] - self.values[other]
-        differs = np.flatnonzero(np.abs(more) > LEAST_OF_BEAM)
-        if not len(differs):
-            return 0.0
-        more = more[differs]
-        # A thing is where the map shows it to the explanation that it speaks against.
-        away = np.where(more > 0.0, self.distances[other, differs], self.distances[one, differs])
-        places = self.begins[differs] + away[:, None] * self.ways[differs]
-        first, second = cKDTree(places).query_pairs(THINGS_APART, output_type="ndarray").T
-        near = coo_array((np.ones(len(first)), (first, second)), shape=(len(places), len(places)))
-        count, thing = connected_components(near, directed=False)
-        low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-        np.minimum.at(low, thing, places)
-        np.maximum.at(high, thing, places)
-        limits = OF_A_THING * np.maximum(1.0, np.hypot(*(high - low).T) / THING_WIDTH)
-        return float(np.clip(np.bincount(thing, more, count), -limits, limits).sum())
-
-
-def _of_lines(context: SearchContext, matches: Records, rays: Indices) -> Floats:
-    """Return the score of each scan line, (k, n) nats, for each of the rays to it."""
-    return np.asarray(np.where(matches["wall"] >= 0, matches["score"], 0.0) / np.maximum(1, rays))
+def _gaps(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> Floats:
+    """Return by how much the first explanation has more evidence than each other, nats."""
+    sigma = _loose_sigma(context, wall_sigma)
+    loose = context if sigma is None else context.with_scan(
+        context.scan, ScanLines.of(context.scan, sigma, context.options, context.lines.given)
+    )  # fmt: skip
+    wider = 1.0 if sigma is None else max(1.0, LOOSE_BEAMS * math.hypot(sigma, MODEL_OFFSET) / NEAR)
+    estimates = np.concatenate([one.estimate for one in sets])
+    _, matches = score(loose, estimates)
+    lines = context.rays_to_lines
+    beams = together(lines, context.beams) if context.with_beams else lines
+    table = cast(context, beams, estimates)
+    ranges = beams.rows["range"]
+    passes = (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
+    distances = np.where(passes, table["distance"], np.where(np.isfinite(ranges), ranges, beams.reach))
+    # The score of each scan line, for each of the rays to it.
+    rays = np.maximum(1, np.bincount(lines.line, minlength=matches.shape[1]))
+    of_rays = (np.where(matches["wall"] >= 0, matches["score"], 0.0) / rays)[:, lines.line]
+    if context.with_beams:
+        read = evidence_of(context, context.beams, table[:, len(lines) :], wider)
+        weights = context.beams.weights / max(1e-9, float(context.beams.weights.sum()))
+        values = np.hstack([of_rays, weights * (BEAMS_READ * read.read - BEAMS_PASSED * read.passed)])
+    else:
+        rows = context.index.obstacles.walls[table["wall"]]
+        lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
+        values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
+    return np.asarray(compare_things(values, distances, beams.rows))
 
 
 def _loose_sigma(context: SearchContext, wall_sigma: float) -> float | None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.estimator import Estimate
 from ..consensus.tuning import (
@@ -148,12 +149,13 @@ def _views(context: SearchContext) -> float:
 
 def _of_beams(context: SearchContext, best: ConsensusSet) -> tuple[float, float, float]:
     """Return the agreement of the view with the map's, and how far beams pass, and read nearer."""
-    beams, seen = context.beams, best.evidence
+    beams = context.beams
     if not len(beams) or not context.can_look:
         return NEUTRAL, 0.0, 0.0
     if not context.with_beams:
         return NEUTRAL, best.by_pairs - best.score, 0.0
-    weights, ranges, shown = beams.weights, beams.rows["range"], seen.shown
+    table = cast(context, beams, best.estimate)
+    weights, ranges, shown, seen = beams.weights, beams.rows["range"], table[0], evidence_of(context, beams, table)
     hits = shown["wall"] >= 0
     tolerance = AGREEING + AGREEING_FRACTION * np.where(np.isfinite(ranges), ranges, 0.0)
     agree = hits & (np.abs(shown["distance"] - np.where(np.isfinite(ranges), ranges, -1e9)) < tolerance)
@@ -165,5 +167,5 @@ def _of_beams(context: SearchContext, best: ConsensusSet) -> tuple[float, float,
     agreement = float(weights @ agree) / evident if evident > 0.0 else NEUTRAL
     total = max(1e-9, float(weights.sum()))
     with np.errstate(invalid="ignore"):
-        nearer = float(weights @ (seen.across < -NEAR)) / total
-    return agreement, float(weights @ seen.passed) / total, nearer
+        nearer = float(weights @ (seen.across[0] < -NEAR)) / total
+    return agreement, float(weights @ seen.passed[0]) / total, nearer

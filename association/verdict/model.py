@@ -40,7 +40,7 @@ class Odds:
 
     def at(self, features: Features) -> float:
         """Return the logarithm of the odds."""
-        return self.constant + sum(self.terms(features).values())
+        return self.constant + sum(curve.at(getattr(features, name)) for name, curve in self.curves.items())
 
 
 @dataclass(frozen=True, slots=True)

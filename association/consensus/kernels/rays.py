@@ -1,13 +1,18 @@
-"""Cast rays: for each beam at each pose the first wall that it meets."""
+"""Cast rays: for each beam at each pose the first wall that it meets, and walls that beams pass through."""
 
 from __future__ import annotations
 
 import math
 
-from compiled import kernel
-from registration.layout import Records
+import numpy as np
 
+from compiled import kernel
+from registration.layout import Floats, Records
+
+from ...layout import Indices
+from ...scan.kernels.ordering import ascending
 from ...tables import Place
+from ..tuning import SIGHT_TOLERANCE
 
 
 @kernel
@@ -97,3 +102,67 @@ def cast_beams(beams: Records, reach: float, behind: float, poses: Records, plac
                     row += step_y
                     next_y += pace_y
             out.distance = best
+
+
+@kernel
+def passed_walls(
+    beams: Records, line: Indices, sensor: Indices, table: Records, matches: Records
+) -> tuple[Indices, Indices, Floats, Floats]:
+    """Return the walls that rays to lines pass through well before their end, and how many rays do.
+
+    Parameters
+    ----------
+    beams : (m,) of `BEAM`
+    line, sensor : (m,)
+        The scan line that each goes to, and its view.
+    table : (k, m) of `SHOWN`
+    matches : (k, n) of `MATCH`
+
+    Returns
+    -------
+    poses, walls : (p,)
+    to_matched, to_clutter : (p,) float64
+        Rays to matched lines and to others, at most from any one view.
+    """
+    m = len(beams)
+    sensors = 1
+    for b in range(m):
+        sensors = max(sensors, sensor[b] + 1)
+    room = 0
+    for p in range(len(table)):
+        for b in range(m):
+            room += table[p, b].wall >= 0 and beams[b].range - SIGHT_TOLERANCE > table[p, b].distance
+    poses, walls = np.empty(room, np.intp), np.empty(room, np.intp)
+    to_matched, to_clutter = np.zeros(room), np.zeros(room)
+    keys, passing = np.empty(m), np.empty(m, np.intp)
+    found = 0
+    for p in range(len(table)):
+        count = 0
+        for b in range(m):
+            one = table[p, b]
+            if one.wall >= 0 and line[b] >= 0 and beams[b].range - SIGHT_TOLERANCE > one.distance:
+                keys[count] = one.wall * sensors + sensor[b]
+                passing[count] = b
+                count += 1
+        order = ascending(keys[:count])
+        before = -1
+        last = -1.0
+        matched = 0.0
+        clutter = 0.0
+        for place in range(count):
+            b = passing[order[place]]
+            wall = table[p, b].wall
+            if wall != before:
+                poses[found], walls[found] = p, wall
+                found += 1
+                before = wall
+            if keys[order[place]] != last:
+                matched = clutter = 0.0
+                last = keys[order[place]]
+            if matches[p, line[b]].wall >= 0:
+                matched += 1.0
+            else:
+                clutter += 1.0
+            to_matched[found - 1] = max(to_matched[found - 1], matched)
+            to_clutter[found - 1] = max(to_clutter[found - 1], clutter)
+    return poses[:found], walls[:found], to_matched[:found], to_clutter[:found]
