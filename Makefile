@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page pictures wheel image-check sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload siege mutants fuzz page pictures wheel image-check sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -62,9 +62,6 @@ bench: $(VENV)/.ready  ## print the table of quality and speed
 
 overload: $(VENV)/.ready  ## print what ten times too much load does, and what large maps do meanwhile (5 min)
 	$(BIN)/python -m benchmarks.overload
-
-endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed workers and drains end (5 min)
-	$(BIN)/python -m benchmarks.endings
 
 mutants: $(VENV)/.ready  ## change the code in 600 places, one at a time, and report which changes the tests notice (hours; continues a stopped run)
 	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)

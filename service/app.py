@@ -48,6 +48,7 @@ from .importing.reader import Bounds
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
 from .maps.lookup import MapLookup
+from .memory import return_free_pages
 from .parsing.parser_process import ParserProcess
 from .settings import Settings
 from .telemetry.metrics import Metrics, RefusalTally
@@ -209,15 +210,16 @@ async def _prepare(services: Services) -> None:
             error,
             extra={"store": where},
         )
-    threads, parser = services.parse_threads, services.parser
+    threads = services.parse_threads
     await threads.run(remove_abandoned)
     if not is_complete():
         await _compile(services)
-    await asyncio.gather(threads.run(warm_up), threads.run(parser.start))
+    await threads.run(warm_up)
     # Objects made until now live as long as the process: the garbage collector need not look through them, ever. It has
     # been off since the process began, which saves a fifth of the start; hardly any of these objects is garbage.
     gc.freeze()
     gc.enable()
+    return_free_pages()
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")

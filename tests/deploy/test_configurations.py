@@ -7,9 +7,10 @@ import os
 import re
 import shutil
 import socket
+import ssl
 import subprocess
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx
@@ -113,7 +114,7 @@ def nginx(service_port: int, port: int, folder: Path) -> list[str]:
         "127.0.0.1:8000": f"127.0.0.1:{service_port}",
         "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
         "/etc/linefix": str(folder),
-        "events {}": f"events {{}}\n{user}daemon off;\npid {folder}/pid;\nerror_log {folder}/error.log;",
+        "events {": f"{user}daemon off;\npid {folder}/pid;\nerror_log {folder}/error.log;\nevents {{",
         "http {": "http {\naccess_log off;\n" + "".join(f"{kind}_temp_path {folder}/{kind};\n" for kind in kinds),
     }
     written = _changed(DEPLOY / "nginx.conf", folder, changes)
@@ -156,11 +157,29 @@ def test_a_proxy_stands_in_front(
         process.wait(60)
 
 
-@pytest.mark.parametrize("said", [b"", b"\x16\x03\x01"], ids=["nothing", "the beginning of a handshake"])
+def silent(port: int) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", port))
+
+
+def in_a_handshake(port: int) -> socket.socket:
+    connection = silent(port)
+    connection.sendall(b"\x16\x03\x01")
+    return connection
+
+
+def in_a_head(port: int) -> socket.socket:
+    context = ssl.create_default_context()
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    connection = context.wrap_socket(silent(port))
+    connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nX-A: a")
+    return connection
+
+
+@pytest.mark.parametrize(("kind", "count"), [(silent, 600), (in_a_handshake, 600), (in_a_head, 100)])
 def test_connections_that_say_little_end_at_nginx(
-    said: bytes, start_service: Callable[..., RunningService], tmp_path: Path
+    kind: Callable[[int], socket.socket], count: int, start_service: Callable[..., RunningService], tmp_path: Path
 ) -> None:
-    """The service alone would leave other clients waiting: it has eight connections, and ends none of them in time."""
+    """The service alone would refuse other clients: it serves seven connections, and ends none of them in time."""
     if shutil.which("nginx") is None:
         pytest.skip("no nginx")
     running, port = start_service(max_connections=8, request_timeout_s=600), free_port()
@@ -172,9 +191,11 @@ def test_connections_that_say_little_end_at_nginx(
             httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=False, timeout=60) as client,
         ):
             until(lambda: _answers(client))
-            for _ in range(64):
-                held.enter_context(socket.create_connection(("127.0.0.1", port))).sendall(said)
+            connections = [held.enter_context(kind(port)) for _ in range(count)]
             assert httpx.get(f"https://127.0.0.1:{port}/livez", verify=False, timeout=60).status_code == 200
+            connections[0].settimeout(60)
+            with suppress(ConnectionError):
+                assert connections[0].recv(65_536) == b""  # nginx ends it
     finally:
         process.terminate()
         process.wait(60)
