@@ -25,12 +25,12 @@ import orjson
 from association import Deadline
 from examples.running import free_port, running_service
 from linefix.documents.encoding import encode
+from linefix.documents.reading import read_model
 from linefix.documents.requests import AssociateRequest
 from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.lookup import MapLookup
 from service.parsing.parser_process import ParserProcess
-from service.parsing.reading import read_model
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
 from service.work.association import Associator

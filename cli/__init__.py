@@ -5,14 +5,10 @@
     entry                     run a command; errors become one line and an exit code
     program                   all commands together
     locate, register, vectorize, replay, batch, analyze, key, ros2, maps/    the commands
-    asking                    where a request goes: to a server, or to this process
-    here                      answers of this process, by `linefix`
-    server                    answers of a server, by `linefix-client`
+    asking                    where a request goes: to a server by `linefix-client`, or to `linefix.answering`
     stored                    the store of maps of this machine
-    contract                  the form of requests
     inputs, scans, logs       files to requests
-    locators, tracking, frames    scans of a log to poses: search, prior, mount
-    all_cores                 the places of an analysis in several processes
+    tracking, frames          a robot along a log: prior, maps, mount
     compiling                 kernels that are not cached, before the first search
     options, printing         options of several commands; answers for people
 """

@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import re
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-import orjson
 import typer
-from numpy.typing import ArrayLike
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
 
-from registration import InputError, Segments
-
-from .asking import server_at
-from .compiling import compile_first
-from .contract import Json, Progress
-from .errors import RefusedError, WrongUseError
+from .asking import answering, id_of, server_at, setting
+from .errors import Asked, RefusedError, WrongUseError
 from .inputs import line_map_of, needing_formats, read_map_file, read_map_or_id
 from .options import AsJson, MapArgument, Server, grouped
-from .printing import print_json, print_rows
+from .printing import Json, print_json, print_rows, write_json
 
 SUFFIXES = (".json", ".geojson")
-# Arguments of the library by the options that they come from.
-OPTIONS = {f"laser.{name.replace('-', '_')}": f"--{name}" for name in ("fov", "beams", "range-max", "sigma")}
-OPTIONS |= {name: f"--{name}" for name in ("spacing", "point", "drive", "landmark")}
+OPTION = re.compile(r"(?:/laser)?/(fov|beams|range_max|sigma|spacing|point|drive|landmark)\b[^:]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,17 +81,13 @@ def analyze(
             "--picture: found the id of a stored map, expected a map file; write one with linefix map get ID --out FILE"
         )
     landmark = [] if further.landmark is None else read_map_file(further.landmark).get("segments", [])
-    if server is None:
-        answer = _analyzed(target, Asked(scanner, further.drive, landmark, places))
-    else:
-        body: Json = {"map": target, "laser": asdict(scanner), "drive": further.drive, "landmark": landmark}
-        body |= {"spacing": places.spacing, "deadline_ms": places.deadline_ms}
-        if places.point is not None:
-            body["point"] = list(places.point)
-        with closing(server_at(server)) as service:
-            answer = service.analyze(body)
+    body: Json = {"map": target, "laser": asdict(scanner), "drive": further.drive, "landmark": landmark}
+    body |= {"spacing": places.spacing, "deadline_ms": places.deadline_ms}
+    if places.point is not None:
+        body["point"] = list(places.point)
+    answer = _analyzed(body, server)
     if out is not None:
-        out.write_bytes(orjson.dumps(answer if out.suffix.lower() == ".json" else features(answer)) + b"\n")
+        write_json(answer if out.suffix.lower() == ".json" else features(answer), out)
     if picture is not None:
         _draw(read_map_file(on), answer, picture)
     if as_json:
@@ -110,52 +96,37 @@ def analyze(
         print_rows(list(_rows(answer)))
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """The analysis that the options of the command request."""
-
-    scanner: ScannerOptions
-    drive: float
-    landmark: ArrayLike
-    places: PlaceOptions
-
-
-def _analyzed(target: Json, asked: Asked) -> Json:
-    """Return the answer of ``POST /v1/analyze``, worked out here on all cores, however long it takes."""
-    import linefix
-    from linefix.map_answers import analysis_json
-    from map_quality import Analysis, Robot
-
-    from .all_cores import look_on_all_cores
-    from .stored import map_here, require_size, settings_here
-
-    if asked.places.deadline_ms is not None and not asked.places.deadline_ms >= 0.0:
-        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {asked.places.deadline_ms:g}")
-    found, cores = map_here(target), settings_here().searches
-    require_size(found.document)
-    compile_first()
-    begun = time.monotonic()
+def _analyzed(body: Json, server: str | None) -> Json:
+    """Return the answer of ``POST /v1/analyze``: of a server, or worked out here on all cores."""
+    deadline = body["deadline_ms"]
+    if deadline is not None and not deadline >= 0.0:
+        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {deadline:g}")
+    if server is not None:
+        with server_at(server) as remote:
+            return remote.call("AnalyzeAnswer", "analyze", body)
     try:
-        laser = asked.scanner
-        robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
-        landmark = Segments.from_array(asked.landmark, argument="landmark")
-        index = linefix.index_map(found.document)
-        analysis = Analysis.over(
-            index, robot, asked.places.spacing, asked.places.point, drive=asked.drive, landmark=landmark
-        )
-    except InputError as error:
-        raise RefusedError(OPTIONS.get(error.argument, error.argument) + f": {error.message}") from None
-    deadline = linefix.Deadline(None if asked.places.deadline_ms is None else begun + 1e-3 * asked.places.deadline_ms)
-    with _progress() as progress:
-        looks = look_on_all_cores(analysis, cores, deadline, progress)
-    spent = round(1e3 * (time.monotonic() - begun), 3)
-    sealed = {"map": found.reference, "client_ref": None, "timing_ms": {"search": spent, "total": spent}}
-    return {**analysis_json(analysis, looks), **sealed}
+        with answering(Asked(id_of(body["map"]))) as within, _progress() as progress:
+            from linefix.answering import analyze as analyze_here
+
+            return analyze_here(body, within, cores_here(), progress)
+    except RefusedError as error:
+        named = OPTION.sub(lambda found: "--" + found[1].replace("_", "-"), str(error), count=1)
+        raise RefusedError(named, error.pointer) from None
+
+
+def cores_here() -> int:
+    """Return how many processes analyze: by the environment, else one for each core."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return setting("SEARCHES", cores)
 
 
 @contextmanager
-def _progress() -> Iterator[Progress]:
+def _progress() -> Iterator[Callable[[int, int], None]]:
     """Show the progress on a terminal; never in piped output."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
     columns = TextColumn("places"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Bar(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
         task = bar.add_task("places", total=None)

@@ -10,21 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bars
-from rich.progress import Task as Bar
-from rich.text import Text
 
-from registration import InputError
-
-from .compiling import compile_kernels
 from .errors import RefusedError, WrongUseError
 from .options import AsJson, UsableOptions, grouped
 from .printing import noted, print_json, print_rows
 
 if TYPE_CHECKING:
-    from batch import Engine, FleetOptions, LogNote, Progress, Summary
+    from batch import Engine, FleetOptions, LogNote, Summary
+    from batch import Progress as Done
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +59,8 @@ def batch(
     """
     if out.is_dir():
         raise WrongUseError(f"--out: found the folder {out}, expected a file")
+    from registration import InputError
+
     begun = time.monotonic()
     try:
         from batch import associate_many
@@ -98,6 +93,7 @@ def _first_error(out: Path) -> str:
 def _options(block: int, chosen: SearchChoice, usable: UsableOptions) -> FleetOptions:
     from association import AssociationOptions
     from batch import FleetOptions
+    from linefix.compiling import compile_kernels
 
     search = AssociationOptions(max_alternatives=0, parts=(), oriented=not chosen.undirected, **asdict(usable))
     return FleetOptions(search, chosen.deadline_ms, block, compile_kernels)
@@ -131,25 +127,20 @@ def _noted(note: LogNote) -> str:
 
 
 @contextmanager
-def shown_progress() -> Iterator[Callable[[Progress], None]]:
+def shown_progress() -> Iterator[Callable[[Done], None]]:
     """Show the progress of a run on a terminal; yield the function that takes its steps."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _Speed(), TimeRemainingColumn())
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Bars(*columns, console=console, disable=not console.is_terminal) as bars:
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
         known = {}
 
-        def watch(progress: Progress) -> None:
+        def watch(progress: Done) -> None:
             if progress.stage not in known:
                 known[progress.stage] = bars.add_task(progress.stage, total=progress.total)
                 bars.reset(known[progress.stage], total=progress.total, completed=progress.done)
             bars.update(known[progress.stage], completed=progress.done)
 
         yield watch
-
-
-class _Speed(ProgressColumn):
-    """The number of items a second."""
-
-    def render(self, task: Bar) -> Text:
-        """Return it as text."""
-        return Text("" if task.speed is None else f"{task.speed:,.0f}/s")

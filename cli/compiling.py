@@ -6,14 +6,6 @@ import sys
 import time
 from contextlib import suppress
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
-from compiled import compiled_fraction, is_complete
-from linefix.compiling import compile_kernels, start_compiler
-
-__all__ = ["compile_first", "compile_kernels"]
-
 LOOK_SECONDS = 0.3
 
 
@@ -22,8 +14,15 @@ def compile_first() -> None:
 
     A terminal shows how far it is.
     """
+    from compiled import compiled_fraction, is_complete
+
     if is_complete():
         return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    from linefix.compiling import start_compiler
+
     print(
         "linefix: compiling the kernels, which takes one to two minutes; later runs load them from the cache",
         file=sys.stderr,

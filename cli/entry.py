@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import sys
 
-from service.serving import EXTRA, ONE_THREAD, needed, serve
-
 from .errors import CommandError
 
+# Its threads cost more than they bring, for arrays of some hundred rows.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 DEFECT = "a defect of linefix; please report it"
 INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number the end by a signal
 
@@ -17,6 +17,8 @@ def main() -> None:
     """Run the command that the command line names."""
     arguments = sys.argv[1:]
     if arguments[:1] == ["serve"]:  # a service carries nothing of the other commands in its memory
+        from service.serving import serve
+
         sys.exit(serve(arguments[1:]))
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
@@ -34,6 +36,8 @@ def run(arguments: list[str]) -> int:
     except CommandError as error:
         return _ended(error.exit_code, str(error))
     except ModuleNotFoundError as error:
+        from service.serving import EXTRA, needed
+
         if error.name in EXTRA:
             return _ended(2, needed(error))
         return _ended(1, f"{DEFECT}: {error}")

@@ -11,7 +11,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,3 +120,26 @@ def error_of(status: int, code: str, detail: str, faults: Sequence[Mapping[str, 
     if 400 <= status < 500 and status not in BUSY:
         return RefusedError(message, faults[0]["pointer"] if faults else "")
     return NoServerError(message)
+
+
+@contextmanager
+def refusing(asked: Asked = NOTHING) -> Iterator[None]:
+    """Raise errors of the command line in place of those about a request."""
+    from linefix.answering import NotStoredError, TooLateError
+    from linefix.documents.errors import InvalidRequestError, TooManyError
+    from linefix.documents.inputs import fault_of
+    from registration import InputError
+
+    try:
+        yield
+        return
+    except TooLateError as error:
+        raise NoServerError(str(error)) from None
+    except NotStoredError as error:
+        raise RefusedError(str(error)) from None
+    except TooManyError as error:
+        named = [{"pointer": error.pointer, "message": str(error)}] if error.pointer else []
+        raise error_of(413, "", str(error), named, asked) from None
+    except (InvalidRequestError, InputError) as error:
+        faults = error.faults if isinstance(error, InvalidRequestError) else (fault_of(error),)
+    raise error_of(422, "", "", [{"pointer": one.pointer, "message": one.message} for one in faults], asked)

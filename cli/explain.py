@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .contract import Json
-from .errors import WrongUseError
+from .asking import answering, id_of
+from .errors import Asked, WrongUseError
 from .locate import NearOptions, SearchChoice, request_body
 from .options import AsJson, MapArgument, ScanArgument, UsableOptions, grouped
-from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
+from .printing import Json, pose_text, print_json, print_rows, print_table, verdict_rows
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
 
@@ -24,12 +24,13 @@ def explain(
 
     The answer is that of linefix locate. It is usable if its probability reaches --usable-from and no veto applies.
     """
-    from . import here
-
     body = request_body([on], scan, window, search, usable)
     if "maps" in body:
         raise WrongUseError(f"{on}: found a folder with {len(body['maps'])} maps, expected one map")
-    found = here.explain(body)
+    with answering(Asked(id_of(body["map"]))) as within:
+        from linefix import answering as library
+
+        found = library.explain(body, within)
     if as_json:
         print_json(found)
         return

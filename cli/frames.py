@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from registration import RigidTransform
-
 from .errors import RefusedError
 
 if TYPE_CHECKING:
     from formats import LoggedScan
+    from registration import RigidTransform
 
 ROBOT = "base_link"  # name of the robot's frame where the user sets the mount
 

@@ -10,14 +10,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from association import MapPoints
-from linefix.map_answers import map_json
-from registration import InputError, Segments
-from service.contract import InvalidRequestError, Limits, NotJsonError, TooManyError, fault_of, parse
-
-from .contract import Json
-from .errors import NOTHING, Asked, RefusedError, WrongUseError, error_of
-from .printing import noted, plain
+from .errors import RefusedError, WrongUseError
+from .printing import Json, noted, plain
 
 if TYPE_CHECKING:
     from formats import ImportReport, LineMap
@@ -25,8 +19,7 @@ if TYPE_CHECKING:
 STDIN = "-"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
-MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
-_ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
+MAX_VALUES = 1_000_000_000  # of a file; what a request may hold is the service's business
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
 RECORDINGS = ("rosbag1", "rosbag2", "mcap")
@@ -54,7 +47,10 @@ def bytes_of(name: str) -> bytes:
 
 def json_of(data: bytes) -> Any:
     """Parse JSON; raises `NotJsonError`, and `TooManyError` when there are more values than any request may have."""
-    return parse(data, _ANY)
+    from linefix.documents.limits import Limits
+    from linefix.documents.reading import parse
+
+    return parse(data, Limits(values=MAX_VALUES))
 
 
 def read_json(name: str) -> Any:
@@ -67,6 +63,8 @@ def read_json(name: str) -> Any:
     RefusedError
         When it is not JSON.
     """
+    from linefix.documents.errors import NotJsonError, TooManyError
+
     data = bytes_of(name)
     try:
         return json_of(data)
@@ -105,6 +103,7 @@ def read_map_file(name: str) -> Json:
     if path.suffix.lower() != ".json":
         with needing_formats(f"reading {path.name}"):
             from formats import read_map
+            from linefix.documents.results import map_json
 
             imported = read_map(path)
         _print_choice(imported.report)
@@ -135,7 +134,9 @@ def line_map_of(document: Json) -> LineMap:
     InputError
         When its segments are none.
     """
+    from association import MapPoints
     from formats import LineMap
+    from registration import Segments
 
     segments = Segments.from_array(document.get("segments", []), argument="segments")
     points = MapPoints.of(document.get("points", []), document.get("points_sigma"), path="")
@@ -153,6 +154,8 @@ def needing_formats(what: str) -> Iterator[None]:
     ------
     RefusedError
     """
+    from registration import InputError
+
     try:
         yield
     except ModuleNotFoundError:
@@ -160,20 +163,3 @@ def needing_formats(what: str) -> Iterator[None]:
     except InputError as error:
         told = f"--point: {error.message}" if error.argument == "inside" else str(error)
         raise RefusedError(told) from None
-
-
-@contextmanager
-def refusing(asked: Asked = NOTHING) -> Iterator[None]:
-    """Raise `RefusedError` in place of the errors about a request."""
-    try:
-        yield
-    except InvalidRequestError as error:
-        faults = error.faults
-    except TooManyError as error:
-        named = [{"pointer": error.pointer, "message": str(error)}] if error.pointer else []
-        raise error_of(413, "", str(error), named, asked) from None
-    except InputError as error:
-        faults = (fault_of(error),)
-    else:
-        return
-    raise error_of(422, "", "", [{"pointer": one.pointer, "message": one.message} for one in faults], asked)

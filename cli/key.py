@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import secrets
+from enum import StrEnum
 from typing import Annotated
 
-import orjson
 import typer
 
-from service.admission.grants import Role
-from service.admission.key_file import parse_keys
-
 from .errors import WrongUseError
+
+
+class Role(StrEnum):
+    """A permission of a key."""
+
+    READ = "read"
+    ASSOCIATE = "associate"
+    WRITE = "write"
 
 
 def key(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the key, for people; not secret.")],
     role: Annotated[
-        list[Role] | None, typer.Option(help="Role of the key; repeat for more roles. Default: all.")
+        list[Role] | None,
+        typer.Option(help="Role of the key; repeat for more roles. Default: all."),
     ] = None,
     maps: Annotated[
         str | None,
@@ -26,12 +33,14 @@ def key(
     ] = None,
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
+    from service.admission.key_file import parse_keys
+
     made = secrets.token_urlsafe(32)
     described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}
     if maps is not None:
         described["maps"] = maps
     # A string or a list of them is the same in TOML as in JSON.
-    lines = ["[[key]]", *(f"{field} = {orjson.dumps(value).decode()}" for field, value in described.items())]
+    lines = ["[[key]]", *(f"{field} = {json.dumps(value)}" for field, value in described.items())]
     try:
         parse_keys("\n".join(lines))
     except ValueError:

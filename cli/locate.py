@@ -9,10 +9,9 @@ from typing import Annotated
 import typer
 
 from .asking import ask
-from .contract import Json
 from .errors import WrongUseError
 from .options import AsJson, MapsArgument, ScanArgument, Server, UsableOptions, grouped
-from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
+from .printing import Json, pose_text, print_json, print_rows, print_table, verdict_rows
 from .scans import read_scan
 from .several import read_target
 

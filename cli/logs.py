@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, TextIO, TypeVar
 
 import typer
 
-from .contract import Json
 from .errors import WrongUseError
 from .inputs import needing_formats
-from .printing import noted, plain
+from .printing import Json, noted, plain
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, LogOptions

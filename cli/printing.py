@@ -5,32 +5,42 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.measure import Measurement
-from rich.table import Table
-from rich.text import Text
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
 
-from service.contract import encode
-
-from .contract import Json
-
+Json = dict[str, Any]
 WIDEST = 10_000  # characters of a row
 
 
 def print_json(answer: Any) -> None:
     """Print one document in one line, without control characters for a terminal."""
+    from linefix.documents.encoding import encode
+
     sys.stdout.write(escaped(encode(answer).decode()) + "\n")
+
+
+def write_json(document: Any, out: Path) -> None:
+    """Write one document to a file."""
+    from linefix.documents.encoding import encode
+
+    out.write_bytes(encode(document) + b"\n")
 
 
 def console(width: int | None = None) -> Console:
     """Return where people read, by default as wide as the terminal; nothing printed there is taken for markup."""
+    from rich.console import Console
+
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=True, width=width)
 
 
 def plain(text: object) -> Text:
     """Return text of a file or a server without control characters for a terminal."""
+    from rich.text import Text
+
     return Text("".join(letter if letter.isprintable() else "?" for letter in str(text)))
 
 
@@ -49,6 +59,9 @@ def noted(note: Json) -> str:
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """Print a table; numbers stand on the right."""
+    from rich.measure import Measurement
+    from rich.table import Table
+
     table = Table(box=None, pad_edge=False, header_style="bold")
     for number, name in enumerate(columns):
         right = all(isinstance(row[number], int | float) for row in rows)

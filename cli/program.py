@@ -8,9 +8,6 @@ import typer
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from service.serving import serve
-from service.version import VERSION
-
 from . import maps
 from .analyze import analyze
 from .batch import batch
@@ -32,6 +29,8 @@ app.add_typer(maps.app)
 
 def _tell_version(asked: bool) -> None:
     if asked:
+        from service.version import VERSION
+
         print(f"linefix {VERSION}")
         raise typer.Exit
 
@@ -56,6 +55,8 @@ def linefix(
 )
 def run_service(context: typer.Context) -> None:
     """Start the HTTP service; linefix serve --help lists all settings."""
+    from service.serving import serve
+
     raise typer.Exit(serve(context.args))
 
 

@@ -7,10 +7,9 @@ from typing import Annotated
 import typer
 
 from .asking import ask
-from .contract import Json
 from .inputs import read_json, read_map_file
 from .options import AsJson, ScanArgument, Server
-from .printing import print_json, print_rows, verdict_rows
+from .printing import Json, print_json, print_rows, verdict_rows
 from .scans import read_scan
 
 

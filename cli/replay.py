@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from itertools import islice
 from pathlib import Path
@@ -13,25 +14,20 @@ from statistics import median
 from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
-from rich.console import Console
-from rich.progress import track
 
-from linefix.ranges import SPEED, TURN
-from registration import RigidTransform
-
-from .contract import Json
-from .errors import CommandError, NoSuchMapError, RefusedError
+from .asking import answering, server_at
+from .errors import CommandError, NoSuchMapError, RefusedError, refusing
 from .frames import Frames
 from .inputs import line_map_of, needing_formats
-from .locators import Found, Locator, locating
-from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
+from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent
 from .options import AsJson, Server, UsableOptions, grouped
-from .printing import plain, print_json, print_rows, print_table
+from .printing import Json, plain, print_json, print_rows, print_table
 from .several import documents_of, read_target
-from .tracking import Stays, Tracker
+from .tracking import Stays, Tracker, map_of, pose_of
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, StampedPose
+    from registration import RigidTransform
 
 
 HOPELESS = 20  # scans from the first on
@@ -64,7 +60,7 @@ class Tally:
         """The number of scans so far."""
         return sum(self.verdicts.values())
 
-    def take(self, one: LoggedScan, found: Found | CommandError) -> None:
+    def take(self, one: LoggedScan, found: Json | CommandError) -> None:
         """Count an answer, and keep its pose."""
         from formats import StampedPose
 
@@ -72,16 +68,16 @@ class Tally:
             self.verdicts["refused"] += 1
             self.refused = found
             return
-        self.verdicts[found.status + (", usable" if found.usable else ", not usable")] += 1
-        self.reasons.update(one["code"] for one in found.reasons[:1])
-        self.warnings.update(found.warnings)
-        self.times.append(found.timing_ms["total"])
+        usable, pose = found["usable"], pose_of(found)
+        self.verdicts[found["status"] + (", usable" if usable else ", not usable")] += 1
+        self.reasons.update(reason["code"] for reason in found["reasons"][:1])
+        self.warnings.update(warning["code"] for warning in found["warnings"])
+        self.times.append(found["timing_ms"]["total"])
         self.stays.take(one.stamp_ns, found)
-        if found.pose is not None and found.usable:
-            self.rounds.setdefault(one.round, []).append(StampedPose(one.stamp_ns, found.pose))
-            self.on_map.setdefault(found.map_id or "", ([], []))[0].append(found.pose)
-        elif found.pose is not None:
-            self.on_map.setdefault(found.map_id or "", ([], []))[1].append(found.pose)
+        if pose is not None:
+            self.on_map.setdefault(map_of(found) or "", ([], []))[0 if usable else 1].append(pose)
+            if usable:
+                self.rounds.setdefault(one.round, []).append(StampedPose(one.stamp_ns, pose))
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,10 +138,10 @@ def replay(
     told, opened_log = read_target(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
-    with locating(told, usable, server) as locator:
+    with locating(told, usable, server) as locate:
         taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locator, taken, frames, scans.mode):
+            for one, found in located(locate, taken, frames, scans.mode):
                 tally.take(one, found)
                 if as_json:
                     print_json(_line(one, found, frames, several="maps" in told))
@@ -166,9 +162,34 @@ def replay(
         raise tally.refused
 
 
+@contextmanager
+def locating(target: Json, usable: UsableOptions, server: str | None) -> Iterator[Callable[[Json], Json]]:
+    """Give the function from scan and prior of a request to its answer: by this process, or by the server at a URL."""
+    options = {"include": [], "max_alternatives": 0, **asdict(usable)}
+    if server is not None:
+        with server_at(server) as remote:
+            yield lambda sought: remote.ask("associate", {**target, **sought, "options": options})
+        return
+    with answering() as within:
+        from linefix.answering import Stopwatch, locate, target_of
+        from linefix.documents.parts import SearchOptions
+        from linefix.documents.reading import validate
+        from linefix.documents.requests import BatchItem, OnMaps
+
+        how = validate(SearchOptions, options, within.limits)
+        maps = target_of(validate(OnMaps, target, within.limits), None, within)
+
+    def here(sought: Json) -> Json:
+        watch = Stopwatch()
+        with refusing():
+            return locate(maps, validate(BatchItem, sought, within.limits), how, within, watch)
+
+    yield here
+
+
 def located(
-    locator: Locator, scans: Iterator[LoggedScan], frames: Frames, mode: Mode
-) -> Iterator[tuple[LoggedScan, Found | RefusedError]]:
+    locate: Callable[[Json], Json], scans: Iterator[LoggedScan], frames: Frames, mode: Mode
+) -> Iterator[tuple[LoggedScan, Json | RefusedError]]:
     """Yield each scan with its pose, or the reason why it is refused.
 
     In mode track the prior comes from the answers before and odometry.
@@ -183,7 +204,7 @@ def located(
             continue
         prior = None if tracker is None else tracker.prior(one)
         try:
-            found = locator.locate(one, prior, None if tracker is None or prior is None else tracker.map_id)
+            found = locate({"scan": sent(one)} | ({} if prior is None else {"prior": prior}))
         except RefusedError as error:
             refusals = None if refusals is None else [*refusals, str(error)]
             if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
@@ -204,25 +225,23 @@ def _hopeless(refusals: list[str] | None) -> bool:
 def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
     """Yield the scans; show the progress on a terminal."""
     total = None if log.count is None else -(-log.count // every)
+    from rich.console import Console
+    from rich.progress import track
+
     where = Console(stderr=True)
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
 
 
-def _line(one: LoggedScan, found: Found | CommandError, frames: Frames, *, several: bool) -> Json:
-    taken = None if isinstance(found, CommandError) else found
-    pose = taken and taken.pose
+def _line(one: LoggedScan, found: Json | CommandError, frames: Frames, *, several: bool) -> Json:
+    refused = isinstance(found, CommandError)
+    answer: Json = {"usable": False, "reasons": []} if isinstance(found, CommandError) else found
+    fields = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")
     return {
         "stamp": one.stamp,
-        "status": taken and taken.status,
-        "usable": bool(taken and taken.usable),
-        "probability": taken and taken.probability,
-        "pose": pose and {"x": pose.x, "y": pose.y, "theta": pose.theta},
-        "covariance": taken and taken.covariance,
-        "reasons": taken.reasons if taken else [],
-        "timing_ms": taken and taken.timing_ms,
+        **{name: answer.get(name) for name in fields},
         "child_frame_id": frames.name,
-        "error": None if taken else str(found),
-        **({"map_id": taken and taken.map_id} if several else {}),
+        "error": str(found) if refused else None,
+        **({"map_id": None if refused else map_of(answer)} if several else {}),
     }
 
 
@@ -257,6 +276,8 @@ def _draw(documents: dict[str, Json], tally: Tally, picture: Path) -> None:
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
     """Print what was read of the log, and whose poses are printed."""
+    from linefix.ranges import SPEED, TURN
+
     print_notes(log, where)
     codes = {note.code for note in log.report.assumed}
     if "no_odometry" in codes:

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from linefix.warmup import warm_up
-
-from .contract import Json
 from .errors import RefusedError, WrongUseError
 from .inputs import needing_formats
 from .options import UsableOptions, grouped
+from .printing import Json
 from .ros2_parameters import parameters_of, robots_of
 from .several import read_maps
 
@@ -247,6 +245,8 @@ def _require_one_robot(file: Path | None) -> None:
 
 
 def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
+    from linefix.warmup import warm_up
+
     warm_up()  # or the first scans would wait for it
     node.wait_until_ready()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -6,11 +6,9 @@ import json
 import math
 from typing import Any
 
-from service.contract import NotJsonError, TooManyError
-
-from .contract import Json
 from .errors import RefusedError
 from .inputs import bytes_of, json_of, needing_formats
+from .printing import Json
 
 FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
@@ -44,6 +42,8 @@ def read_scan(name: str) -> Json:
 def _parsed(data: bytes, name: str) -> Any:
     """Return the content of JSON or YAML; text that begins with a bracket is JSON."""
     if data.lstrip()[:1] in (b"{", b"["):
+        from linefix.documents.errors import NotJsonError, TooManyError
+
         try:
             return json_of(data)
         except (NotJsonError, TooManyError) as error:

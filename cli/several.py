@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .asking import whole_map
-from .contract import Json
 from .errors import WrongUseError
 from .inputs import FILES, read_map_or_id
+from .printing import Json
 
 IN_BAGS = "metadata.yaml"  # a file in the folder of each bag of ROS 2
 MOST_NAME = 120  # letters of a name; the contract allows 128

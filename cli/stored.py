@@ -3,48 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager
 
 import orjson
 from pydantic import ValidationError
 
-from service.contract import InlineMap
+from linefix.documents.parts import MapDocument
+from linefix.documents.reading import read_map, read_stored
 from service.maps import MapStore, Preconditions
 from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.maps.lookup import outline_of
-from service.parsing.reading import read_map
 from service.settings import Settings
 
-from .contract import Json, id_of
-from .errors import NoServerError, NoSuchMapError, RefusedError, WrongUseError
-from .inputs import refusing
+from .errors import NoServerError, NoSuchMapError, RefusedError, WrongUseError, refusing
+from .printing import Json
 
 MAPS_AT_ONCE = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class FoundMap:
-    """A map document, and id and revision where it is stored."""
-
-    document: Json
-    reference: Json | None
-
-
-def map_here(on: Json) -> FoundMap:
-    """Return the map of a file as it is, or the stored one whose id was given."""
-    map_id = id_of(on)
-    if map_id is None:
-        return FoundMap(on, None)
-    with closing(StoredMaps()) as maps:
-        return maps.found(map_id)
 
 
 class StoredMaps:
     """The maps that a service with these settings stores."""
 
     def __init__(self) -> None:
-        self._settings = settings_here()
+        self._settings = _settings()
         self._store = MapStore(self._settings.url, most_bytes=self._settings.max_stored_bytes)
 
     def close(self) -> None:
@@ -61,14 +42,15 @@ class StoredMaps:
 
     def get(self, map_id: str) -> Json:
         """Return a stored map."""
-        return self.found(map_id).document
+        with _reaching(map_id):
+            document: Json = orjson.loads(self._store.load(map_id).document)
+            return document
 
-    def found(self, map_id: str) -> FoundMap:
-        """Return a stored map with its revision."""
+    def found(self, map_id: str) -> tuple[MapDocument, Json]:
+        """Return a stored map, and its id and revision."""
         with _reaching(map_id):
             stored = self._store.load(map_id)
-            reference = {"map_id": map_id, "revision": stored.record.revision}
-            return FoundMap(orjson.loads(stored.document), reference)
+            return read_stored(stored.document), {"map_id": map_id, "revision": stored.record.revision}
 
     def maps(self) -> Iterator[Json]:
         """Yield the summary of each stored map, by id."""
@@ -85,7 +67,7 @@ class StoredMaps:
             self._store.delete(map_id, Preconditions())
 
 
-def settings_here() -> Settings:
+def _settings() -> Settings:
     """Return the settings of the environment; raises `WrongUseError` where one is wrong."""
     try:
         return Settings()
@@ -93,20 +75,6 @@ def settings_here() -> Settings:
         wrong = error.errors()[0]
         name = ".".join(str(part) for part in wrong["loc"])
         raise WrongUseError(f"LINEFIX_{name.upper()} in the environment: {wrong['msg']}") from None
-
-
-def require_size(document: Json) -> None:
-    """Raise `RefusedError` where a map has more segments than the settings of the environment allow."""
-    most, segments = settings_here().max_map_segments, len(document["segments"])
-    if segments > most:
-        raise RefusedError(
-            f"the map has {segments} segments, expected at most {most} map segments; set LINEFIX_MAX_MAP_SEGMENTS"
-        )
-
-
-def require_storable(line_map: InlineMap) -> None:
-    """Raise `InputError` where a map could not be stored."""
-    outline_of(line_map)
 
 
 @contextmanager

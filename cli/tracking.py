@@ -6,17 +6,12 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from linefix import SoftPrior
-from map_quality.update.odometry import odometry_deviations
-from registration import RigidTransform
-
 from .frames import odometry_of
-from .locators import Found
+from .printing import Json
 
 if TYPE_CHECKING:
     from formats import LoggedScan
+    from registration import RigidTransform
 
 LOST = 5.0  # m; a prior wider than this is dropped
 FASTEST, FASTEST_TURN = 1.0, 1.0  # m/s and rad/s; deviations of a motion that odometry does not show
@@ -38,7 +33,7 @@ class Tracker:
     _unknown: float = 0.0  # s without odometry
     map_id: str | None = None  # of several maps the one that the last usable pose is on
 
-    def prior(self, scan: LoggedScan) -> SoftPrior | None:
+    def prior(self, scan: LoggedScan) -> Json | None:
         """Return the prior of the next scan's pose, None without one."""
         odometry, last = odometry_of(scan), self._last
         if odometry is None:
@@ -54,21 +49,38 @@ class Tracker:
         self._last = scan
         if self._pose is None or self._odometry is None:
             return None
+        from map_quality.update.odometry import odometry_deviations
+
         sigma, angle = odometry_deviations(self._driven, self._turned)
         sigma, angle = sigma + FASTEST * self._unknown, angle + FASTEST_TURN * self._unknown
         if sigma > LOST:
             return None
         here = self._pose.compose(self._odometry.inverse().compose(odometry))
-        return SoftPrior(here, np.diag([sigma**2, sigma**2, angle**2]))
+        covariance = [[sigma**2, 0.0, 0.0], [0.0, sigma**2, 0.0], [0.0, 0.0, angle**2]]
+        prior: Json = {"x": here.x, "y": here.y, "theta": here.theta, "covariance": covariance}
+        return prior if self.map_id is None else {**prior, "map_id": self.map_id}
 
-    def learn(self, found: Found, scan: LoggedScan) -> None:
+    def learn(self, answer: Json, scan: LoggedScan) -> None:
         """Update the last usable pose with the answer to that scan."""
         odometry = odometry_of(scan)
-        if "prior_contradicted" in found.warnings:
+        if any(one["code"] == "prior_contradicted" for one in answer["warnings"]):
             self._pose = None
-        elif found.usable and odometry is not None:
-            self._pose, self._odometry, self.map_id = found.pose, odometry, found.map_id
+        elif answer["usable"] and odometry is not None:
+            self._pose, self._odometry, self.map_id = pose_of(answer), odometry, map_of(answer)
             self._driven = self._turned = self._unknown = 0.0
+
+
+def pose_of(answer: Json) -> RigidTransform | None:
+    """Return the pose of an answer."""
+    from registration import RigidTransform
+
+    pose = answer["pose"]
+    return None if pose is None else RigidTransform(pose["x"], pose["y"], pose["theta"])
+
+
+def map_of(answer: Json) -> str | None:
+    """Return of several maps the one that the pose is on."""
+    return answer["map"]["map_id"] if "maps" in answer and answer["map"] else None
 
 
 @dataclass(slots=True)
@@ -87,12 +99,13 @@ class Stays:
 
     found: list[Stay] = field(default_factory=list)
 
-    def take(self, stamp_ns: int, found: Found) -> None:
+    def take(self, stamp_ns: int, answer: Json) -> None:
         """Add an answer; one that is not usable begins no stay and ends none."""
-        if not found.usable or found.map_id is None:
+        map_id = map_of(answer)
+        if not answer["usable"] or map_id is None:
             return
         stamp, last = 1e-9 * stamp_ns, self.found[-1] if self.found else None
-        if last is None or last.map_id != found.map_id:
-            self.found.append(Stay(found.map_id, stamp, stamp))
+        if last is None or last.map_id != map_id:
+            self.found.append(Stay(map_id, stamp, stamp))
         else:
             last.last, last.scans = stamp, last.scans + 1

@@ -6,13 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-import orjson
 import typer
 
 from .asking import ask
-from .contract import Json
 from .options import AsJson, ScanArgument, Server
-from .printing import print_json, print_rows, print_table
+from .printing import Json, print_json, print_rows, print_table, write_json
 from .scans import read_scan
 
 TAKEN = ("laser", "points", "viewpoint")  # of a scan; its frame and stamp make no difference to its segments
@@ -38,7 +36,7 @@ def vectorize(
         asked["options"] = {"sigma": sigma}
     answer = ask("vectorize", asked, server)
     if out is not None:
-        out.write_bytes(orjson.dumps(_scan_of(told, answer)) + b"\n")
+        write_json(_scan_of(told, answer), out)
     if as_json:
         print_json(answer)
         return

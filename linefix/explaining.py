@@ -1,8 +1,8 @@
-"""Explain a verdict: for programs, and as the JSON document of ``linefix explain --json``."""
+"""Explain a verdict."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -21,7 +21,6 @@ from association import (
 from registration import Segments
 from vectorization import LaserScan
 
-from .answers import Json, pose_json
 from .driving import search_drive
 from .locating import prepared, scan_of
 from .ranges import MountedScan
@@ -107,18 +106,3 @@ def explain_search(
 
     result = search_drive(search, scan)
     return Explanation(result, found[0].verdict, found[1].verdict if len(found) > 1 else None)
-
-
-def explanation_json(found: Explanation) -> Json:
-    """Return how a verdict came about as JSON, without the answer itself."""
-    last = found.last_view
-    return {"verdict": _verdict_json(found.verdict), "last_view": None if last is None else _verdict_json(last)}
-
-
-def _verdict_json(one: VerdictExplanation) -> Json:
-    return {
-        **asdict(one),
-        "status": str(one.status),
-        "pose": pose_json(one.pose),
-        "alternatives": [{**asdict(other), "pose": pose_json(other.pose)} for other in one.alternatives],
-    }

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import sys
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from ..asking import server_at
-from ..contract import Json
-from ..here import check as check_here
+from .. import asking
 from ..inputs import read_map_or_id
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Server
-from ..printing import print_json, print_rows
+from ..printing import Json, print_json, print_rows
 from ..scans import read_scan
-
-if TYPE_CHECKING:
-    from formats import LoggedScan
 
 SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
@@ -39,25 +33,17 @@ def check(
     as_json: AsJson = False,
 ) -> None:
     """Report possible errors of a map; with scans, also whether they fit better mirrored, scaled or moved."""
-    scans, logged = (
-        [read_scan(name) for name in scan or []],
-        [] if log is None else samples_of(log, topic, tf_namespace),
-    )
-    target = read_map_or_id(on)
-    if server is None:
-        answer = check_here(target, scans, logged)
-    else:
-        scans += [sent(replace(one, mount=None)) for one in logged]
-        with closing(server_at(server)) as remote:
-            answer = remote.check(target, {"scans": scans} if scans else None)
+    scans = [read_scan(name) for name in scan or []]
+    scans += [] if log is None else samples_of(log, topic, tf_namespace)
+    answer = asking.check(read_map_or_id(on), scans, server)
     if as_json:
         print_json(answer)
     else:
         print_rows(check_rows(answer))
 
 
-def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) -> list[LoggedScan]:
-    """Return some scans of a log, spread over all of it; print on stderr what was made of the log.
+def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) -> list[Json]:
+    """Return some scans of a log, spread over all of it, as a request has them; print on stderr what was made of it.
 
     Raises
     ------
@@ -67,7 +53,7 @@ def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) ->
     source = opened(log, options_of(topic, tf_namespace))
     taken = spread(list(scans_of(source)), SAMPLES)
     print_notes(source, sys.stderr)
-    return taken
+    return [sent(replace(one, mount=None)) for one in taken]  # the mount does not matter to the map
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import orjson
 import typer
 
 from ..asking import document_at
-from ..contract import Json
 from ..inputs import line_map_of, needing_formats
 from ..options import MapArgument, Server
+from ..printing import Json, write_json
 
 
 def draw(
@@ -39,7 +38,7 @@ def write_document(document: Json, out: Path) -> None:
         When it has another, or the extra ``[formats]`` is missing.
     """
     if out.suffix.lower() == ".json":
-        out.write_bytes(orjson.dumps(document) + b"\n")
+        write_json(document, out)
         return
     with needing_formats(f"writing {out.name}"):
         from formats import write_map

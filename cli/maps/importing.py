@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from .. import here
-from ..asking import server_at
-from ..contract import Fields, Json
+from .. import asking
 from ..errors import Asked, WrongUseError
-from ..inputs import line_map_of, needing_formats, refusing
+from ..inputs import line_map_of, needing_formats
 from ..options import AsJson, Picture, Server, grouped
-from ..printing import noted, print_json, print_rows
+from ..printing import Json, noted, print_json, print_rows
 from .checking import check_rows, samples_of
 from .drawing import write_document
 from .updating import draw_changes, update_by_drive, update_rows
@@ -115,7 +112,7 @@ class SaidOfFile:
         )
 
     @property
-    def fields(self) -> Fields:
+    def fields(self) -> Json:
         """The same as fields of a form."""
         once = {
             "units": self.units,
@@ -200,12 +197,16 @@ def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
     """
     if not file.exists():
         raise WrongUseError(f"{file}: there is no such file; check the path and the working folder")
-    if server is None:
-        with needing_formats(f"reading {file.name}"), refusing(Asked(files=(file.name,))):
-            options = said.options
-        return here.import_map(file, options)
-    with closing(server_at(server)) as remote:
-        return remote.import_map(_with_what_it_names(file), said.fields)
+    if server is not None:
+        with asking.server_at(server) as remote:
+            return remote.import_map(_with_what_it_names(file), said.fields)
+    with needing_formats(f"reading {file.name}"), asking.answering(Asked(files=(file.name,))) as within:
+        from formats import read_map
+        from linefix.answering import Stopwatch, check_import
+
+        options, watch = said.options, Stopwatch()
+        with needing_formats(f"reading {file.name}"):
+            return check_import(read_map(file, options), watch, within)
 
 
 def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
@@ -217,7 +218,7 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
         As of `imported`; ``check`` has the scans too.
     """
     scans = samples_of(log, None)
-    checked = here.check(answer["map"], [], scans)
+    checked = asking.check(answer["map"], scans, None)
     thicker, line_map = checked["samples"]["wall_thickness"], answer["map"]
     drawn = float(line_map["meta"].get("thickness", 0.0)) if line_map["oriented"] else 0.0
     made_of_centres = "thickness" in line_map["meta"] or not line_map["oriented"]
@@ -229,7 +230,7 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
     kept = [note for note in again["report"]["assumed"] if note["code"] != "thickness_given"]
     found = {"code": "thickness_found", "message": message, "count": 0}
     again["report"]["assumed"] = [*kept, found]
-    return {**again, "check": here.check(again["map"], [], scans)}
+    return {**again, "check": asking.check(again["map"], scans, None)}
 
 
 def _with_what_it_names(file: Path) -> list[Path]:

@@ -5,22 +5,19 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
-from .. import here
-from ..asking import server_at, whole_map
-from ..contract import Json
+from .. import asking
 from ..errors import WrongUseError
 from ..inputs import line_map_of, needing_formats, read_map_or_id
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Picture, Server, grouped
-from ..printing import print_json, print_rows
+from ..printing import Json, print_json, print_rows
 from .drawing import write_document
 
 if TYPE_CHECKING:
@@ -71,25 +68,15 @@ def update(
     """Propose changes of a map that the scans of several visits show, and write the new map."""
     target = read_map_or_id(on)
     visits = dict(zip(visit_names(logs), (_scans(log, source) for log in logs), strict=True))
-    answer = _proposed(target, visits, changes, server)
+    answer = asking.update(target, _request_of(visits, changes), server)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
-        draw_changes(whole_map(target, server), answer, picture)
+        draw_changes(asking.whole_map(target, server), answer, picture)
     if as_json:
         print_json(answer)
     else:
         print_rows(list(update_rows(answer)))
-
-
-def _proposed(
-    target: Json, visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions, server: str | None
-) -> Json:
-    """Return the proposal, computed here or by a server."""
-    if server is None:
-        return here.update(target, visits, changes.accept, tuple(changes.refuse or ()))
-    with closing(server_at(server)) as remote:
-        return remote.update(target, _request_of(visits, changes))
 
 
 def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
@@ -100,19 +87,9 @@ def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptio
 
 
 def _sent(one: LoggedScan) -> Json:
-    """Return a scan of a log as a request for an update has it.
-
-    Raises
-    ------
-    WrongUseError
-        When the laser hangs upside down.
-    """
+    """Return a scan of a log as a request for an update has it."""
     view = sent(replace(one, mount=None))["views"][0]
-    if view["flipped"]:
-        raise WrongUseError(
-            "LOG: found a laser that is mounted upside down, expected one that is not with --server; omit --server"
-        )
-    told: Json = {name: view[name] for name in ("laser", "twist") if name in view}
+    told: Json = {name: view[name] for name in ("laser", "twist", "flipped") if name in view}
     if one.pose is not None:
         told["odometry"] = {"x": one.pose.x, "y": one.pose.y, "theta": one.pose.theta}
     return told
@@ -166,7 +143,7 @@ def update_by_drive(document: Json, log: Path) -> Json:
     scans = _scans(log, LogOptions(scans=2 * SCANS))
     half = len(scans) // 2
     halves = {"first half": scans[:half], "second half": scans[half:]}
-    return here.update(document, halves, None, ())
+    return asking.update(document, _request_of(halves, ChangeOptions()), None)
 
 
 def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
@@ -190,7 +167,7 @@ def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
     if sharp:
         yield (
             "sharper",
-            f"{len(sharp)} walls at better positions, sigma {1e3 * float(np.median(sharp)):.1f} mm (median)",
+            f"{len(sharp)} walls at better positions, sigma {1e3 * median(sharp):.1f} mm (median)",
         )
     held = answer["held_back"]
     yield "scans", f"{answer['usable_before']} of {answer['scans']} usable before, {answer['usable_after']} after"
@@ -206,6 +183,8 @@ def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
 def draw_changes(old: Json, answer: Json, picture: Path) -> None:
     """Draw the old map, and the changes in colours: old walls that go dashed, new walls solid."""
     with needing_formats("drawing a picture"):
+        import numpy as np
+
         from formats import draw_map
         from formats.colours import CHANGES, rgb
         from formats.picture import DrawnLines

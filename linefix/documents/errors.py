@@ -3,6 +3,7 @@
 ::
 
     RequestError
+    ├── NotJsonError          bytes are not JSON, or not packed as stated
     ├── InvalidRequestError   places that are wrong
     ├── TooManyError          more of something than a limit allows
     └── BodyTooLargeError     more bytes than a limit allows
@@ -36,6 +37,10 @@ def in_one_line(faults: Sequence[Fault]) -> str:
 
 class RequestError(Exception):
     """A request is not what the contract takes."""
+
+
+class NotJsonError(RequestError):
+    """Bytes are not JSON, or not packed as stated."""
 
 
 class InvalidRequestError(RequestError):

@@ -29,12 +29,12 @@ class Limits:
         Ranges or points, and segments, of all views of one scan.
     """
 
-    values: int
-    map_segments: int
-    scan_segments: int
-    beams: int
-    pairs: int
-    batch: int
+    values: int = 2_000_000
+    map_segments: int = 200_000
+    scan_segments: int = 2_000
+    beams: int = 20_000
+    pairs: int = 200_000
+    batch: int = 256
     views: int = 64
     beams_together: int = 100_000
     segments_together: int = 10_000

@@ -28,6 +28,7 @@ class UpdateScan(LaserScan):
     covariance: Covariance | None = Field(
         None, description="covariance of additive (x, y, theta) of `pose`, required with it; m^2, m rad, rad^2"
     )
+    flipped: bool = Field(False, description="the sensor is mounted upside down: y becomes -y in its data")
     odometry: Pose | None = Field(
         None,
         description="pose of the scan by odometry, in a frame that is fixed during the visit; "

@@ -8,12 +8,12 @@ from functools import partial
 from typing import TypeVar
 
 from association import Deadline
+from linefix.answering import Stopwatch
 from linefix.documents.limits import Limits
 
 from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
 from ..telemetry.traces import stage
-from ..work.job import Stopwatch
 from .exchange import Exchange
 from .search_stage import in_slot_of, unless_hung_up
 

@@ -11,8 +11,10 @@ from typing import Any, cast
 from starlette.requests import Request
 from starlette.types import Scope
 
+from linefix.answering import Stopwatch
+
 from ..admission.ticket import Ticket
-from ..work.job import Job, Stopwatch
+from ..work.job import Job
 from .services import Services, services_of
 
 _KEY = "request"  # in `scope["state"]`, next to the application's own

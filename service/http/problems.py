@@ -13,7 +13,15 @@ import orjson
 from starlette.responses import Response
 
 from association import CancelledError
-from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError, in_one_line
+from linefix.documents.errors import (
+    BodyTooLargeError,
+    Fault,
+    InvalidRequestError,
+    NotJsonError,
+    TooManyError,
+    in_one_line,
+)
+from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
 from linefix.documents.replies import ProblemCode
 from registration import InputError
@@ -22,7 +30,6 @@ from ..admission import errors as admission
 from ..importing import errors as importing
 from ..maps import errors as maps
 from ..parsing import errors as parsing
-from ..work.inputs import fault_of
 from . import errors as http
 from .etags import etag
 
@@ -55,7 +62,7 @@ class Kind:
 
 
 TABLE = (
-    Kind("invalid_json", 400, "The body is not JSON", (parsing.NotJsonError,)),
+    Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),
     Kind(
         "invalid_http",
         400,

@@ -10,11 +10,11 @@ from functools import partial
 from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapPoints, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
+from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
-from ..parsing.reading import read_stored
 from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .records import MapOutline, MapRecord

@@ -3,7 +3,6 @@
 ::
 
     ParsingError
-    ├── NotJsonError      the body is not JSON, or not packed as its head states
     └── ParserEndedError  the process that parses large bodies has ended meanwhile
 """
 
@@ -12,10 +11,6 @@ from __future__ import annotations
 
 class ParsingError(Exception):
     """Bytes could not be read; the message names the reason, and repeats none of them."""
-
-
-class NotJsonError(ParsingError):
-    """The body is not JSON, or not packed as its head states."""
 
 
 class ParserEndedError(ParsingError):

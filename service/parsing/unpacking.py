@@ -5,9 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 
-from linefix.documents.errors import BodyTooLargeError
-
-from .errors import NotJsonError
+from linefix.documents.errors import BodyTooLargeError, NotJsonError
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _GZIP = zlib.MAX_WBITS | 16

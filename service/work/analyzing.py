@@ -7,14 +7,13 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 
 from association import CancelledError, Deadline
-from linefix.answers import Json
+from linefix.answering import Json
 from linefix.documents.analysis import AnalyzeRequest
+from linefix.documents.inputs import analysis_of
 from linefix.documents.parts import InlineMap
-from linefix.map_answers import analysis_json
-from map_quality import Analysis, PlaceVerdict, Robot
-from registration import Segments
+from linefix.documents.results import analysis_json
+from map_quality import Analysis, PlaceVerdict
 
-from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
 from .association import reference_to
 from .job import Done, Job
@@ -51,24 +50,6 @@ class Tally:
         return len(self.found) == len(self.analysis.standing.order)
 
 
-def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
-    """Return what there is to do.
-
-    Raises
-    ------
-    AnalysisError
-        When the requested places cannot be had.
-    InputError
-        When a segment of the landmark is too short or too long.
-    """
-    laser = asked.laser
-    robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
-    landmark = Segments.from_array(asked.landmark, argument="landmark")
-    return Analysis.over(
-        cached.index, robot, asked.spacing, asked.point, seed=asked.seed, drive=asked.drive, landmark=landmark
-    )
-
-
 def begin_analysis(lookup: MapLookup, source: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
     """Index a map and lay the grid over it.
 
@@ -84,7 +65,7 @@ def begin_analysis(lookup: MapLookup, source: InlineMap | FoundMap, asked: Analy
         When the deadline has passed before.
     """
     cached = lookup.indexed(source, oriented=None, deadline=job.deadline)
-    analysis = analysis_of(cached, asked)
+    analysis = analysis_of(cached.index, asked)
     job.begin_search()
     return Tally(analysis, reference_to(source), iter(analysis.standing.order.tolist()))
 

@@ -4,54 +4,24 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import orjson
 
-from association import (
-    AssociationResult,
-    CancelledError,
-    Deadline,
-    IndexingEndedError,
-    InvalidSearchError,
-    KnownOfMaps,
-    Scan,
-)
-from linefix.answers import Json, association_json
-from linefix.documents.encoding import encode
-from linefix.documents.parts import HardPriorFields, InlineMap, SearchOptions, SoftPriorFields
-from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest
-from linefix.driving import associate, associate_on_maps
+from association import CancelledError, Deadline, IndexingEndedError
+from linefix.answering import Json, Target, found_json, registered, search, vectorized
+from linefix.documents.encoding import encode, encode_list
+from linefix.documents.inputs import scanned_of
+from linefix.documents.parts import InlineMap, SearchOptions
+from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
 
 from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap, CachedMaps, FoundMaps
 from ..maps.lookup import FoundMap, MapLookup
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
-from .inputs import association_options_of, included_of, prior_of, scanned_of
 from .job import Done, Job
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """A map, or several, ready to be searched.
-
-    Attributes
-    ----------
-    cached : CachedMap or CachedMaps
-    reference : dict, or None
-        Id and revision of a stored map, as they are answered; None of several.
-    maps : FoundMaps, or None
-        Several maps.
-    map_weights : mapping, or None
-        Of several maps, as sent.
-    """
-
-    cached: CachedMap | CachedMaps
-    reference: Json | None
-    maps: FoundMaps | None = None
-    map_weights: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +67,8 @@ class Associator:
         job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline)
         job.watch.lap("search")
-        reference = found.get("map", target.reference)
-        answer = {**found, "map": reference, "client_ref": asked.client_ref}
-        return job.done(answer, map=reference, verdict=found["status"], usable=found["usable"])
+        noted = {"map": found["map"], "verdict": found["status"], "usable": found["usable"]}
+        return job.done({**found, "client_ref": asked.client_ref}, **noted)
 
     def target(
         self,
@@ -123,9 +92,15 @@ class Associator:
         with stage("index"):
             if isinstance(source, FoundMaps):
                 together = ready or self.lookup.indexed_together(source, oriented=oriented, deadline=deadline)
-                return Target(together, None, source, asked.map_weights)
+                assert isinstance(together, CachedMaps)  # several maps are ready as several
+                names = together.maps.ids
+                frames: dict[str | None, str] = dict(zip(names, together.frame_ids, strict=True))
+                frames[None] = together.frame_ids[0]
+                references: dict[str | None, Json | None] = {name: source.reference_to(name) for name in names}
+                return Target(together.maps, frames, references, asked.map_weights)
             cached = ready or self.lookup.indexed(source, oriented=oriented, deadline=deadline)
-        return Target(cached, reference_to(source))
+        assert isinstance(cached, CachedMap)
+        return Target(cached.index, {None: cached.frame_id}, {None: reference_to(source)})
 
     def find(
         self, target: Target, sought: AssociateRequest | BatchItem, options: SearchOptions, deadline: Deadline
@@ -148,17 +123,13 @@ class Associator:
             raise DeadlinePassedError
         begun = time.perf_counter()
         with stage("search"):
-            result = _search(target, scanned.scan, sought.prior, options, deadline)
+            try:
+                result = search(target, scanned.scan, sought.prior, options, deadline)
+            except IndexingEndedError:
+                raise DeadlinePassedError from None
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
-        cached, maps = target.cached, target.maps
-        frame_id = cached.frame_of(result.map_id) if isinstance(cached, CachedMaps) else cached.frame_id
-        answer = association_json(result, included_of(sought.scan, options, scanned, frame_id))
-        if maps is None:
-            return answer
-        verdicts = [{**one, **maps.reference_to(one["map_id"])} for one in answer["maps"]]
-        reference = None if result.map_id is None else maps.reference_to(result.map_id)
-        return {**answer, "maps": verdicts, "map": reference}
+        return found_json(target, result, sought, scanned, options)
 
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
@@ -170,33 +141,28 @@ class Associator:
         if isinstance(sought, Exception):
             raise sought
         found = self.find(target, sought, options, deadline)
+        if None in target.references:  # the map stands in the batch
+            del found["map"]
         return BatchResult(found["status"], encode({"index": index, "status_code": 200, "result": found}))
-
-
-def _search(
-    target: Target, scan: Scan, sent: SoftPriorFields | HardPriorFields | None, options: SearchOptions, until: Deadline
-) -> AssociationResult:
-    """Search a map, or several."""
-    cached, prior, prior_map = target.cached, prior_of(sent), None if sent is None else sent.map_id
-    search = association_options_of(options, oriented=cached.oriented)
-    if not isinstance(cached, CachedMaps):
-        if prior_map is not None:
-            raise InvalidSearchError(
-                "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
-            )
-        return associate(cached.index, scan, prior, search, until)
-    try:
-        return associate_on_maps(cached.maps, scan, KnownOfMaps(prior, prior_map, target.map_weights), search, until)
-    except IndexingEndedError:
-        raise DeadlinePassedError from None
 
 
 def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResult], job: Job) -> Done:
     """Return the answer of a batch, given its items."""
     noted = dict(Counter(result.verdict for result in results))
     items = [orjson.Fragment(result.body) for result in results]
-    answer = {"results": items, "map": target.reference, "client_ref": asked.client_ref}
-    return job.done(answer, map=target.reference, verdicts=noted)
+    reference = target.references.get(None)
+    answer = {"results": items, "map": reference, "client_ref": asked.client_ref}
+    return job.done(answer, map=reference, verdicts=noted)
+
+
+def answer_registration(asked: RegisterRequest, job: Job) -> Done:
+    """Find the pose from known correspondences; raises `InputError`."""
+    return job.done(registered(asked, job.watch, encode_list))
+
+
+def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
+    """Cut a scan into directed segments; raises `InvalidRequestError` where the library refuses it."""
+    return job.done(vectorized(asked, job.watch))
 
 
 def reference_to(source: InlineMap | FoundMap) -> Json | None:

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 from association import Scan
 from linefix.checking import CheckedMap, concluded, try_in_time
+from linefix.documents.inputs import scans_of, transform_of
 from linefix.documents.parts import InlineMap, is_oriented
 from linefix.documents.requests import CheckRequest
-from linefix.map_answers import checked_json
+from linefix.documents.results import checked_json
 from map_quality import MapCheck, Sample, check_map
 
 from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
 from .association import reference_to
-from .inputs import scans_of, transform_of
 from .job import Done, Job
 
 

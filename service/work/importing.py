@@ -8,7 +8,7 @@ import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from linefix.documents.parts import InlineMap, is_oriented
-from linefix.map_answers import check_json
+from linefix.documents.results import check_json
 from map_quality import check_map
 
 from ..admission.errors import DeadlinePassedError

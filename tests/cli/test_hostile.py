@@ -10,9 +10,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from linefix_client import Client, ProblemError, UnreachableError, asking
+from linefix_client import Client, ProblemError, UnreachableError
+from linefix_client import asking as requests
 
-from cli import server
+from cli import asking
 from tests.formats.recorded import BEGUN, Recording
 
 from .running import Linefix, refused
@@ -74,7 +75,7 @@ PIECE = b" " * 4096
 def test_an_answer_without_end_is_refused(
     linefix: Linefix, monkeypatch: pytest.MonkeyPatch, head: bytes, piece: bytes
 ) -> None:
-    monkeypatch.setattr(asking, "MAX_ANSWER_BYTES", 2**20)
+    monkeypatch.setattr(requests, "MAX_ANSWER_BYTES", 2**20)
     with sending(head, piece) as url:
         line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
         assert "the answer is longer than 1 MB; check the URL" in line
@@ -83,7 +84,7 @@ def test_an_answer_without_end_is_refused(
 
 
 def test_an_answer_that_takes_for_ever_is_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "SECONDS", 0.2)
+    monkeypatch.setattr(asking, "SECONDS", 0.2)
     with sending(ENDLESS, b" ") as url:
         line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
         assert "the answer has not ended after 0.2 s; check the URL" in line
@@ -142,7 +143,7 @@ def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
 
 
 def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "MAX_PAGES", 5)
+    monkeypatch.setattr(asking, "MAX_PAGES", 5)
     body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
     with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
         assert "found more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)

@@ -12,7 +12,6 @@ import pytest
 from PIL import Image
 
 import linefix
-from cli.locators import Found
 from cli.tracking import LOST, Tracker
 from formats import LoggedScan
 from registration import RigidTransform
@@ -107,9 +106,9 @@ def test_what_cannot_be_replayed(
     assert said in refused(linefix("replay", *arguments), code)
 
 
-def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> Found:
-    warnings = [] if warning is None else [warning]
-    return Found("ok", usable, 0.9, pose, None, [], warnings, {})
+def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> dict[str, Any]:
+    warnings = [] if warning is None else [{"code": warning}]
+    return {"usable": usable, "pose": {"x": pose.x, "y": pose.y, "theta": pose.theta}, "warnings": warnings}
 
 
 def test_poses_after_a_clock_was_set_back_are_in_a_file_of_their_own(
@@ -139,11 +138,11 @@ def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
     tracker.learn(answer(at), before)
     prior = tracker.prior(after)
     assert prior is not None
-    assert [round(value, 9) for value in (prior.pose.x, prior.pose.y, prior.pose.theta)] == [3.0, 1.2, 0.9]
+    assert [round(value, 9) for value in (prior["x"], prior["y"], prior["theta"])] == [3.0, 1.2, 0.9]
     tracker.learn(answer(at, usable=False), after)
     again = tracker.prior(after)
     assert again is not None
-    np.testing.assert_allclose(again.covariance, prior.covariance)
+    np.testing.assert_allclose(again["covariance"], prior["covariance"])
     tracker.learn(answer(at, warning="prior_contradicted"), after)
     assert tracker.prior(after) is None
 
@@ -157,7 +156,7 @@ def test_what_is_known_gets_less_with_the_way_and_ends() -> None:
         prior = tracker.prior(scan_at(RigidTransform(float(k % 2), 0.0, 0.0)))  # to and fro
         if prior is None:
             break
-        sigmas.append(math.sqrt(prior.covariance[0][0]))
+        sigmas.append(math.sqrt(prior["covariance"][0][0]))
     assert sigmas == sorted(sigmas)
     assert LOST - 0.2 < sigmas[-1] <= LOST
 
@@ -171,7 +170,7 @@ def test_what_odometry_does_not_know_widens_the_prior_and_another_part_ends_it()
     for unknown_s in (0.0, 1.0, 3.0):
         prior = tracker.prior(scan_at(here, unknown_s=unknown_s))
         assert prior is not None
-        sigmas.append(math.sqrt(prior.covariance[0][0]))
+        sigmas.append(math.sqrt(prior["covariance"][0][0]))
     assert sigmas[1] > sigmas[0] + 0.9
     assert sigmas[2] > sigmas[1] + 1.8
     assert tracker.prior(scan_at(here, unknown_s=3.0, part=1)) is None

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import linefix
 from association import AssociationDiagnostics, Corrections
-from linefix.answers import Included, association_json
 from linefix.documents.replies import AssociationDiagnosticsAnswer
+from linefix.documents.results import Included, association_json
 
 ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
 SEEN = [[-1, 1, -1, -5], [-1, -5, 1, -5], [1, -5, 1, -3], [1, -3, 4, -3], [4, -3, 4, 1], [4, 1, -1, 1]]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import linefix
-from linefix.map_answers import checked_json
+from linefix.documents.results import checked_json
 from simulation import Scanner, scan
 
 ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]

@@ -26,14 +26,14 @@ def test_exports_are_sorted_and_complete() -> None:
     assert linefix.__all__ == sorted(linefix.__all__)
     private = {
         "annotations",
-        "answers",
+        "analyzing",
+        "answering",
         "checking",
         "documents",
         "driving",
         "explaining",
         "importlib",
         "locating",
-        "map_answers",
         "public",
         "ranges",
         "updating",

@@ -10,9 +10,9 @@ from fastapi import APIRouter, Request, Response
 from linefix.documents import examples
 from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
 from linefix.documents.parts import InlineMap, StoredMap
+from linefix.documents.reading import read_model
 
 from ...admission.errors import DeadlinePassedError
-from ...parsing.reading import read_model
 from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
 from ...work.job import Done, Job
 from ..body_stage import read

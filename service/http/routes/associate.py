@@ -7,10 +7,10 @@ from functools import partial
 from fastapi import APIRouter, Request, Response
 
 from linefix.documents import examples
+from linefix.documents.reading import read_model
 from linefix.documents.replies import AssociateAnswer
 from linefix.documents.requests import AssociateRequest
 
-from ...parsing.reading import read_model
 from ...work.job import Done, Job
 from ..body_stage import read
 from ..exchange import Exchange, begin_search

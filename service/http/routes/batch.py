@@ -12,11 +12,11 @@ from fastapi import APIRouter, Request, Response
 from association import CancelledError
 from linefix.documents import examples
 from linefix.documents.encoding import encode
+from linefix.documents.reading import read_batch
 from linefix.documents.replies import BatchAnswer
 from linefix.documents.requests import BatchItem, BatchRequest
 
 from ...admission.budget import ByteAccount
-from ...parsing.reading import read_batch
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..body_stage import read

@@ -12,12 +12,12 @@ from fastapi import APIRouter, Query, Request, Response
 from linefix.documents import examples
 from linefix.documents.checks import CheckAnswer
 from linefix.documents.parts import StoredMap
+from linefix.documents.reading import read_model
 from linefix.documents.requests import CheckRequest
 from map_quality import Sample
 
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
-from ...parsing.reading import read_model
 from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
 from ..body_stage import read

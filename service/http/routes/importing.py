@@ -11,9 +11,9 @@ from fastapi import APIRouter, Request, Response
 from linefix.documents.imports import FORM as MAP_FORM
 from linefix.documents.imports import SCANS_FORM, ImportAnswer, ScansAnswer
 from linefix.documents.parts import InlineMap
+from linefix.documents.reading import read_model
 
 from ...importing.bounded import ReadScans, read_apart, read_scans_apart
-from ...parsing.reading import read_model
 from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM

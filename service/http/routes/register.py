@@ -7,11 +7,11 @@ from functools import partial
 from fastapi import APIRouter, Request, Response
 
 from linefix.documents import examples
+from linefix.documents.reading import read_model
 from linefix.documents.replies import RegisterAnswer
 from linefix.documents.requests import RegisterRequest
 
-from ...parsing.reading import read_model
-from ...work.registration import answer_registration
+from ...work.association import answer_registration
 from ..body_stage import read
 from ..exchange import begin_search
 from ..search_stage import in_search_slot

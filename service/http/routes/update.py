@@ -9,11 +9,11 @@ from fastapi import APIRouter, Request, Response
 
 from linefix.documents import examples
 from linefix.documents.parts import StoredMap
+from linefix.documents.reading import read_model
 from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
 
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
-from ...parsing.reading import read_model
 from ...work.job import Done, Job
 from ...work.updating import Progress, answer_apply, begin_update, take_steps, update_done
 from ..body_stage import read

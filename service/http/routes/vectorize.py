@@ -7,11 +7,11 @@ from functools import partial
 from fastapi import APIRouter, Request, Response
 
 from linefix.documents import examples
+from linefix.documents.reading import read_model
 from linefix.documents.replies import VectorizeAnswer
 from linefix.documents.requests import VectorizeRequest
 
-from ...parsing.reading import read_model
-from ...work.scans import answer_vectorization
+from ...work.association import answer_vectorization
 from ..body_stage import read
 from ..exchange import begin_search
 from ..search_stage import in_search_slot

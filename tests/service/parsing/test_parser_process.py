@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 import registration
-from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
+from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, NotJsonError, TooManyError
 from linefix.documents.parts import MapDocument
-from service.parsing.errors import NotJsonError, ParserEndedError
+from linefix.documents.reading import read_map, read_model
+from service.parsing.errors import ParserEndedError
 from service.parsing.parser_process import NICE, ParserProcess, receive, send
-from service.parsing.reading import read_map, read_model
 
 from .bodies import LIMITS, large_map
 

@@ -7,9 +7,8 @@ import tracemalloc
 
 import pytest
 
-from linefix.documents.errors import BodyTooLargeError
+from linefix.documents.errors import BodyTooLargeError, NotJsonError
 from service.admission.errors import TooMuchHeldError
-from service.parsing.errors import NotJsonError
 from service.parsing.unpacking import unpack as unpack_counted
 
 MEGABYTE = 1 << 20

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from association import PARTS, AssociationOptions
+from linefix.documents.inputs import association_options_of
 from linefix.documents.parts import SearchOptions
-from service.work.inputs import association_options_of
 
 
 @pytest.mark.parametrize(

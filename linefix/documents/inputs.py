@@ -10,22 +10,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from association import PARTS, AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
-from linefix.answers import Included
-from linefix.documents.errors import Fault, InvalidRequestError
-from linefix.documents.parts import (
-    HardPriorFields,
-    LaserScan,
-    MeasuredFields,
-    PointScan,
-    SearchOptions,
-    SegmentScan,
-    SoftPriorFields,
-    is_oriented,
+from association import (
+    PARTS,
+    AssociationOptions,
+    HardPrior,
+    MapIndex,
+    MapPart,
+    MapPoints,
+    Prior,
+    Scan,
+    SoftPrior,
+    View,
+    assemble,
+    mirrored,
 )
-from linefix.documents.requests import CheckRequest, RegisterRequest
-from linefix.documents.strict import Pose
-from linefix.documents.views import LaserView, PointView, SegmentView, ViewsScan
+from map_quality import NOT_SHARPENED, Analysis, Replacement, Robot, Sharpened, VisitScan
 from registration import (
     IDENTITY,
     InputError,
@@ -36,7 +35,25 @@ from registration import (
     Segments,
 )
 
+from .analysis import AnalyzeRequest
+from .errors import Fault, InvalidRequestError
+from .parts import (
+    HardPriorFields,
+    LaserScan,
+    MapDocument,
+    MeasuredFields,
+    PointScan,
+    SearchOptions,
+    SegmentScan,
+    SoftPriorFields,
+    is_oriented,
+)
+from .requests import CheckRequest, RegisterRequest
+from .results import Included
 from .scans import Scanned, range_scan, scan_points, view_laser, viewpoint_of
+from .strict import Pose
+from .updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest, UpdateScan
+from .views import LaserView, PointView, SegmentView, ViewsScan
 
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
@@ -65,6 +82,7 @@ def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: 
     viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
         seen = range_scan(scan.laser, scan.twist, "/scan", timed=timed)
+        seen = replace(seen, flipped=isinstance(scan, UpdateScan) and scan.flipped)
         return _vectorized(assemble([view_laser(seen, IDENTITY, scan.sigma, viewpoint)]))
     if isinstance(scan, PointScan):
         return _vectorized(scan_points(scan.points, scan.sigma, viewpoint))
@@ -198,6 +216,79 @@ def scans_of(asked: CheckRequest) -> list[Scan]:
             # A motion that is not known would only loosen the fit.
             found.append(scanned_of(one, timed=False).scan)
     return found
+
+
+def visit_scans(asked: UpdateRequest) -> list[VisitScan]:
+    """Return the scans of all visits; an error names the place of a scan in the request."""
+    found = []
+    for number, visit in enumerate(asked.visits):
+        for place, one in enumerate(visit.scans):
+            with naming_scan(f"/visits/{number}/scans/{place}"):
+                pose = None if one.pose is None else transform_of(one.pose)
+                odometry = None if one.odometry is None else transform_of(one.odometry)
+                found.append(VisitScan(scanned_of(one).scan, visit.visit, pose, one.covariance, odometry))
+    return found
+
+
+def analysis_of(index: MapIndex, asked: AnalyzeRequest) -> Analysis:
+    """Return the analysis of a map that a request is for.
+
+    Raises
+    ------
+    AnalysisError
+        When the requested places cannot be had.
+    InputError
+        When a segment of the landmark is too short or too long.
+    """
+    laser = asked.laser
+    robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
+    landmark = Segments.from_array(asked.landmark, argument="landmark")
+    return Analysis.over(
+        index, robot, asked.spacing, asked.point, seed=asked.seed, drive=asked.drive, landmark=landmark
+    )
+
+
+def part_of(document: MapDocument, *, oriented: bool, path: str = "map.") -> MapPart:
+    """Return a map as the search takes it; `path` goes before the fields that errors name."""
+    segments = Segments.from_array(document.segments, argument=f"{path}segments")
+    points = MapPoints.of(document.points, document.points_sigma, path=path)
+    return MapPart(segments, document.sigma, oriented, points)
+
+
+def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lower left and the upper right corner of the walls of a map.
+
+    Raises
+    ------
+    InvalidSegmentsError, InvalidMapError
+        When it could not be searched.
+    """
+    part = part_of(document, oriented=True, path=path)
+    return MapIndex.require(part.segments, part.sigma, path)
+
+
+def index_of(document: MapDocument, *, oriented: bool) -> MapIndex:
+    """Return the index of a map."""
+    part = part_of(document, oriented=oriented)
+    return MapIndex.build(part.segments, part.sigma, oriented=oriented, points=part.points)
+
+
+def replacements_of(asked: ApplyRequest) -> dict[int, Replacement]:
+    """Return the accepted changes of a map, by their indices in the request."""
+    return {number: _replacement_of(one, number) for number, one in enumerate(asked.changes) if one.accepted}
+
+
+def _replacement_of(one: ProposedChange, number: int) -> Replacement:
+    new = Segments.from_array([each.segment for each in one.new], argument=f"changes.{number}.new")
+    return Replacement(one.code, tuple(one.segments), new.endpoints, np.array([each.sigma for each in one.new]))
+
+
+def sharpened_of(asked: SharpenedWalls | None) -> Sharpened:
+    """Return the walls at better positions; none where there are none."""
+    if asked is None:
+        return NOT_SHARPENED
+    ends = Segments.from_array(asked.ends, argument="sharpened.ends").endpoints
+    return Sharpened(np.array(asked.segments, dtype=np.intp), ends, np.array(asked.sigma))
 
 
 @contextmanager

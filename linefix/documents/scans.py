@@ -1,4 +1,4 @@
-"""Ranges and points of a request to scans, or to segments: the one place of the service that calls `vectorization`."""
+"""Ranges and points of a request to scans, or to segments."""
 
 from __future__ import annotations
 
@@ -11,12 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import AssociationWarning, Scan, View
-from linefix import view_of
-from linefix.answers import Json, vectorization_json
-from linefix.documents.errors import Fault, InvalidRequestError
-from linefix.documents.parts import Laser, Twist
-from linefix.documents.requests import VectorizeRequest
-from linefix.ranges import RangeScan, motion_warning
 from registration import RigidTransform
 from vectorization import (
     LaserScan,
@@ -28,7 +22,10 @@ from vectorization import (
     vectorize,
 )
 
-from .job import Done, Job
+from ..ranges import RangeScan, motion_warning, view_of
+from .errors import Fault, InvalidRequestError
+from .parts import Laser, Twist
+from .requests import VectorizeRequest
 
 Floats = NDArray[np.float64]
 Viewpoint = tuple[float, float] | None
@@ -149,16 +146,8 @@ def _naming_argument(form: str, places: tuple[str, str]) -> Iterator[None]:
         raise InvalidRequestError([Fault(place + row, error.message)]) from error
 
 
-def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
-    """Cut a scan into directed segments; raises `InvalidRequestError` where the library refuses it."""
-    job.watch.lap("decode")
-    answer = vectorization_of(asked)
-    job.watch.lap("search")
-    return job.done(answer)
-
-
-def vectorization_of(asked: VectorizeRequest) -> Json:
-    """Return the segments of a scan, and the warnings about it.
+def vectorization_of(asked: VectorizeRequest) -> tuple[Vectorization, AssociationWarning | None]:
+    """Return the segments of a scan, and the warning about a sensor whose motion is not known.
 
     Raises
     ------
@@ -169,6 +158,6 @@ def vectorization_of(asked: VectorizeRequest) -> Json:
     options = VectorizationOptions(sent.sigma, sent.min_points, sent.min_length, sent.max_gap)
     if asked.laser is None:
         assert asked.points is not None  # the model takes exactly one of the two
-        return vectorization_json(vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES))
+        return vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES), None
     seen = range_scan(asked.laser, asked.twist, _PLACES[0])
-    return vectorization_json(vectorize_laser(seen, options, _PLACES), motion_warning(seen))
+    return vectorize_laser(seen, options, _PLACES), motion_warning(seen)

@@ -8,13 +8,13 @@ import orjson
 import pytest
 
 from linefix.documents import examples
-from linefix.documents.errors import InvalidRequestError, TooManyError
+from linefix.documents.errors import InvalidRequestError, NotJsonError, TooManyError
+from linefix.documents.limits import Limits
 from linefix.documents.parts import MapDocument
+from linefix.documents.reading import parse, read_batch, read_map, read_model, read_stored
 from linefix.documents.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
-from service.parsing.errors import NotJsonError
-from service.parsing.reading import parse, read_batch, read_map, read_model, read_stored
 
-from .bodies import LIMITS
+LIMITS = Limits(values=2_000_000, map_segments=200_000, scan_segments=2_000, beams=20_000, pairs=200_000, batch=256)
 
 FEW = replace(LIMITS, values=10)
 

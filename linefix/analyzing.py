@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -15,11 +15,10 @@ from association import Deadline, MapIndex, MapPoints
 from map_quality import Analysis, PlaceVerdict, Robot, Standing
 from registration import Segments
 
-from .contract import Progress
-
 PORTION = 16  # places that a process is given at a time
 ALONE = 64  # places up to which starting others takes longer than it saves
 
+Progress = Callable[[int, int], None]
 Looks = dict[int, PlaceVerdict | None]
 _analysis: Analysis | None = None  # of a process that was started for it
 _deadline = Deadline()

@@ -8,14 +8,12 @@ from typing import Any, TypeVar
 import orjson
 from pydantic import BaseModel, ValidationError
 
-from linefix.documents.encoding import encode
-from linefix.documents.errors import InvalidRequestError, RequestError, TooManyError
-from linefix.documents.faults import faults_of
-from linefix.documents.limits import Limits
-from linefix.documents.parts import MapDocument
-from linefix.documents.requests import BatchItem, BatchRequest
-
-from .errors import NotJsonError
+from .encoding import encode
+from .errors import InvalidRequestError, NotJsonError, RequestError, TooManyError
+from .faults import faults_of
+from .limits import Limits
+from .parts import MapDocument
+from .requests import BatchItem, BatchRequest
 
 M = TypeVar("M", bound=BaseModel)
 MAP_FIELDS = ("segments", "sigma", "oriented", "frame_id", "points", "points_sigma", "meta")

@@ -1,0 +1,343 @@
+"""Results of the library to answers: the fields are those of the models of `replies`, each declared there alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from operator import attrgetter
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticUndefined
+
+from association import (
+    NOT_IN_ORDER,
+    AssociationDiagnostics,
+    AssociationResult,
+    AssociationWarning,
+    Status,
+    VerdictExplanation,
+    message_of,
+)
+from map_quality import Analysis, MapCheck, MapUpdate, PlaceVerdict
+from registration import RegistrationResult
+from vectorization import Vectorization
+
+from ..checking import CheckedMap
+from . import analysis, checks, replies, updates
+from .parts import MapDocument
+from .strict import Answer
+
+if TYPE_CHECKING:
+    from formats import ImportedMap, LineMap
+
+    from ..explaining import Explanation
+
+Json = dict[str, Any]
+Indices = NDArray[np.intp]
+MOST_INDICES = 1000  # of one finding
+SEAL = frozenset(("client_ref", "request_id", "timing_ms"))  # of the request, not of its result
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """A field of an answer: its name there, its attribute in a result, the model of what it holds, and its default."""
+
+    name: str
+    attribute: str
+    inner: type[Answer] | None
+    default: Any
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """How results become an answer; `all_at_once` where no field needs a conversion."""
+
+    fields: tuple[_Field, ...]
+    names: tuple[str, ...]
+    all_at_once: Callable[[Any], tuple[Any, ...]] | None
+
+
+def _models_in(annotation: Any) -> Iterator[type[Answer]]:
+    if isinstance(annotation, type) and issubclass(annotation, Answer):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
+
+
+@cache
+def _plan(model: type[Answer], given: frozenset[str]) -> _Plan:
+    fields = tuple(
+        _Field(
+            one.alias or name, name, next(_models_in(one.annotation), None), one.get_default(call_default_factory=True)
+        )
+        for name, one in model.model_fields.items()
+        if name not in SEAL
+    )
+    own = [one for one in fields if one.name not in given]
+    plain = len(own) > 1 and all(one.inner is None and one.default is PydanticUndefined for one in own)
+    getter = attrgetter(*(one.attribute for one in own)) if plain else None
+    return _Plan(fields, tuple(one.name for one in own), getter)
+
+
+NOTHING: frozenset[str] = frozenset()
+
+
+def answer_of(model: type[Answer], result: object, /, **given: Any) -> Json:
+    """Return a result as an answer.
+
+    Each field of the model is the attribute of its name, unless it is given. One with a default may be missing.
+    """
+    plan = _plan(model, frozenset(given) if given else NOTHING)
+    if plan.all_at_once is not None:
+        return {**given, **dict(zip(plan.names, map(_plain, plan.all_at_once(result)), strict=True))}
+    answer: Json = {}
+    for one in plan.fields:
+        if one.name in given:
+            answer[one.name] = given[one.name]
+            continue
+        value = getattr(result, one.attribute) if one.default is PydanticUndefined else _or_default(result, one)
+        if value is not PydanticUndefined:
+            answer[one.name] = _plain(value) if one.inner is None else _inner(one.inner, value)
+    return answer
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _inner(model: type[Answer], value: Any) -> Any:
+    if value is None:
+        return None
+    return answers_of(model, value) if isinstance(value, tuple | list) else answer_of(model, value)
+
+
+def _or_default(result: object, one: _Field) -> Any:
+    """Return an attribute; undefined where it is the default, and so left out."""
+    value = getattr(result, one.attribute, one.default)
+    return PydanticUndefined if value == one.default or value == () else value
+
+
+def answers_of(model: type[Answer], results: Iterable[object]) -> list[Json]:
+    """Return results as answers of one model."""
+    return [answer_of(model, one) for one in results]
+
+
+def registration_json(
+    result: RegistrationResult, pairs: Indices, listed: Callable[[Iterable[Json]], Any] = list
+) -> Json:
+    """Return the answer of a registration.
+
+    `pairs` are the indices of scan and map segment of each correspondence, (k, 2). `listed` makes a list of the
+    residuals, which are many; or what is written as a list.
+    """
+    columns = (result.offsets.tolist(), result.angles.tolist(), result.weights.tolist())
+    residuals = listed(
+        {"scan": scan, "map": on, "offset": offset, "angle": angle, "weight": weight}
+        for (scan, on), offset, angle, weight in zip(pairs.tolist(), *columns, strict=True)
+    )
+    status = "degenerate" if result.degenerate else "ok"
+    return answer_of(replies.RegisterAnswer, result, status=status, residuals=residuals)
+
+
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """Names of the segments of a scan: the index, or of several views the view and the index in it."""
+
+    starts: Indices | None
+
+    def fields(self, scan: int) -> Json:
+        if self.starts is None:
+            return {"scan": scan}
+        view = int(np.searchsorted(self.starts, scan, side="right")) - 1
+        return {"view": view, "scan": scan - int(self.starts[view])}
+
+    def listed(self, scans: Sequence[int]) -> list[Any]:
+        return list(scans) if self.starts is None else [self.fields(scan) for scan in scans]
+
+
+@dataclass(frozen=True, slots=True)
+class Included:
+    """Fields of an answer that come from the request and its map.
+
+    Attributes
+    ----------
+    parts : frozenset of str
+        Names of the requested parts, as in ``include``.
+    frame_id, child_frame_id : str
+        Of the map and of the scan.
+    stamp : JSON
+        Of the scan, as sent.
+    segments : list or None
+        Of the scan, where the caller sent ranges or points: rows of four numbers, metres; of several views one list or
+        None each.
+    starts : (v,) or None
+        Index of the first segment of each view; segments are then named by view and index. None: a single view.
+    """
+
+    parts: frozenset[str]
+    frame_id: str
+    child_frame_id: str
+    stamp: Any = None
+    segments: list[Any] | None = None
+    starts: Indices | None = None
+
+
+def association_json(
+    result: AssociationResult, included: Included, references: Mapping[str, Json] = MappingProxyType({})
+) -> Json:
+    """Return the answer of a search with the parts that are included.
+
+    `references` are id and revision of each of several maps, by name.
+    """
+    named, parts = _Names(included.starts), included.parts
+    given: Json = {name: getattr(included, name) for name in ("frame_id", "child_frame_id", "stamp")}
+    given["unmatched_scan"] = named.listed(result.unmatched_scan)
+    given["diagnostics"] = _diagnostics_json(result.diagnostics, named)
+    given["correspondences"] = [
+        answer_of(replies.CorrespondenceAnswer, pair, **named.fields(pair.scan)) for pair in result.correspondences
+    ]
+    given["segments"] = included.segments
+    given["alternatives"] = answers_of(replies.AlternativeAnswer, result.alternatives)
+    given["missing_map"] = result.missing_map
+    if result.maps:
+        given["maps"] = [
+            answer_of(replies.MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
+        ]
+        given["map"] = None if result.map_id is None else references[result.map_id]
+    answer = answer_of(replies.FoundAnswer, result, message=message_of(result), **given)
+    for name in {"correspondences", "alternatives", "missing_map", "segments"} - parts:
+        del answer[name]
+    return answer
+
+
+def _diagnostics_json(diagnostics: AssociationDiagnostics | None, named: _Names) -> Json | None:
+    if diagnostics is None:
+        return None
+    wall = diagnostics.critical_wall
+    critical = None if wall is None else answer_of(replies.CriticalWallAnswer, wall, scan=named.listed(wall.scan))
+    fit = answer_of(replies.RegistrationDiagnosticsAnswer, diagnostics.registration)
+    return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical, **fit)
+
+
+def explanation_json(found: Explanation) -> Json:
+    """Return how a verdict came about, without the answer itself: the JSON of ``linefix explain``."""
+    last = found.last_view
+    return {"verdict": _verdict_json(found.verdict), "last_view": None if last is None else _verdict_json(last)}
+
+
+def _verdict_json(one: VerdictExplanation) -> Json:
+    pose = None if one.pose is None else answer_of(replies.PoseAnswer, one.pose)
+    others = [{**asdict(other), "pose": answer_of(replies.PoseAnswer, other.pose)} for other in one.alternatives]
+    return {**asdict(one), "status": str(one.status), "pose": pose, "alternatives": others}
+
+
+def vectorization_json(found: Vectorization, moving: AssociationWarning | None = None) -> Json:
+    """Return the answer of a vectorization; `moving` is the warning about a sensor whose motion is not known."""
+    measured = found.measured
+    unordered = None if found.ordered else AssociationWarning("points_not_in_order", NOT_IN_ORDER)
+    return answer_of(
+        replies.VectorizeAnswer,
+        measured,
+        segments=measured.segments.endpoints.tolist(),
+        point_counts=measured.point_counts.astype(int).tolist(),
+        sigma=found.sigma,
+        sigmas=measured.sigma.tolist(),
+        rms=found.rms.tolist(),
+        warnings=answers_of(replies.WarningAnswer, [one for one in (unordered, moving) if one is not None]),
+    )
+
+
+def map_json(line_map: LineMap) -> Json:
+    """Return a map as a map document; one without points does not mention them."""
+    return {name: _plain(value) for name, value in line_map.document.items()}
+
+
+def import_json(imported: ImportedMap, found: MapCheck) -> Json:
+    """Return the answer of an import: the map, the report of its files, and its doubtful parts."""
+    return {"map": map_json(imported.map), "report": asdict(imported.report), "check": check_json(found)}
+
+
+def check_json(found: MapCheck) -> Json:
+    """Return the check of a map without scans."""
+    findings = [
+        answer_of(checks.FindingAnswer, one, segments=one.segments[:MOST_INDICES], count=len(one.segments))
+        for one in found.findings
+    ]
+    return answer_of(checks.MapCheckAnswer, found, findings=findings)
+
+
+def checked_json(checked: CheckedMap) -> Json:
+    """Return the answer of a check; its ``samples`` are null without sample scans."""
+    samples, report = None, checked.report
+    if report is not None:
+        nothing: Json = {"status": None, "usable": False, "pose": None}
+        scans = [
+            {"index": number, **nothing} if one is None else answer_of(checks.SampleAnswer, one.result, index=number)
+            for number, one in enumerate(checked.samples)
+        ]
+        samples = answer_of(checks.SamplesAnswer, report, scans=scans)
+    return {**check_json(checked.all), "samples": samples}
+
+
+def analysis_json(found: Analysis, looks: Mapping[int, PlaceVerdict | None]) -> Json:
+    """Return the answer of an analysis; `looks` by the poses' numbers, None where no robot can stand."""
+    verdicts = [one for _, one in sorted(looks.items()) if one is not None]
+    by_status, tried = Counter(one.status for one in verdicts), len(found.standing.order)
+    return {
+        "places": answers_of(analysis.AnalyzedPlaceAnswer, verdicts),
+        "summary": {
+            "places": len(verdicts),
+            "usable": sum(one.usable for one in verdicts),
+            **{str(one): by_status[one] for one in (Status.OK, Status.AMBIGUOUS, Status.DEGENERATE, Status.NO_MATCH)},
+            "similar_pose": sum(one.similar_pose is not None for one in verdicts),
+            "resolved_within": sum(one.resolved_after is not None for one in verdicts) if found.drive else None,
+            "usable_with_landmark": None
+            if found.landmark is None
+            else sum(one.with_landmark is not None and one.with_landmark.usable for one in verdicts),
+            "not_free": len(looks) - len(verdicts),
+            "left_out": tried - len(looks),
+        },
+        "spacing": found.standing.spacing,
+        "complete": len(looks) == tried,
+    }
+
+
+def kept_fields(old: MapDocument) -> Json:
+    """Return the fields of a map that no update changes."""
+    points: Json = {"points": old.points.tolist(), "points_sigma": old.points_sigma}
+    kept = {"oriented": old.oriented, "frame_id": old.frame_id, "meta": old.meta}
+    return {**kept, **(points if len(old.points) else {})}
+
+
+def update_json(update: MapUpdate, old: MapDocument) -> Json:
+    """Return the answer of an update of a map."""
+    usable, held = update.usable, update.held_back
+    changes = []
+    for one, accepted in zip(update.changes, update.accepted, strict=True):
+        new = zip(one.new.tolist(), one.sigma.tolist(), strict=True)
+        evidence = {"from": one.evidence.first, "to": one.evidence.last}
+        changes.append(
+            answer_of(
+                updates.ChangeAnswer,
+                one,
+                new=[{"segment": ends, "sigma": sigma} for ends, sigma in new],
+                evidence=answer_of(updates.EvidenceAnswer, one.evidence, **evidence),
+                accepted=accepted,
+            )
+        )
+    return {
+        "map": {"segments": update.segments.endpoints.tolist(), "sigma": update.sigma, **kept_fields(old)},
+        "changes": changes,
+        "scans": usable.scans + held.scans,
+        "usable_before": usable.before + held.before,
+        "usable_after": usable.after + held.after,
+        "held_back": {"scans": held.scans, "usable_before": held.before, "usable_after": held.after},
+        "sharpened": answer_of(updates.SharpenedAnswer, update.sharpened),
+        "refused_visits": answers_of(updates.RefusedVisitAnswer, update.refused_visits),
+        "complete": update.complete,
+    }
