@@ -158,6 +158,15 @@ class Publishing:
             help="Publish the transform from the map to the odometry frame. Do not use it together with AMCL."
         ),
     ] = False
+    tf_max_age_s: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            max=3600.0,
+            help="Stop the transform of --publish-tf this long after the last scan with ranges; 0: never.",
+        ),
+    ] = 0.0
     hardware_id: Annotated[
         str, typer.Option(metavar="NAME", help="Hardware id of the diagnostics. Default: the namespace.")
     ] = ""
@@ -228,6 +237,7 @@ def ros2(
             min_sigma=publishing.min_sigma,
             min_sigma_theta=publishing.min_sigma_theta,
             publish_tf=publishing.publish_tf,
+            tf_max_age_s=publishing.tf_max_age_s,
             domain=domain_of(os.environ),
             hardware_id=publishing.hardware_id,
         )

@@ -21,7 +21,8 @@
     deciding          when initialpose is published
     watching          whether the localizer of the robot agrees
     correcting        the transform from the map to the odometry frame
-    health, silence   diagnostics, status, log; why nothing happens
+    health            diagnostics, status, log
+    inputs            the watch over ages, contradictions and clocks of what is received
     requests          requests with an id, and their results
     reporting         results as messages
     tuning            limits and thresholds

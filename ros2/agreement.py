@@ -38,6 +38,8 @@ from .tuning import (
     SEPARATE_DISTANCE,
     SEPARATE_NS,
     TURNED,
+    UNKNOWN_SPEED,
+    UNKNOWN_TURN_RATE,
 )
 
 Floats = NDArray[np.float64]
@@ -74,6 +76,10 @@ class Observation:
     usable : bool
     odometry : RigidTransform or None
         odom_from_base at `stamp`; None: no odometry, the robot is taken to rest.
+    part : tuple of int
+        Of odometry; that of different parts is not comparable.
+    unknown_s : float
+        Seconds up to `stamp` in which odometry is not known; the uncertainty of a step grows with them.
     others : sequence of Place
         Other poses that explain the scan.
     conclusive : bool
@@ -87,6 +93,8 @@ class Observation:
     covariance: Floats | None
     usable: bool
     odometry: RigidTransform | None = None
+    part: tuple[int, ...] = ()
+    unknown_s: float = 0.0
     others: Sequence[Place] = ()
     conclusive: bool = False
     map_id: str | None = None
@@ -184,7 +192,9 @@ class Agreement:
         self._hypotheses = [
             one for one in self._hypotheses if one is self._agreed or scan.stamp - one.latest.stamp <= FORGOTTEN_NS
         ]
-        verdicts = [(one, _verdict(one.latest, scan)) for one in self._hypotheses]
+        # Without odometry a robot rests or not since the first scan: from scan to scan a slow one always seems to.
+        known = scan.odometry is not None
+        verdicts = [(one, _verdict(one.latest if known else one.first, scan)) for one in self._hypotheses]
         for one, agrees in verdicts:
             if agrees is False:
                 one.against += 1
@@ -221,16 +231,16 @@ class Agreement:
 def step_between(begin: Observation, end: Observation) -> RigidTransform | None:
     """Return where the robot is at `end`, relative to where it was at `begin`.
 
-    Without odometry at both it is taken to rest. None where odometry is known at one of them only.
+    Without odometry at both it is taken to rest. None where odometry is known at one of them only, or of two parts.
     """
     if begin.odometry is None and end.odometry is None:
         return IDENTITY
-    if begin.odometry is None or end.odometry is None:
+    if begin.odometry is None or end.odometry is None or begin.part != end.part:
         return None
     return begin.odometry.inverse().compose(end.odometry)
 
 
-def predict(begin: Observation, step: RigidTransform) -> tuple[RigidTransform, Floats]:
+def predict(begin: Observation, step: RigidTransform, unknown_s: float = 0.0) -> tuple[RigidTransform, Floats]:
     """Return the pose that odometry predicts from a scan with a pose, and its covariance.
 
     Parameters
@@ -238,6 +248,8 @@ def predict(begin: Observation, step: RigidTransform) -> tuple[RigidTransform, F
     begin : Observation
     step : RigidTransform
         As by `step_between`.
+    unknown_s : float
+        Seconds of the step in which odometry is not known.
 
     Returns
     -------
@@ -250,8 +262,9 @@ def predict(begin: Observation, step: RigidTransform) -> tuple[RigidTransform, F
     predicted = begin.pose.compose(step)
     known = np.zeros((3, 3)) if begin.covariance is None else begin.pose.carry(begin.covariance, step)
     distance, angle = math.hypot(step.x, step.y), abs(step.theta)
-    place = ODOMETRY_DISTANCE + ODOMETRY_DISTANCE_PER_METRE * distance
+    place = ODOMETRY_DISTANCE + ODOMETRY_DISTANCE_PER_METRE * distance + UNKNOWN_SPEED * unknown_s
     turn = ODOMETRY_ANGLE + ODOMETRY_ANGLE_PER_ANGLE * angle + ODOMETRY_ANGLE_PER_METRE * distance
+    turn += UNKNOWN_TURN_RATE * unknown_s
     return predicted, known + np.diag([place**2, place**2, turn**2])
 
 
@@ -269,7 +282,7 @@ def _verdict(begin: Observation, scan: Observation) -> bool | None:
     step = step_between(begin, scan)
     if step is None or scan.pose is None:
         return None
-    predicted, covariance = predict(begin, step)
+    predicted, covariance = predict(begin, step, abs(scan.unknown_s - begin.unknown_s))
     if scan.usable and scan.map_id != begin.map_id:
         return False
     if scan.usable:

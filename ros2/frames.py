@@ -2,55 +2,29 @@
 
 from __future__ import annotations
 
-import bisect
-from collections import OrderedDict, deque
-from dataclasses import dataclass, field
+from collections import OrderedDict
+from dataclasses import dataclass
 
 import numpy as np
 
-from formats.logs.tracks import between
+from formats.logs.tracks import Track
+from formats.logs.transforms import stamp_of
 from registration import IDENTITY
 
 from .messages import TFMessage, TransformStamped
-from .transforms import NS, Floats, FrameError, Mount, matrix_of_message, mount_of
-from .tuning import CLOCK_BACK_NS, MAX_FRAMES, MAX_TRANSFORMS, STALE_NS, TRANSFORMS_KEPT
+from .transforms import Floats, FrameError, Mount, matrix_of_message, mount_of
+from .tuning import MAX_FRAMES, MAX_TRANSFORMS, TRANSFORMS_KEPT
 
 LONGEST_CHAIN = 64  # frames from a sensor to the root
 
 
 @dataclass(slots=True)
 class _Frame:
-    """A frame in its parent: one value where it is static, else the newest values over time."""
+    """A frame in its parent."""
 
     parent: str
-    static: bool
-    stamps: deque[int] = field(default_factory=lambda: deque(maxlen=TRANSFORMS_KEPT))
-    matrices: deque[Floats] = field(default_factory=lambda: deque(maxlen=TRANSFORMS_KEPT))
+    track: Track
     used: bool = False
-
-    def add(self, stamp: int, matrix: Floats) -> None:
-        back = self.stamps[-1] - stamp if self.stamps else -1
-        if not self.static and 0 < back <= CLOCK_BACK_NS:
-            return  # out of order
-        if self.static or back > CLOCK_BACK_NS:
-            self.stamps.clear()
-            self.matrices.clear()
-        elif back == 0:
-            self.stamps.pop()
-            self.matrices.pop()
-        self.stamps.append(stamp)
-        self.matrices.append(matrix)
-
-    def at(self, stamp: int | None) -> Floats | None:
-        """Return parent_from_frame at a time; None: the newest. None is returned where the time is too far away."""
-        if self.static or stamp is None:
-            return self.matrices[-1]
-        after = bisect.bisect_left(self.stamps, stamp)
-        if after in (0, len(self.stamps)):
-            end = min(after, len(self.stamps) - 1)
-            return self.matrices[end] if abs(self.stamps[end] - stamp) <= STALE_NS else None
-        begin, end_stamp = self.stamps[after - 1], self.stamps[after]
-        return between(self.matrices[after - 1], self.matrices[after], (stamp - begin) / (end_stamp - begin))
 
 
 class Frames:
@@ -107,7 +81,7 @@ class Frames:
         for name in chain[: chain.index(outer)]:
             frame = self._frames[name]
             frame.used = True
-            step = frame.at(stamp)
+            step = frame.track.newest[1] if stamp is None else frame.track.at(stamp)
             if step is None:
                 return None
             matrix = step @ matrix
@@ -120,6 +94,16 @@ class Frames:
             return matrix
         back = self.lookup(inner, outer, None)
         return None if back is None else np.asarray(np.linalg.inv(back), dtype=np.float64)
+
+    def newest(self, outer: str, inner: str) -> tuple[int, Floats] | None:
+        """Return the newest time at which outer_from_inner moves, nanoseconds, and it; None where it does not."""
+        chain = self._ancestors(inner)
+        moving = [self._frames[one].track for one in chain[:-1] if not self._frames[one].track.static]
+        if outer not in chain or not moving:
+            return None
+        stamp = min(track.newest[0] for track in moving)
+        matrix = self.lookup(outer, inner, stamp)
+        return None if matrix is None else (stamp, matrix)
 
     def mount(self, base: str, laser: str, stamp: int | None) -> Mount | None:
         """Return where a laser is mounted; None where the frames do not connect it with the base.
@@ -148,10 +132,10 @@ class Frames:
         matrix = matrix_of_message(transform)
         parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
         frame = self._frames.get(child)
-        if frame is None or frame.parent != parent or frame.static != static:
-            used = frame is not None and frame.used
-            frame = self._frames[child] = _Frame(parent, static, used=used)
-        frame.add(int(transform.header.stamp.sec) * NS + int(transform.header.stamp.nanosec), matrix)
+        if frame is None or frame.parent != parent or frame.track.static != static:
+            track = Track(static, most=TRANSFORMS_KEPT)
+            frame = self._frames[child] = _Frame(parent, track, used=frame is not None and frame.used)
+        frame.track.add(stamp_of(transform.header), matrix, static=static)
         self._frames.move_to_end(child)
         while len(self._frames) > MAX_FRAMES:
             del self._frames[next((name for name, one in self._frames.items() if not one.used), child)]

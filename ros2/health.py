@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from .transforms import NS
 from .tuning import LOG_SECONDS, REPEAT_SECONDS
 from .wire import Publisher
 
+NUMBER = re.compile(r"(?<![\w/])[-+]?(?:\d+(?:\.\d*)?(?:e[-+]?\d+)?|nan|inf)(?!\w)")
 MOST_PROBLEMS = 100  # different ones that are remembered
 
 
@@ -25,6 +27,7 @@ class State(StrEnum):
     AGREED = "agreed"
     CONTRADICTED = "contradicted"
     LOST = "lost"
+    STALE = "stale"
 
 
 STATES = {
@@ -34,6 +37,7 @@ STATES = {
     State.AGREED: (OK, "the pose is agreed"),
     State.CONTRADICTED: (ERROR, "the agreed pose is contradicted by the last scans"),
     State.LOST: (ERROR, "the pose of the localizer differs from that of the scans"),
+    State.STALE: (ERROR, "the agreed pose is not confirmed any more"),
 }
 
 
@@ -69,10 +73,9 @@ class Health:
 
     def problem(self, problem: str, stamp: Time | None = None) -> None:
         """Publish a problem, and log it; the same one at most once in `REPEAT_SECONDS` and `LOG_SECONDS`."""
-        now = time.monotonic()
-        if _is_new(self._published, problem, now, REPEAT_SECONDS):
+        if _is_new(self._published, NUMBER.sub("#", problem), time.monotonic(), REPEAT_SECONDS):
             self.publish("scan", stamp or Time(), (ERROR, problem))
-        self.note(problem)
+        self.remind(problem)
 
     def warn(self, warning: str, stamp: Time, about: str) -> None:
         """Publish a warning, and log it, as often as a problem; warnings `about` one thing may differ in numbers."""
@@ -85,6 +88,10 @@ class Health:
         if _is_new(self._logged, about or line, time.monotonic(), LOG_SECONDS):
             self.log(line)
 
+    def remind(self, line: str) -> None:
+        """Log a line as `note`, also where it differs in numbers."""
+        self.note(line, NUMBER.sub("#", line))
+
     def publish(
         self, part: str, stamp: Time, verdict: tuple[int, str], values: Mapping[str, str] | None = None
     ) -> None:
@@ -93,20 +100,22 @@ class Health:
         status = status_of(f"{prefix}linefix: {part}", hardware_id, verdict, values)
         self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [status]))
 
-    def beat(self, state: State, stamp: Time, values: Mapping[str, str]) -> None:
-        """Publish the state: at once where it or the map has changed, else once a second."""
+    def beat(self, state: State, stamp: Time, values: Mapping[str, str], doubt: str = "") -> None:
+        """Publish the state, with why it is stale: at once where it or the map has changed, else once a second."""
         now = time.monotonic()
         changed, map_changed = state is not self._state, values.get("map") != self._map
         if not changed and not map_changed and now - self._beat < 1.0:
             return
         self._beat, self._map = now, values.get("map")
         values = {"state": state.value, **values}
-        self.publish("localization", stamp, STATES[state], values)
+        level, message = STATES[state]
+        verdict = level, f"{message}: {doubt}" if state is State.STALE else message
+        self.publish("localization", stamp, verdict, values)
         prefix, hardware_id = self.names
-        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, STATES[state], values))
+        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, verdict, values))
         if changed:
             self._state = state
-            self.log(f"state {state.value}: {STATES[state][1]}")
+            self.log(f"state {state.value}: {verdict[1]}")
 
 
 def _is_new(times: dict[str, float], text: str, now: float, seconds: float) -> bool:

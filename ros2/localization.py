@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
-import linefix
+from formats.logs.tuning import MOST_GAP_NS
 
 from .agreement import Agreement, Event, Observation
 from .correcting import MapToOdom
@@ -20,7 +21,7 @@ from .options import NodeOptions
 from .reporting import at_least, map_marker, stamped_pose, transform_of
 from .requests import Requests
 from .topics import Topics
-from .transforms import NS, planar
+from .transforms import NS
 from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
 from .watching import Watch
 
@@ -97,10 +98,10 @@ class Localization:
         """
         self._watch.take(pose)
 
-    def take(self, located: Located) -> None:
-        """Take the result of a scan."""
+    def take(self, located: Located, received: Callable[[int], int | None]) -> None:
+        """Take the result of a scan; `received` returns when a scan with a stamp was received."""
         stamp = nanoseconds(located.stamp) or time.time_ns()
-        scan = located.observation(self._odometry_at(stamp), stamp)
+        scan = located.observation(self._odometry.known(stamp, received(stamp)), stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
             self._correction.reset()  # where the clock was set back, the agreement forgets the pose
@@ -175,22 +176,13 @@ class Localization:
         self._localizer_map = scan.map_id
         self._health.note(f"published {name} ({reason}): {place}")
 
-    def _odometry_at(self, stamp: int) -> linefix.RigidTransform | None:
-        """Return odom_from_base, by odometry or else by transforms."""
-        found = self._odometry.at(stamp)
-        if found is not None:
-            return found
-        base = self._options.base_of(self.odom_frame)
-        matrix = self._frames.lookup(self.odom_frame, base, stamp)
-        return None if matrix is None else planar(matrix)[0]
-
     def publish_transform(self) -> None:
         """Publish the transform from the map to the odometry frame, if that is wanted and it is time."""
         newest = self._odometry.newest
         if self._topics.tf is None or newest is None:
             return
         stamp, odometry = newest
-        if 0 <= stamp - self._transformed < TRANSFORM_PERIOD_NS:
+        if -MOST_GAP_NS < stamp - self._transformed < TRANSFORM_PERIOD_NS:
             return
         map_from_odom = self._correction.advance(stamp, odometry)
         if map_from_odom is None:

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import linefix
+from formats.logs.tracks import Known
 from registration import RigidTransform
 
 from .agreement import Observation, Place
 from .looking import Look
 from .messages import Time
 from .options import NodeOptions
+from .transforms import NS, planar
 from .tuning import INCONCLUSIVE_NATS
 
 OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
@@ -45,12 +47,16 @@ class Located:
         """Of the pose, (3, 3): additive (x, y, theta) in the map frame."""
         return self.answer.covariance
 
-    def observation(self, odometry: RigidTransform | None, stamp: int) -> Observation:
+    def observation(self, known: Known | None, stamp: int) -> Observation:
         """Return the result for the agreement, with odom_from_base at its stamp (nanoseconds)."""
+        odometry = () if known is None else (planar(known.matrix)[0], known.part, known.unknown_ns / NS)
         answer = self.answer
         others = tuple(Place(one.pose, one.map_id) for one in answer.alternatives)
-        return Observation(
-            stamp, answer.pose, answer.covariance, answer.usable, odometry, others, self._conclusive, answer.map_id
+        return replace(
+            Observation(stamp, answer.pose, answer.covariance, answer.usable, *odometry),
+            others=others,
+            conclusive=self._conclusive,
+            map_id=answer.map_id,
         )
 
     @property

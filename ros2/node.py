@@ -15,6 +15,7 @@ from .connecting import connect
 from .frames import Frames
 from .gathering import Gathering, looks_of
 from .health import Health, State, current_time
+from .inputs import Inputs
 from .localization import Localization
 from .locating import search_options
 from .map_conversion import MapConverter
@@ -25,10 +26,9 @@ from .odometry import OdometryHistory
 from .options import NodeOptions
 from .reporting import answer_marker, stamped_pose, values_of, verdict_of
 from .searching import Found, Searcher
-from .silence import Silence
 from .topics import Topics
-from .transforms import FrameError, planar
-from .tuning import END_SECONDS, ODOMETRY_SECONDS
+from .transforms import NS, FrameError, planar
+from .tuning import END_SECONDS, ODOMETRY_SECONDS, TRANSFORM_PERIOD_NS
 from .wire import Waiting
 
 BEAT = 0.2  # s between two checks whether to end
@@ -75,6 +75,7 @@ class Node:
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
         self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
+        self._beat = TRANSFORM_PERIOD_NS / NS if options.publish_tf else BEAT
         participant = connect(options.domain)
         # Not in a cycle of references: the garbage collector would leave the endpoints of DDS open.
         node = weakref.ref(self)
@@ -82,7 +83,7 @@ class Node:
         prefix = f"{options.namespace.strip('/')}/" if options.namespace else ""
         names = prefix, options.hardware_id or options.namespace.strip("/")
         self._health = Health(self._topics.diagnostics, self._topics.status, names, log)
-        self._silence = Silence(options, self._topics, self._health.note)
+        self._inputs = Inputs(options, self._topics, self._odometry, self._health.remind)
         self._localization = Localization(options, self._topics, self._health, self._frames, self._odometry)
         self._waiting = Waiting(participant, self._topics.subscriptions)
         self._searcher = Searcher(search_options(options), self._waiting.wake)
@@ -99,7 +100,7 @@ class Node:
         """Search scans until `end` is called."""
         while not self._ended:
             left = self._gathering.left
-            self._waiting.wait(BEAT if left is None else min(BEAT, left + MARGIN))
+            self._waiting.wait(self._beat if left is None else min(self._beat, left + MARGIN))
             self.turn()
 
     def end(self) -> None:
@@ -135,13 +136,23 @@ class Node:
         self._turn_results()
         self._localization.publish_initial()
         self._turn_scans()
-        self._health.beat(self._state, current_time(), self._localization.values)
+        if not self._inputs.transform_stops:
+            self._localization.publish_transform()
+        state, doubt = self._state, self._inputs.doubt
+        if state is State.AGREED and doubt:
+            state = State.STALE
+        values = {**self._localization.values, **self._inputs.values}
+        self._health.beat(state, current_time(), values, doubt)
 
     def _turn_transforms(self) -> None:
         for topic in self._topics.transforms:
             for message in topic.take():
                 for problem in self._frames.take(message, static=topic.static, prefix=topic.prefix):
                     self._health.problem(f"{topic.subscription.name}: {problem}")
+                frame = self._options.frame(self._options.odom_frame)
+                newest = self._frames.newest(frame, self._options.base_of(frame))
+                if newest is not None:
+                    self._odometry.take_transform(*newest, frame)
         for pose in self._topics.amcl.take():
             try:
                 self._localization.take_localizer(pose)
@@ -153,7 +164,7 @@ class Node:
             return
         for maps in self._topics.maps:
             for grid in maps.take():
-                self._silence.map()
+                self._inputs.map()
                 self._converter.take(grid)
         converted = self._converter.result()
         if converted is None:
@@ -171,7 +182,7 @@ class Node:
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
             for scan in scans.take()[-1:]:
-                self._silence.scan()
+                self._inputs.scan(scan)
                 if self._options.together_s > 0.0:
                     self._gathering.take(topic, scan)
                 else:
@@ -181,7 +192,7 @@ class Node:
             self._next[0] = ready
         while self._next and not self._searcher.busy:
             self._search(self._next.pop(next(iter(self._next))))
-        self._silence.look()
+        self._inputs.look()
 
     def _turn_results(self) -> None:
         """Take results; each waits until odometry has reached its stamp, or long enough.
@@ -201,12 +212,16 @@ class Node:
             self._take_result(found)
 
     def _take_odometry(self, message: Odometry) -> None:
+        name, frame = self._topics.odometry.name, message.header.frame_id.strip("/")
         try:
-            self._odometry.take(message, self._child_from_base(message.child_frame_id))
+            if self._maps is not None and frame in self._maps.frames.values():
+                raise FrameError(
+                    f"found odometry in {quoted(frame)}, the frame of the map, expected a frame of its own, such as "
+                    "odom; choose another topic with --odom"
+                )
+            self._odometry.take(message, self._child_from_base(message.child_frame_id), name)
         except ValueError as error:  # those of the libraries are such, too
-            self._health.problem(f"{self._topics.odometry.name}: {error}", message.header.stamp)
-            return
-        self._localization.publish_transform()
+            self._health.problem(f"{name}: {error}", message.header.stamp)
 
     def _child_from_base(self, child: str) -> linefix.RigidTransform:
         """Return where the base is in the child frame of odometry."""
@@ -241,7 +256,7 @@ class Node:
                 self._health.warn(f"{quoted(look.frame)}: {note}", stamp, f"{code} {look.frame}")
         self._searched = bool(looks)
         if looks:
-            self._silence.searched()
+            self._inputs.searched()
             self._searcher.submit(self._maps.index, looks, self._generation)
 
     def _take_result(self, found: Found) -> None:
@@ -256,7 +271,7 @@ class Node:
             pose = stamped_pose(located.stamp, located.pose, located.covariance, frame)
             self._topics.pose.publish(pose)
         self._topics.markers.publish(answer_marker(located, frame))
-        self._localization.take(located)
+        self._localization.take(located, self._inputs.received)
         self._health.publish("scan", located.stamp, verdict_of(located), values_of(located, milliseconds))
 
     @property

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import bisect
 import math
+import time
 from collections import deque
 from dataclasses import dataclass
 
+from formats.logs.tracks import Known, Track
 from registration import IDENTITY, RigidTransform
 
 from .messages import Odometry, Time
-from .transforms import NS, matrix_of, planar
-from .tuning import CLOCK_BACK_NS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
+from .transforms import NS, Floats, matrix_in_space, matrix_of, planar
+from .tuning import ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
+TRANSFORMS = "tf"  # as a source
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,22 +40,24 @@ def nanoseconds(stamp: Time) -> int:
 
 
 class OdometryHistory:
-    """The newest poses and speeds of the robot in its odometry frame.
+    """The newest poses and speeds of the robot in its odometry frame, by messages or else by transforms.
 
     Attributes
     ----------
     frame : str
-        The odometry frame; empty before the first message.
+        The odometry frame; empty before the first value.
+    source : str
+        The topic; empty before the first value.
     """
 
     def __init__(self) -> None:
-        self.frame = ""
-        self._stamps: deque[int] = deque(maxlen=KEPT)
-        self._poses: deque[RigidTransform] = deque(maxlen=KEPT)
-        self._speeds: deque[Speed] = deque(maxlen=KEPT)
+        self.frame = self.source = ""
+        self._track = Track(static=False, most=KEPT)
+        self._speeds: deque[tuple[int, Speed]] = deque(maxlen=KEPT)
+        self._received = 0  # the newest value, by `time.monotonic_ns`
 
-    def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY) -> None:
-        """Take a message; when the clock is set back, as when a bag is played again, all before is forgotten.
+    def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY, topic: str = "odometry") -> None:
+        """Take a message; messages go before transforms.
 
         Parameters
         ----------
@@ -61,15 +65,14 @@ class OdometryHistory:
             Of its child frame, twist as well.
         child_from_base : RigidTransform
             Pose of the base frame in the child frame.
+        topic : str
 
         Raises
         ------
         ValueError
             When it is no pose, or no speed.
         """
-        pose, twist = message.pose.pose, message.twist.twist
-        place, turn = pose.position, pose.orientation
-        matrix = matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w))
+        matrix, twist = matrix_of(message.pose.pose.position, message.pose.pose.orientation), message.twist.twist
         speed = Speed(twist.linear.x, twist.linear.y, twist.angular.z)
         if not (math.hypot(speed.vx, speed.vy) <= MAX_SPEED and abs(speed.omega) <= MAX_TURN_RATE):
             raise ValueError(
@@ -77,60 +80,70 @@ class OdometryHistory:
                 f"expected at most {MAX_SPEED:g} m/s and {MAX_TURN_RATE:g} rad/s"
             )
         stamp = nanoseconds(message.header.stamp)
-        if self._stamps and stamp <= self._stamps[-1]:
-            if self._stamps[-1] - stamp <= CLOCK_BACK_NS:
-                return  # out of order
-            self._stamps.clear()
-            self._poses.clear()
+        self._add(stamp, matrix @ matrix_in_space(child_from_base), message.header.frame_id.strip("/"), topic)
+        if self._speeds and stamp < self._speeds[-1][0]:
             self._speeds.clear()
-        self.frame = message.header.frame_id.strip("/")
-        self._stamps.append(stamp)
-        self._poses.append(planar(matrix)[0].compose(child_from_base))
-        self._speeds.append(speed.carried(child_from_base))
+        self._speeds.append((stamp, speed.carried(child_from_base)))
+
+    def take_transform(self, stamp: int, odom_from_base: Floats, frame: str) -> None:
+        """Take a pose of the tree of frames, where no message has come for some time."""
+        if self.source == TRANSFORMS and self._track.newest[0] == stamp:
+            return
+        if self.source in ("", TRANSFORMS) or self.silent_s > ENDED_SECONDS:
+            self._add(stamp, odom_from_base, frame, TRANSFORMS)
+
+    def _add(self, stamp: int, odom_from_base: Floats, frame: str, source: str) -> None:
+        if (frame, source) != (self.frame, self.source):
+            self.frame, self.source, self._track = frame, source, Track(static=False, most=KEPT)
+        self._received = time.monotonic_ns()
+        self._track.add(stamp, odom_from_base, received=self._received)
 
     @property
     def newest(self) -> tuple[int, RigidTransform] | None:
-        """The newest time, nanoseconds, and odom_from_base at it."""
-        return (self._stamps[-1], self._poses[-1]) if self._stamps else None
+        """The time now by the clock of odometry, nanoseconds, and the newest odom_from_base; None where it ended."""
+        if not len(self._track) or self.silent_s > ENDED_SECONDS:
+            return None
+        stamp, matrix = self._track.newest
+        return stamp + time.monotonic_ns() - self._received, planar(matrix)[0]
+
+    @property
+    def silent_s(self) -> float:
+        """Seconds since the newest value was received; infinite where none was."""
+        return (time.monotonic_ns() - self._received) / NS if len(self._track) else math.inf
+
+    @property
+    def jump(self) -> str:
+        """The last step that is not possible, as a text, until a while after; empty where there is none."""
+        jumps = self._track.jumps if len(self._track) else []
+        return str(jumps[-1]) if jumps and self._track.newest[0] - jumps[-1].end < ENDED_SECONDS * NS else ""
+
+    def clock_offset(self, stamp: int, received: int) -> float:
+        """Return how many seconds longer after its stamp a scan was received than odometry was; 0 without odometry."""
+        return (received - stamp - self._track.latency(stamp, received)) / NS if len(self._track) else 0.0
 
     def awaited(self, stamp: Time) -> bool:
         """Return whether odometry arrives, but has not reached a stamp."""
-        behind = nanoseconds(stamp) - self._stamps[-1] if self._stamps else 0
-        return 0 < behind <= STALE_NS
+        return bool(len(self._track)) and 0 < nanoseconds(stamp) - self._track.newest[0] <= STALE_NS
 
     def speed(self, at: int) -> Speed | None:
         """Return the speed of the robot at a time, nanoseconds; None where it is not known."""
-        after = bisect.bisect_left(self._stamps, at)
-        near = range(max(0, after - 1), min(after + 1, len(self._stamps)))
-        nearest = min(near, key=lambda k: abs(self._stamps[k] - at), default=None)
-        if nearest is None or abs(self._stamps[nearest] - at) > FRESH_NS:
-            return None
-        return self._speeds[nearest]
+        stamp, speed = min(self._speeds, key=lambda one: abs(one[0] - at), default=(0, None))
+        return speed if abs(stamp - at) <= FRESH_NS else None
 
     def between(self, begin: int, end: int) -> RigidTransform | None:
         """Return where the robot was at `end`, relative to where it was at `begin`; None where that is not known.
 
-        Times are in nanoseconds.
+        Times are in nanoseconds. At the ends of odometry it is taken to rest for a while.
         """
         if begin == end:
             return IDENTITY
-        a, b = self.at(begin), self.at(end)
-        return None if a is None or b is None else a.inverse().compose(b)
+        a, b = (self._track.at(one) if len(self._track) else None for one in (begin, end))
+        return None if a is None or b is None else planar(a)[0].inverse().compose(planar(b)[0])
 
     def step(self, begin: Time, end: Time) -> RigidTransform | None:
         """Return `between` of two stamps of messages."""
         return self.between(nanoseconds(begin), nanoseconds(end))
 
-    def at(self, stamp: int) -> RigidTransform | None:
-        """Return odom_from_base at a time, nanoseconds; None where it is not known."""
-        if not self._stamps:
-            return None
-        after = bisect.bisect_left(self._stamps, stamp)
-        if after in (0, len(self._stamps)):
-            end = min(after, len(self._stamps) - 1)
-            return self._poses[end] if abs(self._stamps[end] - stamp) <= STALE_NS else None
-        begin, end = self._stamps[after - 1], self._stamps[after]
-        a, b = self._poses[after - 1], self._poses[after]
-        fraction = (stamp - begin) / (end - begin)
-        step = a.inverse().compose(b)
-        return a.compose(RigidTransform(fraction * step.x, fraction * step.y, fraction * step.theta))
+    def known(self, stamp: int, received: int | None = None) -> Known | None:
+        """Return odom_from_base of something with a stamp and a time of reception; None where it is not known."""
+        return self._track.known(stamp, received) if len(self._track) else None

@@ -51,6 +51,8 @@ class NodeOptions:
         Least standard deviations of ``initialpose``, metres and radians: less collapses the particles of AMCL.
     publish_tf : bool
         Publish the transform from the map to `odom_frame`.
+    tf_max_age_s : float
+        Stop the transform this long after the last scan with ranges, seconds; 0: never.
     domain : int
         ``ROS_DOMAIN_ID``.
     hardware_id : str
@@ -74,6 +76,7 @@ class NodeOptions:
     min_sigma: float = 0.05
     min_sigma_theta: float = 0.0349  # 2 degrees
     publish_tf: bool = False
+    tf_max_age_s: float = 0.0
     domain: int = 0
     hardware_id: str = ""
 

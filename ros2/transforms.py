@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from formats.logs import transforms
 from formats.logs.sensors import tilt_of
 from formats.logs.tuning import MOST_TILT
 from registration import RigidTransform
 
 from .messages import TransformStamped
 from .names import MAX_NAME, quoted
-from .tuning import LEVEL_TILT, MAX_COORDINATE, MAX_MOUNT, QUATERNION_TOLERANCE
+from .tuning import LEVEL_TILT, MAX_MOUNT
 
 Floats = NDArray[np.float64]
 
@@ -95,36 +97,27 @@ def planar(matrix: Floats) -> tuple[RigidTransform, bool, float]:
     float
         Radians between the planes x, y of both frames, 0 to pi / 2.
     """
-    heading = math.atan2(matrix[1, 0], matrix[0, 0])
-    return RigidTransform(float(matrix[0, 3]), float(matrix[1, 3]), heading), bool(matrix[2, 2] < 0.0), tilt_of(matrix)
+    return *transforms.planar(matrix), tilt_of(matrix)
 
 
-def matrix_of(x: float, y: float, z: float, quaternion: tuple[float, float, float, float]) -> Floats:
-    """Return the homogeneous matrix of a translation (m) and a quaternion (x, y, z, w).
+def matrix_of(position: Any, orientation: Any) -> Floats:
+    """Return the homogeneous matrix of a position and a quaternion of a message.
 
     Raises
     ------
     FrameError
         When a number is not finite or too large, or the quaternion does not have length 1.
     """
-    if not all(abs(one) <= MAX_COORDINATE for one in (x, y, z)):
-        raise FrameError(
-            f"found the translation ({x:.4g}, {y:.4g}, {z:.4g}), expected metres, at most {MAX_COORDINATE:g} m; "
-            "correct the publisher"
-        )
-    length = math.hypot(*quaternion) if all(map(math.isfinite, quaternion)) else math.nan
-    if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
-        found = ", ".join(f"{one:.4g}" for one in quaternion)
-        raise FrameError(f"found the quaternion ({found}), expected one of length 1; correct the publisher")
-    a, b, c, w = (one / length for one in quaternion)
-    matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (b * b + c * c), 2 * (a * b - c * w), 2 * (a * c + b * w)],
-        [2 * (a * b + c * w), 1 - 2 * (a * a + c * c), 2 * (b * c - a * w)],
-        [2 * (a * c - b * w), 2 * (b * c + a * w), 1 - 2 * (a * a + b * b)],
-    ]
-    matrix[:3, 3] = x, y, z
-    return matrix
+    try:
+        return transforms.matrix_of(position, orientation)
+    except ValueError as error:
+        raise FrameError(f"{error}; correct the publisher") from None
+
+
+def matrix_in_space(pose: RigidTransform) -> Floats:
+    """Return a pose in the plane as a homogeneous matrix, (4, 4)."""
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    return np.array([[c, -s, 0.0, pose.x], [s, c, 0.0, pose.y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def matrix_of_message(transform: TransformStamped) -> Floats:
@@ -147,8 +140,7 @@ def matrix_of_message(transform: TransformStamped) -> Floats:
         raise FrameError(
             f"{named} makes the frame its own parent, expected two different frames; correct the publisher"
         )
-    place, turn = transform.transform.translation, transform.transform.rotation
     try:
-        return matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w))
+        return matrix_of(transform.transform.translation, transform.transform.rotation)
     except FrameError as error:
         raise FrameError(f"{named} is not used: {error}") from None

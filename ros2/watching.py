@@ -66,8 +66,7 @@ class Watch:
         FrameError
             When it is no pose.
         """
-        place, turn = message.pose.pose.position, message.pose.pose.orientation
-        pose, _, _ = planar(matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w)))
+        pose, _, _ = planar(matrix_of(message.pose.pose.position, message.pose.pose.orientation))
         covariance = np.reshape(np.asarray(message.pose.covariance, dtype=np.float64), (6, 6))[np.ix_(PLANAR, PLANAR)]
         self._amcl = _Estimate(nanoseconds(message.header.stamp), pose, _valid(covariance))
 

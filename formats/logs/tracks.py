@@ -222,10 +222,12 @@ class Track:
 
     def known(self, stamp: int, received: int | None = None) -> Known | None:
         """Return the value at a time as odometry; None where that is not known."""
-        if self.static or not self.moves:
-            matrix = self.at(stamp, received)
-            return None if matrix is None else Known(matrix)
+        if self.static:
+            return Known(self.newest[1])
         number = self._number(stamp, received)
+        if not self.moves:
+            matrix = self.at(stamp, received)
+            return None if matrix is None else Known(matrix, (self._dropped + number, 0))
         part = self._parts[number]
         if received is not None and abs(received - stamp - part.latency(stamp)) > CLOCKS_APART_NS:
             return None

@@ -117,11 +117,11 @@ def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
 
 def test_odometry_is_interpolated_and_forgotten() -> None:
     told = OdometryHistory()
-    begin, end = messages.Time(5, 0), messages.Time(5, 500_000_000)
+    begin, end = messages.Time(5, 0), messages.Time(5, 250_000_000)
     assert told.step(begin, begin) == HERE
     assert told.step(begin, end) is None
     told.take(odometry(5, 0, HERE))
-    told.take(odometry(6, 0, linefix.RigidTransform(1.0, 0.0, 0.4)))
+    told.take(odometry(5, 500_000_000, linefix.RigidTransform(1.0, 0.0, 0.4)))
     half = told.step(begin, end)
     assert half is not None
     assert (half.x, half.y, half.theta) == pytest.approx((0.5, 0.0, 0.2))

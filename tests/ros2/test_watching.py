@@ -22,8 +22,8 @@ MAP_FROM_ODOM = RigidTransform(2.0, 1.0, 0.5)
 NAMES = "map", "odom"
 
 
-def stamped(second: float) -> messages.Header:
-    return messages.Header(messages.Time(int(second), int(1e9 * (second % 1.0))), "map")
+def stamped(second: float, frame: str = "map") -> messages.Header:
+    return messages.Header(messages.Time(*divmod(round(second * SECOND), SECOND)), frame)
 
 
 def amcl(second: float, pose: RigidTransform, sigma: float = 0.1) -> messages.PoseWithCovarianceStamped:
@@ -34,9 +34,10 @@ def amcl(second: float, pose: RigidTransform, sigma: float = 0.1) -> messages.Po
 
 def history() -> OdometryHistory:
     odometry = OdometryHistory()
-    for k in range(11):
-        message = messages.Odometry(messages.Header(messages.Time(k), "odom"), "base_link")
-        message.pose.pose = messages.Pose(messages.Point(0.3 * k), quaternion(0.0))
+    for k in range(51):
+        second = k / 5.0
+        message = messages.Odometry(stamped(second, "odom"), "base_link")
+        message.pose.pose = messages.Pose(messages.Point(0.3 * second), quaternion(0.0))
         odometry.take(message)
     return odometry
 
@@ -113,5 +114,5 @@ def test_a_covariance_that_is_none_ends_nothing(entry: float) -> None:
 
 
 def test_a_pose_that_is_none_is_refused() -> None:
-    with pytest.raises(FrameError, match="expected metres"):
+    with pytest.raises(FrameError, match="expected a position"):
         Watch().take(amcl(7.0, RigidTransform(1e300, 0.0, 0.0)))

@@ -22,7 +22,7 @@ BEST_EFFORT = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Pol
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Look for missing input after 0.1 s."""
-    monkeypatch.setattr("ros2.silence.SILENT_SECONDS", 0.1)
+    monkeypatch.setattr("ros2.inputs.SILENT_SECONDS", 0.1)
 
 
 def wait_for(logged: list[str], expected: str, play: Callable[[], None] = lambda: None) -> None:

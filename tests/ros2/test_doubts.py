@@ -1,0 +1,147 @@
+"""What is not known is not believed: odometry that is missing or contradicts itself, scans that end."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import pytest
+
+import linefix
+from ros2 import NodeOptions, messages
+from ros2.odometry import OdometryHistory
+from ros2.transforms import matrix_in_space
+
+from .robot import is_at_truth, mount, quaternion, running, scan, wait_until
+from .test_agreement import STRAIGHT, drive, first_agreed
+from .test_fleet import Fleet, moved
+
+TENTH = 100_000_000
+
+
+def told(stamp: int, x: float, frame: str = "odom") -> messages.Odometry:
+    message = messages.Odometry(messages.Header(messages.Time(*divmod(stamp, 10 * TENTH)), frame), "base_link")
+    message.pose.pose = messages.Pose(messages.Point(x), quaternion(0.0))
+    return message
+
+
+def test_odometry_is_known_between_values_that_are_near_and_possible() -> None:
+    odometry = OdometryHistory()
+    for k in (*range(20), *range(50, 60)):
+        odometry.take(told(k * TENTH, 0.1 * k))
+    before, after = odometry.known(15 * TENTH), odometry.known(55 * TENTH)
+    assert before is not None
+    assert after is not None
+    assert before.part == after.part
+    assert after.unknown_ns - before.unknown_ns == 31 * TENTH
+    assert odometry.known(30 * TENTH) is None
+    assert odometry.known(60 * TENTH) is None
+    assert not odometry.jump
+    odometry.take(told(59 * TENTH + TENTH // 10, 4.9))
+    assert odometry.jump.startswith("1.00 m within 0.010 s")
+    assert odometry.known(57 * TENTH) is None
+
+
+def test_odometry_of_another_clock_is_not_known() -> None:
+    odometry = OdometryHistory()
+    for k in range(20):
+        odometry.take(told(k * TENTH, 0.1 * k))
+    now = time.monotonic_ns()
+    offset = odometry.clock_offset(15 * TENTH, now)
+    same = now - round(1e9 * offset)
+    assert odometry.known(15 * TENTH, same) is not None
+    assert odometry.known(15 * TENTH, same + 8 * TENTH) is None
+
+
+def test_transforms_are_odometry_until_messages_come() -> None:
+    odometry = OdometryHistory()
+    odometry.take_transform(TENTH, matrix_in_space(linefix.RigidTransform(1.0, 2.0, 0.5)), "odom")
+    assert (odometry.frame, odometry.source) == ("odom", "tf")
+    assert odometry.newest is not None
+    assert odometry.newest[1].y == 2.0
+    odometry.take(told(2 * TENTH, 7.0), topic="/odom")
+    odometry.take_transform(3 * TENTH, matrix_in_space(linefix.RigidTransform(1.0, 2.0, 0.5)), "odom")
+    assert odometry.source == "/odom"
+    assert odometry.newest[1].x == 7.0
+
+
+def test_a_slow_robot_without_odometry_does_not_rest() -> None:
+    slow = [linefix.RigidTransform(0.02 * k, 0.0, 0.0) for k in range(100)]  # 0.05 m/s
+    assert first_agreed(drive(slow, odometry=False)) is None
+
+
+def test_scans_of_different_parts_of_odometry_do_not_agree() -> None:
+    assert first_agreed([replace(one, part=(k,)) for k, one in enumerate(drive(STRAIGHT))]) is None
+
+
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ros2.inputs.ENDED_SECONDS", "ros2.inputs.SILENT_SECONDS"):
+        monkeypatch.setattr(name, 1.0)
+
+
+@pytest.mark.parametrize("seen", [None, False], ids=["no scans", "no ranges"])
+def test_a_pose_without_scans_is_stale_and_its_transform_ends(
+    domain: int, room: linefix.MapIndex, soon: None, seen: bool | None
+) -> None:
+    logged: list[str] = []
+    options = NodeOptions(domain=domain, agree=1, publish_tf=True, tf_max_age_s=1.0)
+    with running(options, room, logged.append):
+        robot, second = Fleet(domain), [1.0]
+        robot.mounts.publish(mount())
+
+        def drives() -> None:
+            second[0] += 0.05
+            robot.drive(moved(1.0 + 0.001 * second[0]), second[0])
+
+        robot.until(robot.transforms, drives)
+        robot.status.take()
+
+        def blind() -> None:
+            second[0] += 0.05
+            still = told(round(1e9 * second[0]), moved(1.0).x + 1.0)
+            still.pose.pose.position.y = moved(1.0).y
+            robot.odometry.publish(still)
+            if seen is not None:
+                empty = scan(1, seen=seen)
+                empty.header.stamp = still.header.stamp
+                robot.scans.publish(empty)
+
+        stale = robot.until(robot.status, blind, lambda one: "not confirmed any more" in one.message)
+        assert stale.level == 2
+        expected = "no scan arrives on /scan" if seen is None else "no scan has a range"
+        assert expected in stale.message
+        assert {one.key: one.value for one in stale.values}["input problem"].startswith(expected)
+        wait_until(lambda: not (blind(), time.sleep(0.5), robot.transforms.take())[2], lambda: logged)
+        assert any(line.startswith("state stale") for line in logged)
+        robot.until(robot.status, drives, lambda one: one.message == "the pose is agreed")
+
+
+def test_missing_odometry_is_logged_and_that_of_the_map_frame_is_refused(
+    domain: int, room: linefix.MapIndex, soon: None
+) -> None:
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain, publish_tf=True), room, logged.append):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        robot.until(robot.poses, lambda: robot.scans.publish(scan(1)), is_at_truth)
+        for k in range(30):
+            robot.odometry.publish(told(k * TENTH, 0.1 * k, "map"))
+        wait_until(lambda: any("no odometry: no message on /odom" in line for line in logged), lambda: logged)
+        refused = [line for line in logged if 'found odometry in "map", the frame of the map' in line]
+        assert len(refused) == 1
+        assert robot.transforms.take() == []
+
+
+def test_the_same_problem_with_other_numbers_is_logged_once(domain: int, room: linefix.MapIndex) -> None:
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain), room, logged.append):
+        robot = Fleet(domain)
+        robot.connect()
+        for k in range(30):
+            message = told(k * TENTH, float("nan"))
+            message.pose.pose.position.y = 0.1 * k
+            robot.odometry.publish(message)
+        wait_until(lambda: any("expected a position" in line for line in logged), lambda: logged)
+        time.sleep(0.3)
+    assert len([line for line in logged if "/odom" in line]) == 1
