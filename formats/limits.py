@@ -24,6 +24,7 @@ MAX_YAML_VALUES = 100_000  # that a YAML stands for, aliases counted each time
 MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2
 MAX_TRANSFORMS = 2_000_000  # of a bag, kept while its scans are read
 MAX_UNITS = 1e13  # coordinates of a drawing
+MAX_COORDINATE = 1e9  # m, of a curve of a DXF; farther away its pieces would be without number
 MAX_TEXT = 200  # characters of a name taken from a file
 MAX_NAMED = 10  # names in one message
 

@@ -22,7 +22,7 @@ from ezdxf.lldxf.const import DXFError
 
 from ..errors import FormatError, MalformedFileError, TooLargeError, UnsupportedFormatError
 from ..files import name_of, read_bounded
-from ..limits import MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
+from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
 from ..options import US_FOOT, ImportOptions
 from ..report import Notes, listed, shown
 from .drawing import Drawing
@@ -172,26 +172,30 @@ def _properties(placed: Placed) -> dict[str, str]:
 
 
 def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
-    entity, layer, kind = placed.entity, placed.layers[-1], placed.entity.dxftype()
+    entity, kind = placed.entity, placed.entity.dxftype()
     mesh = isinstance(entity, Polyline) and not (entity.is_2d_polyline or entity.is_3d_polyline)
     if kind not in LINES or mesh:
         drawing.drop("POLYLINE of a mesh" if mesh else kind, hint=_hint(kind))
         return
     try:
         curve = ezpath.make_path(_without_frame(entity))
-        points = list(islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1))
+        reach = max((abs(value) for point in curve.control_vertices() for value in point.xyz), default=0.0)
+        near = reach <= MAX_COORDINATE / SAGITTA * sagitta
+        points = list(islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)) if near else []
         width = max(0.0, _width(entity))
         parts = shown_parts(points, placed.clips) if len(points) <= MAX_CURVE_POINTS else []
     except BROKEN as error:
-        handle = shown(str(entity.dxf.get("handle", None) or "of a block"))
         raise MalformedFileError(
-            f"has a broken {kind} on layer {shown(layer)}, handle {handle}; delete it, or repair the drawing (AUDIT)",
-            argument=drawing.name,
+            f"has a broken {_named(placed)}; delete it, or repair the drawing (AUDIT)", argument=drawing.name
         ) from error
+    if not near:
+        raise TooLargeError(
+            f"has coordinates beyond {MAX_COORDINATE:g} m: {_named(placed)}; delete it, or set the option units",
+            argument=drawing.name,
+        )
     if len(points) > MAX_CURVE_POINTS:
         raise TooLargeError(
-            f"expected at most {MAX_CURVE_POINTS} points of a curve, found {len(points)}; simplify the curve on layer "
-            f"{shown(layer)}",
+            f"expected at most {MAX_CURVE_POINTS} points of a curve, found more; simplify the {_named(placed)}",
             argument=drawing.name,
         )
     if placed.clips and (len(parts) != 1 or len(parts[0]) < len(points)):
@@ -200,6 +204,12 @@ def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
         drawing.add(part, width=width, layers=placed.layers)
     if parts:
         drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
+
+
+def _named(placed: Placed) -> str:
+    """Return the kind, the layer and the handle of an entity."""
+    handle = shown(str(placed.entity.dxf.get("handle", None) or "of a block"))
+    return f"{placed.entity.dxftype()} on layer {shown(placed.layers[-1])}, handle {handle}"
 
 
 def _without_frame(entity: DXFEntity) -> DXFEntity:

@@ -57,6 +57,25 @@ def test_binary_files_that_are_cut_off(tmp_path: Path, kept: int) -> None:
         read_map(tmp_path / "plan.dxf", ImportOptions(units="m"))
 
 
+@pytest.mark.parametrize("size", [1e10, 1e15, 1e300])
+@pytest.mark.parametrize("kind", ["CIRCLE", "SPLINE", "block"])
+def test_a_curve_that_cannot_be_drawn_is_refused_before_it_is_cut_into_pieces(
+    tmp_path: Path, kind: str, size: float
+) -> None:
+    document = drawn()
+    block = document.blocks.new("WING")
+    block.add_circle((0, 0), 1.0)
+    if kind == "CIRCLE":
+        document.modelspace().add_circle((0, 0), size)
+    elif kind == "SPLINE":
+        document.modelspace().add_open_spline([(0, 0), (size, 1), (5, size), (3, 3)])
+    else:
+        document.modelspace().add_blockref("WING", (0, 0), {"xscale": size, "yscale": size})
+    named = "CIRCLE" if kind == "block" else kind
+    with pytest.raises(TooLargeError, match=rf"plan.dxf: has coordinates beyond 1e\+09 m: {named} on layer 0, handle"):
+        read(tmp_path, document)
+
+
 def test_multilines(tmp_path: Path) -> None:
     """Both faces of a wall 0.3 m thick, at corners too, with its ends closed; in a block as well."""
     document = new(units=units.M)
