@@ -28,8 +28,8 @@ from linefix.documents.encoding import encode
 from linefix.documents.reading import read_model
 from linefix.documents.requests import AssociateRequest
 from service.database_location import database_url
-from service.maps import IndexCache, MapOutline, MapStore, Preconditions
-from service.maps.lookup import MapLookup
+from service.maps import IndexCache, MapOutline, MapStore
+from service.maps.lookup import FoundMap, MapLookup
 from service.parsing.parser_process import ParserProcess
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
@@ -179,15 +179,16 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
     limits, deadline = Settings().limits(), Deadline()
     with TemporaryDirectory() as folder:
         store = MapStore(database_url(f"sqlite:///{folder}/maps.sqlite3"))
-        store.put("m", asked.map, MapOutline(1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+        store.put("m", asked.map, MapOutline(1, 0, (0.0, 0.0, 1.0, 1.0)))
         lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, ParserProcess())
         associator = Associator(lookup, Metrics())
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
-        target = associator.target(wanted, lookup.find("m", oriented=None), deadline)
+        stored = store.load("m")
+        target = associator.target(wanted, FoundMap(stored.record, stored.document), deadline)
         answer = associator.find(target, wanted, wanted.options, deadline)
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),
-            "look-up of the map": partial(lookup.find, "m", oriented=None),
+            "look-up of the map": partial(store.record_at_once, "m"),
             "encoding": partial(encode, answer),
             "an empty search": partial(associator.find, target, empty, empty.options, deadline),
         }

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map, read_stored
-from service.maps import MapStore, Preconditions
+from service.maps import MapStore
 from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.maps.lookup import outline_of
 from service.settings import Settings
@@ -37,7 +37,7 @@ class StoredMaps:
         with refusing(), _reaching(map_id):
             asked, kept = read_map(orjson.dumps(document), self._settings.limits())
             outline = outline_of(asked)
-            revision, _ = self._store.put(map_id, kept, outline, Preconditions())
+            revision, _ = self._store.put(map_id, kept, outline)
             return outline.as_json(map_id, revision)
 
     def get(self, map_id: str) -> Json:
@@ -58,13 +58,13 @@ class StoredMaps:
         while after is not None:
             with _reaching():
                 page = self._store.list(MAPS_AT_ONCE, after)
-            yield from (one.outline.as_json(one.map_id, one.revision) for one in page.maps)
+            yield from (one.as_json() for one in page.maps)
             after = page.next
 
     def remove(self, map_id: str) -> None:
         """Remove a stored map."""
         with _reaching(map_id):
-            self._store.delete(map_id, Preconditions())
+            self._store.delete(map_id)
 
 
 def _settings() -> Settings:

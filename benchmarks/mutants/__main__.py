@@ -29,7 +29,7 @@ from .suites import SUITES, Suite, changed_lines, known_equivalents, suite_of
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "out" / "mutants"
 PACKAGES = ("registration", "vectorization", "service", "simulation", "map_quality", "association")
-LEFT_OUT = ("tuning.py", "layout.py", "migrations", "examples.py")
+LEFT_OUT = ("tuning.py", "layout.py", "examples.py")
 """Modules and folders of measured numbers or of names."""
 WITHOUT_EFFECT = re.compile(r"core/(RemoveDecorator|ReplaceBinaryOperator_BitOr_\w+|ExceptionReplacer)")
 """Operators whose mutants seldom differ at run time: `int | None` in annotations, decorators of kernels and caches."""

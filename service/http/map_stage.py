@@ -15,10 +15,9 @@ from linefix.documents.requests import AssociateRequest, BatchRequest
 
 from ..admission.errors import DeadlinePassedError, ForeignMapError
 from ..admission.ticket import Ticket
-from ..maps.cache import CachedMap
+from ..maps import CachedMap, CachedMaps
 from ..maps.errors import StoreAwayError
-from ..maps.lookup import FoundMap
-from ..maps.several import CachedMaps, FoundMaps
+from ..maps.lookup import FoundMap, FoundMaps
 from .exchange import Exchange
 from .services import Services
 
@@ -51,20 +50,20 @@ async def looking_up_map(
     if not asked.map_id.startswith(exchange.ticket.maps):
         raise ForeignMapError
     services = exchange.services
-    found = services.lookup.find_at_once(asked.map_id, oriented=oriented)
-    if found is not None:
-        yield found
+    store, lookup = services.store, services.lookup
+    record = store.record_at_once(asked.map_id)
+    if record is not None and lookup.is_cached(record, oriented=oriented):
+        yield FoundMap(record, None)
         return
-    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
-    find = partial(services.lookup.find, asked.map_id, oriented=oriented)
-    try:
-        async with asyncio.timeout(left):
-            found = await ask_store(services, find)
-    except TimeoutError:
-        raise DeadlinePassedError from None
+    record = await _ask_in_time(services, partial(store.record, asked.map_id), deadline)
+    if lookup.is_cached(record, oriented=oriented):
+        yield FoundMap(record, None)
+        return
     with services.documents.account(exchange.ticket.holder) as account:
-        account.take(len(found.document or b""))
-        yield found
+        account.take(record.size)
+        stored = await _ask_in_time(services, partial(store.load, asked.map_id), deadline)
+        account.take(stored.record.size - record.size)  # another revision may have come
+        yield FoundMap(stored.record, stored.document)
 
 
 @asynccontextmanager
@@ -82,13 +81,7 @@ async def looking_up_maps(
         isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked.maps
     ):
         raise ForeignMapError
-    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
-    try:
-        async with asyncio.timeout(left):
-            found = await ask_store(services, partial(services.lookup.find_together, asked.maps, prefix))
-    except TimeoutError:
-        raise DeadlinePassedError from None
-    yield found
+    yield await _ask_in_time(services, partial(services.lookup.find_together, asked.maps, prefix), deadline)
 
 
 async def index_map(
@@ -100,15 +93,29 @@ async def index_map(
     """
     services = exchange.services
     call: Callable[[], CachedMap | CachedMaps]
+    held = 0
     if isinstance(source, FoundMaps):
         if services.lookup.are_cached(source, oriented=oriented):
             return None
+        held = source.largest_document
         call = partial(services.lookup.indexed_together, source, oriented=oriented, deadline=deadline)
     elif services.lookup.takes_long(source):
         call = partial(services.lookup.indexed, source, oriented=oriented, deadline=deadline)
     else:
         return None
-    return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)
+    with services.documents.account(exchange.ticket.holder) as account:
+        account.take(held)
+        return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)
+
+
+async def _ask_in_time(services: Services, call: Callable[[], T], deadline: Deadline) -> T:
+    """Return what the store returns, as `ask_store`; raise `DeadlinePassedError` when the deadline passes first."""
+    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+    try:
+        async with asyncio.timeout(left):
+            return await ask_store(services, call)
+    except TimeoutError:
+        raise DeadlinePassedError from None
 
 
 async def ask_store(services: Services, call: Callable[[], T]) -> T:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..telemetry.metrics import Metrics
 from .errors import IndexNotReadyError
-from .several import CachedMaps
 
 if TYPE_CHECKING:  # the store comes without what computes
-    from association import Deadline, MapIndex
+    from association import Deadline, MapIndex, MapSet
 
 ALONE = 2  # times the cache; the largest map takes that where its directions mean nothing
 LOOK_SECONDS = 0.05  # between two checks, while waiting for another's index, that the own client is still there
@@ -33,6 +32,24 @@ class CachedMap:
     def oriented(self) -> bool:
         """Return whether directions of its segments mean anything; else the index lists each segment both ways."""
         return len(self.index.segments) == self.index.directed
+
+
+@dataclass(frozen=True, slots=True)
+class CachedMaps:
+    """Several maps that are indexed together, with the frames that their poses are in."""
+
+    maps: MapSet
+    frame_ids: tuple[str, ...]
+    bytes: int
+
+    @property
+    def oriented(self) -> bool:
+        """Return whether directions of segments mean anything on all of the maps."""
+        return self.maps.oriented
+
+    def frame_of(self, map_id: str | None) -> str:
+        """Return the frame of a map; of the first where there is none."""
+        return self.frame_ids[0 if map_id is None else self.maps.ids.index(map_id)]
 
 
 Cached = CachedMap | CachedMaps

@@ -15,36 +15,47 @@ from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
-from .cache import CachedMap, IndexCache
+from .cache import CachedMap, CachedMaps, IndexCache
 from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
-from .records import MapOutline, MapRecord
-from .several import CachedMaps, FoundMaps
 from .store import MapStore
+from .tables import MapOutline, MapRecord
 
 OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
 LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
 LONG_BYTES = 100_000  # of the document of one
-MOST_TOGETHER = 200_000  # segments of several maps, as of one
+MOST_TOGETHER = 200_000  # segments of several maps, and points, as of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A stored map that is to be searched.
-
-    Attributes
-    ----------
-    record : MapRecord
-    document : bytes, or None
-        The document to be indexed; None where the map was in the cache.
-    """
+    """A stored map that is to be searched; its document is None where the map was in the cache."""
 
     record: MapRecord
     document: bytes | None
 
 
+@dataclass(frozen=True, slots=True)
+class FoundMaps:
+    """Several maps that are to be searched, by name: those in the request, and the records of stored ones."""
+
+    maps: tuple[tuple[str, InlineMap | MapRecord], ...]
+
+    @property
+    def largest_document(self) -> int:
+        """The bytes of the largest stored map: one is read after another."""
+        return max((one.size for _, one in self.maps if isinstance(one, MapRecord)), default=0)
+
+    def reference_to(self, map_id: str) -> dict[str, object]:
+        """Return id and revision of a map; the revision is None where the map came with the request."""
+        one = dict(self.maps)[map_id]
+        return {"map_id": map_id, "revision": one.revision if isinstance(one, MapRecord) else None}
+
+
 class MapLookup:
     """Finds the map that a request names or holds, indexed.
+
+    A stored map is looked up before every use, so that a change by another process is never missed.
 
     Parameters
     ----------
@@ -59,33 +70,9 @@ class MapLookup:
         self._store = store
         self._parser = parser
 
-    def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
-        """Look a stored map up, with its document where it is not indexed yet; runs in a thread that may wait.
-
-        `oriented` None: as the map states.
-
-        Looked up before every use, so that a change by another worker is never missed.
-
-        Raises
-        ------
-        StoreError
-            When no such map is stored, or it is damaged, or the store does not answer.
-        """
-        record = self._store.record(map_id)
-        if self._cache.has((record, is_oriented(oriented, record.oriented))):
-            return FoundMap(record, None)
-        stored = self._store.load(map_id)
-        return FoundMap(stored.record, stored.document)
-
-    def find_at_once(self, map_id: str, *, oriented: bool | None) -> FoundMap | None:
-        """Look up, without waiting for anybody, a map that is indexed; None where it takes a thread that may wait.
-
-        As sure to notice a change as `find`.
-        """
-        record = self._store.record_at_once(map_id)
-        if record is None or not self._cache.has((record, is_oriented(oriented, record.oriented))):
-            return None
-        return FoundMap(record, None)
+    def is_cached(self, record: MapRecord, *, oriented: bool | None) -> bool:
+        """Return whether a stored map is indexed; `oriented` None: as the map states."""
+        return self._cache.has((record, is_oriented(oriented, record.oriented)))
 
     def takes_long(self, asked: InlineMap | FoundMap) -> bool:
         """Return whether it may take long until a map is ready to be searched."""
@@ -94,12 +81,10 @@ class MapLookup:
         return asked.document is not None and len(asked.document) > LONG_BYTES
 
     def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
-        """Return a map ready to be searched.
+        """Return a map ready to be searched; runs off the event loop.
 
         Oriented and unoriented indices of a map are different ones, each with a place of its own in the cache.
         `oriented` None: as the map states. If another request indexes the same map, wait for it until the deadline.
-
-        Runs off the event loop.
 
         Raises
         ------
@@ -113,14 +98,16 @@ class MapLookup:
         """
         if isinstance(asked, FoundMap):
             directed = is_oriented(oriented, asked.record.oriented)
-            return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
+            key: Hashable = asked.record, directed
+            return self._cache.get(key, lambda: self._index(self.document(asked), directed), deadline)
         # Robots send the same map with every scan: its content is its name.
         directed = is_oriented(oriented, asked.oriented)
-        key = *_content(asked), directed
-        return self._cache.get(key, lambda: self._index(asked, directed), deadline)
+        return self._cache.get((*_content(asked), directed), lambda: self._index(asked, directed), deadline)
 
     def find_together(self, asked: Sequence[NamedMap | StoredMap] | MapPrefix, prefix: str) -> FoundMaps:
-        """Look several maps up; runs in a thread that may wait. `prefix` is that of all maps that the caller may use.
+        """Look several maps up, and count what is in them by their records; runs in a thread that may wait.
+
+        `prefix` is that of all maps that the caller may use.
 
         Raises
         ------
@@ -128,22 +115,18 @@ class MapLookup:
             When a map is not stored, or is damaged, or the store does not answer.
         InvalidRequestError
             When more maps than allowed have the prefix.
+        TooManyError
+            When there is more in the maps than may be searched together.
         """
-        if not isinstance(asked, MapPrefix):
+        if isinstance(asked, MapPrefix):
+            found = FoundMaps(tuple((one.map_id, one) for one in self._beginning(asked.prefix, prefix)))
+        else:
             records = (one if isinstance(one, NamedMap) else self._store.record(one.map_id) for one in asked)
-            return FoundMaps(tuple((one.map_id, one) for one in records))
-        both = sorted((asked.prefix, prefix), key=len)
-        if not both[1].startswith(both[0]):
-            raise UnknownMapError
-        page = self._store.list(MOST_MAPS, "", both[1])
-        if page.corrupt:
-            raise CorruptMapError
-        if page.next is not None:
-            message = f"found more than {MOST_MAPS} maps, expected at most that many; send a longer prefix"
-            raise InvalidRequestError([Fault("/maps/prefix", message)])
-        if not page.maps:
-            raise UnknownMapError
-        return FoundMaps(tuple((one.map_id, self._store.record(one.map_id)) for one in page.maps))
+            found = FoundMaps(tuple((one.map_id, one) for one in records))
+        for kind in ("segments", "points"):
+            if sum(_count(one, kind) for _, one in found.maps) > MOST_TOGETHER:
+                raise TooManyError("/maps", MOST_TOGETHER, f"{kind} of all maps together")
+        return found
 
     def are_cached(self, asked: FoundMaps, *, oriented: bool | None) -> bool:
         """Return whether several maps are indexed together already."""
@@ -158,27 +141,6 @@ class MapLookup:
         return self._cache.get(
             _key_together(asked, oriented), partial(self._index_together, asked, oriented, deadline), deadline
         )
-
-    def _index_together(self, asked: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMaps:
-        parts, frame_ids = {}, []
-        for number, (name, one) in enumerate(asked.maps):
-            if deadline.passed:
-                raise IndexNotReadyError
-            document = one if isinstance(one, InlineMap) else self._document(FoundMap(one, None))
-            segments = Segments.from_array(document.segments, argument=f"maps.{number}.segments")
-            directed, points = is_oriented(oriented, document.oriented), _points_of(document, f"maps.{number}.")
-            parts[name] = MapPart(segments, document.sigma, directed, points)
-            frame_ids.append(document.frame_id)
-        count = sum(len(part.segments) for part in parts.values())
-        if count > MOST_TOGETHER:
-            raise TooManyError("/maps", MOST_TOGETHER, "segments of all maps together")
-        count += sum(len(part.points) for part in parts.values())
-        self._cache.make_room(2 * INDEXED_BYTES * count)
-        try:
-            maps = MapSet(parts, deadline)
-        except IndexingEndedError:
-            raise IndexNotReadyError from None
-        return CachedMaps(maps, tuple(frame_ids), maps.nbytes + OVERHEAD)
 
     def index_once(self, asked: InlineMap, deadline: Deadline) -> MapIndex:
         """Return the index, with its directions, of a map that is not searched; it is not cached.
@@ -204,12 +166,6 @@ class MapLookup:
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         """
-        return self._document(found)
-
-    def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
-        return self._index(self._document(found), oriented)
-
-    def _document(self, found: FoundMap) -> MapDocument:
         document = found.document
         if document is None:
             stored = self._store.load(found.record.map_id)
@@ -220,12 +176,50 @@ class MapLookup:
             return self._parser.call(read_stored, document)
         return read_stored(document)
 
+    def _beginning(self, *prefixes: str) -> list[MapRecord]:
+        """Return the records of all maps whose ids begin with both prefixes."""
+        shorter, longer = sorted(prefixes, key=len)
+        if not longer.startswith(shorter):
+            raise UnknownMapError
+        page = self._store.list(MOST_MAPS, "", longer)
+        if page.corrupt:
+            raise CorruptMapError
+        if page.next is not None:
+            message = f"found more than {MOST_MAPS} maps, expected at most that many; send a longer prefix"
+            raise InvalidRequestError([Fault("/maps/prefix", message)])
+        if not page.maps:
+            raise UnknownMapError
+        return page.maps
+
+    def _index_together(self, asked: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMaps:
+        parts, frame_ids = {}, []
+        for number, (name, one) in enumerate(asked.maps):
+            if deadline.passed:
+                raise IndexNotReadyError
+            document = one if isinstance(one, InlineMap) else self.document(FoundMap(one, None))
+            segments = Segments.from_array(document.segments, argument=f"maps.{number}.segments")
+            directed, points = is_oriented(oriented, document.oriented), _points_of(document, f"maps.{number}.")
+            parts[name] = MapPart(segments, document.sigma, directed, points)
+            frame_ids.append(document.frame_id)
+        count = sum(len(part.segments) + len(part.points) for part in parts.values())
+        self._cache.make_room(2 * INDEXED_BYTES * count)
+        try:
+            maps = MapSet(parts, deadline)
+        except IndexingEndedError:
+            raise IndexNotReadyError from None
+        return CachedMaps(maps, tuple(frame_ids), maps.nbytes + OVERHEAD)
+
     def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
         # The old goes before the new comes: two of the largest at once would take too much.
         self._cache.make_room(INDEXED_BYTES * (len(asked.segments) * (1 if oriented else 2) + len(asked.points)))
         segments = Segments.from_array(asked.segments, argument="map.segments")
         index = MapIndex.build(segments, asked.sigma, oriented=oriented, points=_points_of(asked, "map."))
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
+
+
+def _count(one: InlineMap | MapRecord, kind: str) -> int:
+    """Return the number of segments, or points, of a map."""
+    return int(getattr(one.outline, kind)) if isinstance(one, MapRecord) else len(getattr(one, kind))
 
 
 def _key_together(asked: FoundMaps, oriented: bool | None) -> Hashable:
@@ -254,9 +248,8 @@ def outline_of(document: MapDocument) -> MapOutline:
     InvalidSegmentsError, InvalidMapError
         When it could not be searched.
     """
-    segments = Segments.from_array(document.segments, argument="segments")
-    # No negative zeros: not every database keeps them.
-    _points_of(document, "")
+    segments, points = Segments.from_array(document.segments, argument="segments"), _points_of(document, "")
     corners = MapIndex.require(segments, document.sigma, "")
+    # No negative zeros: not every database keeps them.
     (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in corners)
-    return MapOutline(len(segments), (left, bottom, right, top), document.sigma, document.oriented)
+    return MapOutline(len(segments), len(points), (left, bottom, right, top), document.sigma, document.oriented)

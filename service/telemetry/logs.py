@@ -101,6 +101,5 @@ def log_config(level: str) -> dict[str, Any]:
         "formatters": {"json": {"()": JsonFormatter}},
         "handlers": {"stderr": {"class": f"{__name__}.PatientHandler", "formatter": "json"}},
         "root": {"level": level.upper(), "handlers": ["stderr"]},
-        # At debug, Numba logs every pass of its compiler; Alembic logs each start without migrations.
-        "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
+        "loggers": {"numba": {"level": "WARNING"}},  # at debug, it logs every pass of its compiler
     }

@@ -17,8 +17,8 @@ from linefix.documents.parts import InlineMap, SearchOptions
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
 
 from ..admission.errors import DeadlinePassedError
-from ..maps import CachedMap, CachedMaps, FoundMaps
-from ..maps.lookup import FoundMap, MapLookup
+from ..maps import CachedMap, CachedMaps
+from ..maps.lookup import FoundMap, FoundMaps, MapLookup
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
 from .job import Done, Job

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -37,7 +36,7 @@ def traced(pid: int, log: Path) -> Iterator[None]:
 
 def steps(log: Path, folder: Path) -> list[str]:
     """Return what was done to the database and to callers, in the order of its completion."""
-    names = {"maps.sqlite3": "database", "maps.sqlite3-journal": "journal", "maps.sqlite3-wal": "log", "": "directory"}
+    names = {"maps.sqlite3": "database", "maps.sqlite3-journal": "journal", "": "directory"}
     found: list[str] = []
     unfinished: dict[str, str] = {}
     for line in log.read_text().splitlines():
@@ -70,16 +69,10 @@ def test_a_write_is_on_the_disk_before_it_is_acknowledged(start_service: Callabl
     print("\n" + ", ".join(found))
     answers = [i for i, step in enumerate(found) if step.startswith("answer")]
     assert [found[i] for i in answers] == ["answer 201", "answer 200", "answer 204"]
-    with sqlite3.connect(tmp_path / "maps.sqlite3") as connection:
-        ahead = connection.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
-    connection.close()
     begin = 0
     for end in answers:
         before = [step for step in found[begin:end] if step not in ("sync ", "unlink ")]
-        if ahead:
-            assert "sync log" in before
-        else:
-            # The commit is the end of the journal, so its directory is synced last.
-            assert before[-3:] == ["sync database", "unlink journal", "sync directory"]
-            assert "sync journal" in before[:-3]
+        # The commit is the end of the journal, so its directory is synced last.
+        assert before[-3:] == ["sync database", "unlink journal", "sync directory"]
+        assert "sync journal" in before[:-3]
         begin = end + 1

@@ -107,7 +107,7 @@ async def list_maps(
     exchange = begin(request)
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
-    items = [item.outline.as_json(item.map_id, item.revision) for item in page.maps]
+    items = [record.as_json() for record in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 

@@ -8,11 +8,14 @@ from contextlib import contextmanager
 from sqlalchemy import Engine, event, text
 
 from service.database_location import database_url
-from service.maps import MapOutline, MapStore, Preconditions
+from service.maps import MapOutline, MapStore
 from service.maps.database import open_engine
+from service.maps.store import ANY
 
-BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
-ANY = Preconditions()
+BOX = MapOutline(4, 0, (0.0, 0.0, 1.0, 1.0))
+
+
+__all__ = ["ANY", "BOX", "alter", "engine_of", "on_every", "opened"]
 
 
 @contextmanager

@@ -12,10 +12,12 @@ import pytest
 from linefix.documents import examples
 from service.app import create_app
 from service.database_location import database_url
-from service.maps import MapOutline, MapStore, Preconditions
+from service.maps import MapStore
 from service.maps.errors import StoreAwayError
 from service.settings import Settings
 from tests.running import RunningService, children_of, until
+
+from .stores import BOX
 
 
 def open_store(path: Path, *, may_make: bool = True) -> MapStore:
@@ -25,7 +27,7 @@ def open_store(path: Path, *, may_make: bool = True) -> MapStore:
 
 
 def put(store: MapStore) -> None:
-    store.put("m", b"{}", MapOutline(1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+    store.put("m", b"{}", BOX)
 
 
 def test_it_is_for_its_owner_alone(tmp_path: Path) -> None:

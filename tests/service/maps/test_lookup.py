@@ -15,9 +15,9 @@ from linefix.documents import examples
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap
 from registration import InputError
 from service.database_location import database_url
-from service.maps import CachedMap, IndexCache, MapOutline, MapStore, Preconditions
+from service.maps import CachedMap, IndexCache, MapOutline, MapStore
 from service.maps.errors import BusyStoreError, UnknownMapError
-from service.maps.lookup import OVERHEAD, MapLookup, outline_of
+from service.maps.lookup import OVERHEAD, FoundMap, MapLookup, outline_of
 from service.parsing.parser_process import LARGE, ParserProcess
 from service.telemetry.metrics import Metrics
 
@@ -38,12 +38,19 @@ class Lookup(MapLookup):
         found = self.find(asked.map_id, oriented=oriented)
         return self.indexed(found, oriented=oriented, deadline=Deadline()), found.record.revision
 
+    def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
+        """Find a stored map, with its document where it is not indexed."""
+        record = self.store.record(map_id)
+        if self.is_cached(record, oriented=oriented):
+            return FoundMap(record, None)
+        stored = self.store.load(map_id)
+        return FoundMap(stored.record, stored.document)
+
     def put(self, map_id: str, **parts: Any) -> None:
         self.store.put(
             map_id,
             orjson.dumps(parts),
-            MapOutline(6, (0.0, 0.0, 1.0, 1.0), None, parts.get("oriented")),
-            Preconditions(),
+            MapOutline(6, 0, (0.0, 0.0, 1.0, 1.0), None, parts.get("oriented")),
         )
 
 
@@ -117,21 +124,6 @@ def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
     assert (revision, second.frame_id, second.index.sigma) == (2, "new", 0.1)
 
 
-def test_what_is_indexed_is_found_at_once_as_it_is_now(lookup: Lookup) -> None:
-    assert lookup.find_at_once("m", oriented=None) is None
-    lookup.put("m", segments=examples.WALLS, oriented=False)
-    assert lookup.find_at_once("m", oriented=None) is None
-    lookup.look(StoredMap(map_id="m"), oriented=None)
-    assert lookup.find_at_once("m", oriented=None) == lookup.find("m", oriented=None)
-    assert lookup.find_at_once("m", oriented=True) is None  # another index, not requested yet
-    lookup.put("m", segments=examples.WALLS)
-    assert lookup.find_at_once("m", oriented=None) is None
-    lookup.look(StoredMap(map_id="m"), oriented=None)
-    found = lookup.find_at_once("m", oriented=None)
-    assert found is not None
-    assert found.record.revision == 2
-
-
 def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
     lookup.put("m", segments=examples.WALLS)
     load, changes = lookup.store.load, [1, 2]
@@ -177,7 +169,7 @@ def document(rows: object) -> MapDocument:
 
 def test_what_is_stored_has_a_count_and_bounds() -> None:
     found = outline_of(document([[-1.0, 2.0, 3.0, -0.0], [0.0, 0.0, 1.0, 5.0]]))
-    assert (found.segments, found.bounds) == (2, (-1.0, 0.0, 3.0, 5.0))
+    assert (found.segments, found.points, found.bounds) == (2, 0, (-1.0, 0.0, 3.0, 5.0))
     assert str(found.bounds[1]) == "0.0"  # not -0.0, which not every database keeps
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from service.database_location import database_url
-from service.maps import MapOutline, MapRecord, MapStore, MapSummary, Preconditions
+from service.maps import MapOutline, MapRecord, MapStore, Preconditions
 from service.maps.errors import (
     CorruptMapError,
     ReadOnlyStoreError,
@@ -18,20 +19,19 @@ from service.maps.errors import (
     StoreFullError,
     UnknownMapError,
 )
-from service.maps.records import columns_of
+from service.maps.tables import row_of
 
 from .stores import ANY, BOX, alter, opened
 
 
 def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
     assert store.put("m", b"one", BOX, ANY) == (1, True)
-    assert store.put("m", b"two", MapOutline(5, (-1.0, 0.1, 1e5, 1 / 3)), ANY) == (2, False)
+    assert store.put("m", b"two", MapOutline(5, 3, (-1.0, 0.1, 1e5, 1 / 3)), ANY) == (2, False)
     assert store.load("m").document == b"two"
-    assert store.record("m") == store.load("m").record == MapRecord("m", 2, store.record("m").sha256)
+    told = MapOutline(5, 3, (-1.0, 0.1, 1e5, 1 / 3))
+    assert store.record("m") == store.load("m").record == MapRecord("m", 2, store.record("m").sha256, 3, told)
     page = store.list(10, "")
-    assert [(item.map_id, item.revision, item.outline.segments, item.outline.bounds) for item in page.maps] == [
-        ("m", 2, 5, (-1.0, 0.1, 1e5, 1 / 3))
-    ]
+    assert page.maps == [store.record("m")]
     store.delete("m", ANY)
     for call in (store.record, store.load, lambda name: store.delete(name, ANY)):
         with pytest.raises(UnknownMapError):
@@ -42,19 +42,19 @@ def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
 
 def test_a_map_s_properties_are_told_without_reading_it(store: MapStore) -> None:
     told = [
-        MapOutline(4, (0.0, 0.0, 1.0, 1.0), sigma, oriented)
+        MapOutline(4, 2, (0.0, 0.0, 1.0, 1.0), sigma, oriented)
         for sigma, oriented in ((None, None), (0.0, False), (1 / 3, True), (-0.0, None))
     ]
     for number, outline in enumerate(told):
         store.put("m", b"x", outline, ANY)
-        assert store.list(10, "").maps == [MapSummary("m", number + 1, outline)]
+        assert [(one.revision, one.outline) for one in store.list(10, "").maps] == [(number + 1, outline)]
         assert store.record("m").oriented is store.load("m").record.oriented is outline.oriented
 
 
 def test_one_map_s_changes_leave_the_others_alone(store: MapStore) -> None:
     for name in ("a", "b", "c"):
         store.put(name, name.encode(), BOX, ANY)
-    store.put("b", b"B", MapOutline(7, (0.0, 0.0, 9.0, 9.0)), ANY)
+    store.put("b", b"B", MapOutline(7, 0, (0.0, 0.0, 9.0, 9.0)), ANY)
     store.delete("c", ANY)
     assert [(item.map_id, item.revision, item.outline.segments) for item in store.list(10, "").maps] == [
         ("a", 1, 4),
@@ -151,6 +151,8 @@ def test_of_many_first_writers_none_is_lost(database: str) -> None:
         ("revision", 7),
         ("sha256", "0" * 64),
         ("segments", 5),
+        ("points", 5),
+        ("size", 5),
         ("min_x", 0.5),
         ("min_y", 0.5),
         ("max_x", -1.0),
@@ -278,7 +280,7 @@ def test_one_map_may_take_it_all(database: str) -> None:
 def test_a_map_that_was_put_a_thousand_times(store: MapStore, database: str) -> None:
     """Its revision is looked at as a number, whichever object holds it."""
     store.put("m", b"one", BOX, ANY)
-    row = columns_of(MapRecord("m", 1000, store.record("m").sha256), BOX)
+    row = row_of(replace(store.record("m"), revision=1000))
     alter(database, "UPDATE maps SET revision = 1000, seal = :seal WHERE map_id = 'm'", seal=row["seal"])
     alter(database, "UPDATE map_documents SET revision = 1000 WHERE map_id = 'm'")
     assert store.load("m").record.revision == 1000

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 # Loaded by the first request that needs them.
-LATER = ("alembic", "cryptography", "ezdxf", "psycopg", "rosbags", "scipy.ndimage")
+LATER = ("cryptography", "ezdxf", "psycopg", "rosbags", "scipy.ndimage")
 PROGRAM = f"""
 import asyncio, gc, json, sys
 from service.app import create_app
