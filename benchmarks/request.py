@@ -30,7 +30,7 @@ from linefix.documents.requests import AssociateRequest
 from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore
 from service.maps.lookup import FoundMap, MapLookup
-from service.parsing.parser_process import ParserProcess
+from service.parsing.child import Child
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
 from service.work.association import Associator
@@ -180,7 +180,7 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
     with TemporaryDirectory() as folder:
         store = MapStore(database_url(f"sqlite:///{folder}/maps.sqlite3"))
         store.put("m", asked.map, MapOutline(1, 0, (0.0, 0.0, 1.0, 1.0)))
-        lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, ParserProcess())
+        lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, Child())
         associator = Associator(lookup, Metrics())
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
         stored = store.load("m")

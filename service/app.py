@@ -49,7 +49,7 @@ from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
 from .maps.lookup import MapLookup
 from .memory import return_free_pages
-from .parsing.parser_process import ParserProcess
+from .parsing.child import Child
 from .settings import Settings
 from .telemetry.metrics import Metrics, RefusalTally
 from .telemetry.traces import traces_of_environment
@@ -122,7 +122,7 @@ def _services(settings: Settings) -> Services:
     budget = _budget(settings, settings.max_bodies_bytes)
     store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(settings.share(settings.cache_bytes), metrics)
-    parser = ParserProcess()
+    parser = Child()
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
     keyring = Keyring(settings.keys, None if settings.keys_file is None else KeyFile(settings.keys_file))
@@ -154,7 +154,8 @@ def _services(settings: Settings) -> Services:
         lookup=lookup,
         documents=_budget(settings, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
-        importing=Gate(1, settings.max_connections, "importing", long_per_slot=0),
+        # A second one when the first takes long, and not for the same key: each takes memory.
+        importing=Gate(1, settings.max_connections, "importing", long_per_slot=1),
         import_bounds=Bounds(
             max(LEAST_IMPORT_BYTES, settings.share(settings.max_import_bytes)),
             settings.max_body_bytes,

@@ -11,7 +11,7 @@ from association import Deadline
 from linefix.answering import Stopwatch
 from linefix.documents.limits import Limits
 
-from ..parsing.parser_process import LARGE
+from ..parsing.child import LARGE
 from ..parsing.unpacking import unpack
 from ..telemetry.traces import stage
 from .exchange import Exchange

@@ -14,7 +14,7 @@ from ..admission.readiness import Readiness
 from ..importing.reader import Bounds
 from ..maps import MapStore
 from ..maps.lookup import MapLookup
-from ..parsing.parser_process import ParserProcess
+from ..parsing.child import Child
 from ..settings import Settings
 from ..telemetry.metrics import Metrics, RefusalTally
 from ..telemetry.traces import Traces
@@ -45,7 +45,7 @@ class Services:
     bodies : BodyReceiver
     answers : ByteBudget
         Bytes of large answers that are being read.
-    parser : ParserProcess
+    parser : Child
         For large bodies.
     store : MapStore
     probe : StoreProbe
@@ -74,7 +74,7 @@ class Services:
     keyring: Keyring
     bodies: BodyReceiver
     answers: ByteBudget
-    parser: ParserProcess
+    parser: Child
     store: MapStore
     probe: StoreProbe
     lookup: MapLookup

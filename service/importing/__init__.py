@@ -2,7 +2,7 @@
 
 ::
 
-    bounded    starts that process, waits for it, and ends it when the time is over
+    bounded    has a child process of service/parsing read, and takes its answer
     folders    where the files of one import are put, and when they go
     reader     what runs in it: from a form to a map and a report
     form       multipart/form-data to files and fields

@@ -1,33 +1,26 @@
-"""Starts the process that reads a map of another tool, waits for it, and ends it when the time is over."""
+"""Has a child process read the files of an import, and takes its answer."""
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import orjson
 
 from association import CancelledError, Deadline
 from linefix.documents.errors import Fault, InvalidRequestError
 
-from ..parsing.parser_process import command_of
+from ..parsing.child import Child, ChildBounds
+from ..parsing.errors import ParserEndedError
 from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
 from .folders import own_folder
-from .reader import NO_ROOM, Bounds
+from .reader import Bounds, read_form_apart
 
-READER = "service.importing.reader"
-LOOK_SECONDS = 0.05  # between two checks that the caller still waits
-# Variables of the environment for the service alone: keys, their paths, passwords of databases and of collectors.
-PRIVATE = ("LINEFIX_", "PG", "OTEL_")
-SHARED = ("LINEFIX_KERNELS",)
-ANSWER, FAILURE = "answer", "failure"  # files in the folder of one import
+HEAD = 1_000  # bytes, more than a short answer takes where the bounds are small
 
 
 class ReaderFailedError(Exception):
@@ -55,17 +48,7 @@ class ReadMap:
 
 @dataclass(frozen=True, slots=True)
 class ReadScans:
-    """Scans of a log.
-
-    Attributes
-    ----------
-    scans : bytes
-        JSON, an object with a list.
-    count : int
-        Number of scans in the log.
-    report : dict
-        The data that was read, merged, dropped and assumed.
-    """
+    """Scans of a log: JSON, an object with a list; the number of scans in the log; the report of reading it."""
 
     scans: bytes
     count: int
@@ -104,30 +87,38 @@ def read_scans_apart(content: bytearray, content_type: str, bounds: Bounds, dead
 def _read(
     content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline, *, scans: bool
 ) -> tuple[dict[str, Any], bytes]:
-    """Return the first line that the process prints, and the rest, which is not parsed."""
-    asked = {"bounds": asdict(bounds), "content_type": content_type, "scans": scans}
-    told = orjson.dumps(asked).decode()
-    with _folder() as folder:
-        status = _ended(command_of(READER, told, str(folder), str(os.getpid())), folder, content, deadline)
-        with (folder / ANSWER).open("rb") as answer, (folder / FAILURE).open("rb") as failures:
-            said, failure = answer.read(bounds.file_bytes), failures.read(100)
-    if status == NO_ROOM:
-        raise NoRoomError
-    if status == 1:
-        raise ReaderFailedError(failure.decode("ascii", "replace"))
-    if status in (-signal.SIGXCPU, -signal.SIGKILL):
-        raise FileTooLargeError(
-            f"reading the file takes more than {bounds.cpu_seconds} s of processor time, or too "
-            "much memory; simplify it"
-        )
-    if status != 0:
-        raise InvalidRequestError(
-            [Fault("/files", "the process that reads the file crashed: the file is damaged; export it again")]
-        )
+    """Return the first line of the answer, and the rest, which is not parsed."""
+    of_child = ChildBounds(
+        bounds.memory_bytes, bounds.cpu_seconds, bounds.file_bytes, answer_bytes=bounds.file_bytes + HEAD
+    )
+    with _folder() as folder, closing(Child(of_child, folder)) as child:
+        asked = content, content_type, str(folder), bounds, scans
+        try:
+            said = child.call(read_form_apart, *asked, ends=lambda: deadline.cancelled or deadline.passed)
+        except ParserEndedError as ended:
+            if deadline.cancelled:
+                raise CancelledError from None
+            if deadline.passed:
+                raise TooLateError from None
+            raise _cause(ended.status, bounds) from None
     first, _, rest = said.partition(b"\n")
     head = orjson.loads(first)
     _require_report(head)
     return head, rest
+
+
+def _cause(status: int | None, bounds: Bounds) -> Exception:
+    """Return what the status of a child that ended without an answer means."""
+    if status is None:
+        return NoRoomError()
+    if status in (-signal.SIGXCPU, -signal.SIGKILL, 0):
+        return FileTooLargeError(
+            f"reading the file takes more than {bounds.cpu_seconds} s of processor time, or too much memory; "
+            "simplify it"
+        )
+    return InvalidRequestError(
+        [Fault("/files", "the process that reads the file crashed: the file is damaged; export it again")]
+    )
 
 
 def _require_report(told: dict[str, Any]) -> None:
@@ -136,52 +127,17 @@ def _require_report(told: dict[str, Any]) -> None:
             return
         case {"missing": _}:
             raise FormatsMissingError
+        case {"no_room": _}:
+            raise NoRoomError
         case {"unknown": str(why)}:
             raise UnknownFormatError(why)
         case {"too_large": str(why)}:
             raise FileTooLargeError(why)
         case {"invalid": list(faults)}:
             raise InvalidRequestError([Fault(**fault) for fault in faults])
+        case {"failed": str(kind)}:
+            raise ReaderFailedError(kind)
     raise ReaderFailedError("the output has neither a report nor a known error")
-
-
-def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadline) -> int:
-    """Run a process to its end and return its status; its output is put into `ANSWER` and `FAILURE`.
-
-    They are files, which may not grow beyond what one file may: the process is not relied on to write little.
-    """
-    told = {name for name in os.environ if name in SHARED or not name.upper().startswith(PRIVATE)}
-    # Libraries that it uses put their own temporary files where those go that were sent.
-    clean = {**{name: os.environ[name] for name in told}, "TMPDIR": str(folder)}
-    with (
-        (folder / ANSWER).open("wb") as answer,
-        (folder / FAILURE).open("wb") as failure,
-        # In a group of its own, so that Ctrl-C is for the service, which then ends this.
-        subprocess.Popen(
-            command, env=clean, process_group=0, stdin=subprocess.PIPE, stdout=answer, stderr=failure
-        ) as process,
-    ):
-        # A thread of its own writes the form: this one checks the deadline.
-        pipe, process.stdin = process.stdin, None
-        assert pipe is not None
-        feeding = threading.Thread(target=_feed, args=(pipe, content))
-        feeding.start()
-        try:
-            while True:
-                with suppress(subprocess.TimeoutExpired):
-                    return process.wait(LOOK_SECONDS)
-                if deadline.cancelled:
-                    raise CancelledError
-                if deadline.passed:
-                    raise TooLateError
-        finally:
-            process.kill()
-            feeding.join()
-
-
-def _feed(pipe: IO[bytes], content: bytearray) -> None:
-    with suppress(OSError), pipe:  # the reading process may have ended
-        pipe.write(content)
 
 
 @contextmanager

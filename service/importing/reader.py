@@ -1,7 +1,7 @@
-"""The program of the bounded process: a form on stdin to a map, or scans, and a report on stdout.
+"""What runs in the child of an import: from a form to a map and a report.
 
-The files come from untrusted senders, and the libraries that read them are many and large. So this process has no more
-memory and time than it was given and no keys in its environment. Its output is JSON, which is checked.
+The files come from untrusted senders, and the libraries that read them are many and large. So the child has no more
+memory and time than it was given and no keys in its environment. Its answer is JSON, which is checked.
 """
 
 from __future__ import annotations
@@ -10,11 +10,6 @@ import base64
 import errno
 import io
 import math
-import os
-import resource
-import shutil
-import sys
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,14 +24,9 @@ from .scans import read_scans
 if TYPE_CHECKING:
     from formats import GridPicture, ImportedMap
 
-MAPPED_BYTES = 1_000_000_000  # of address space in addition to the memory: libraries, and room that is never used
-MOST_OPEN = 64  # files
-NICE = 5  # searches go before it, at three times as much of a core that both want
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
 MOST_PIXELS = 2048  # of a picture, each way
 CPU_SECONDS = 20  # of a processor
-NO_ROOM = 3  # status of the process that reads where its files cannot be written
-OOM_SCORE = "1000"  # the first to go where the machine's memory ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +51,10 @@ class Bounds:
     cpu_seconds: int = CPU_SECONDS
 
 
-def main(told: str, folder: str) -> None:
-    """Read the form on stdin, its files put into a folder; print a report and the content, or the error."""
-    asked = orjson.loads(told)
-    bounds = Bounds(**asked["bounds"])
-    _bind(bounds)
+def read_form_apart(content: bytes, content_type: str, folder: str, bounds: Bounds, scans: bool) -> bytes:
+    """Return lines of JSON: a report and the content of the files in a form, or an error."""
     try:
-        content, content_type = sys.stdin.buffer.read(), asked["content_type"]
-        if asked["scans"]:
+        if scans:
             lines = read_scans(content, content_type, Path(folder))
         else:
             lines = read_files(content, content_type, Path(folder), bounds)
@@ -78,39 +64,19 @@ def main(told: str, folder: str) -> None:
         lines = [{"missing": True}]
     except (MemoryError, RecursionError):
         lines = [{"too_large": "reading the file takes more memory than is allowed; simplify the file"}]
-    sys.stdout.buffer.write(_printed(lines, bounds.file_bytes))
-    sys.stdout.flush()
+    except Exception as error:  # a defect, or a full disk; only its kind is told, nothing of the file
+        full = isinstance(error, OSError) and error.errno in FULL
+        lines = [{"no_room": True} if full else {"failed": type(error).__name__}]
+    printed = _printed(lines)
+    if len(printed) > bounds.file_bytes:  # such a map could not be put either
+        most = bounds.file_bytes
+        return _printed([{"too_large": f"expected an answer of at most {most} bytes, found more; send less"}])
+    return printed
 
 
-def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
-    """Return lines as JSON, or one line with an error where they are too long: such a map could not be put either."""
+def _printed(lines: Lines) -> bytes:
     option = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE
-    printed = b"".join(orjson.dumps(line, option=option) for line in lines)
-    if len(printed) <= most:
-        return printed
-    return orjson.dumps(
-        {"too_large": f"expected an answer of at most {most} bytes, found more; send less"},
-        option=option,
-    )
-
-
-def _bind(bounds: Bounds) -> None:
-    """Take away from this process all that it does not need."""
-    most = bounds.memory_bytes
-    for what, limit in (
-        (resource.RLIMIT_DATA, most),
-        (resource.RLIMIT_AS, most + MAPPED_BYTES),
-        (resource.RLIMIT_CPU, bounds.cpu_seconds),
-        (resource.RLIMIT_FSIZE, bounds.file_bytes),
-        (resource.RLIMIT_NOFILE, MOST_OPEN),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        with suppress(ValueError, OSError):  # less is allowed already, or the system has no such limit
-            resource.setrlimit(what, (limit, limit))
-    with suppress(OSError):
-        os.nice(NICE)
-    with suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text(OOM_SCORE)
+    return b"".join(orjson.dumps(line, option=option) for line in lines)
 
 
 def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> Lines:
@@ -172,15 +138,3 @@ def picture_json(picture: GridPicture) -> dict[str, Any]:
         },
         "resolution": factor * picture.resolution,
     }
-
-
-if __name__ == "__main__":
-    told, folder, service = sys.argv[1:]
-    try:
-        main(told, folder)
-    except Exception as error:  # a defect; only its kind is printed, nothing of the file
-        print(f"{type(error).__name__}", file=sys.stderr, flush=True)
-        os._exit(NO_ROOM if isinstance(error, OSError) and error.errno in FULL else 1)
-    finally:
-        if os.getppid() != int(service):  # it was killed, and removes nothing any more
-            shutil.rmtree(folder, ignore_errors=True)

@@ -14,7 +14,7 @@ from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 from registration import Segments
 
-from ..parsing.parser_process import LARGE, ParserProcess
+from ..parsing.child import LARGE, Child
 from .cache import CachedMap, CachedMaps, IndexCache
 from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .store import MapStore
@@ -61,11 +61,11 @@ class MapLookup:
     ----------
     cache : IndexCache
     store : MapStore
-    parser : ParserProcess
+    parser : Child
         Parses large stored maps.
     """
 
-    def __init__(self, cache: IndexCache, store: MapStore, parser: ParserProcess) -> None:
+    def __init__(self, cache: IndexCache, store: MapStore, parser: Child) -> None:
         self._cache = cache
         self._store = store
         self._parser = parser

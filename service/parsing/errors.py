@@ -14,7 +14,11 @@ class ParsingError(Exception):
 
 
 class ParserEndedError(ParsingError):
-    """The process that parses large bodies has ended meanwhile; the next call has a new one."""
+    """The process that parses large bodies has ended meanwhile, with this status; the next call has a new one."""
 
-    def __init__(self) -> None:
-        super().__init__("the process that parses large bodies ended meanwhile; send the request again")
+    def __init__(self, status: int | None = None) -> None:
+        super().__init__(status)
+        self.status = status
+
+    def __str__(self) -> str:
+        return "the process that parses large bodies ended meanwhile; send the request again"

@@ -8,11 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict
 from pathlib import Path
 from threading import Timer
 
-import orjson
 import pytest
 from PIL import Image
 
@@ -22,10 +20,15 @@ from service.importing.bounded import ReadMap, read_apart
 from service.importing.errors import FileTooLargeError, FormatsMissingError, TooLateError
 from service.importing.folders import PREFIX, remove_abandoned
 from service.importing.reader import Bounds
-from service.parsing.parser_process import command_of
 from tests.running import children_of, until
 
 from .forms import SQUARE, TYPE, YAML, encoded, form
+
+
+def curves(count: int) -> bytes:
+    """Return a drawing that takes some twenty seconds where it has 200,000 curves."""
+    return b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * count + b'"/></svg>'
+
 
 BOUNDS = Bounds(1_000_000_000, 32_000_000, 200_000)
 
@@ -51,10 +54,8 @@ def test_more_memory_than_it_may_have() -> None:
 
 
 def test_more_of_a_processor_than_it_may_have() -> None:
-    """Curves that take some twenty seconds."""
-    curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
     with pytest.raises(FileTooLargeError, match="processor"):
-        read({"a.svg": curves}, Bounds(4_000_000_000, 32_000_000, 200_000, cpu_seconds=1))
+        read({"a.svg": curves(200_000)}, Bounds(4_000_000_000, 32_000_000, 200_000, cpu_seconds=1))
 
 
 def test_it_ends_when_nobody_waits_or_the_time_is_over() -> None:
@@ -130,17 +131,16 @@ def test_files_of_a_service_that_was_killed_are_removed_by_the_next_import(tmp_p
 
 
 def test_the_process_that_reads_removes_the_files_when_its_service_was_killed(tmp_path: Path) -> None:
-    folder = tmp_path / f"{PREFIX}own"
-    folder.mkdir()
-    told = orjson.dumps({"bounds": asdict(BOUNDS), "content_type": TYPE, "scans": False}).decode()
-    # What starts it, and is killed as the service would be while it waits for the form.
-    command = command_of("service.importing.reader", told, str(folder))
-    starting = "import os, subprocess, sys; subprocess.Popen([*sys.argv[1:], str(os.getpid())]).wait()"
-    with subprocess.Popen([sys.executable, "-c", starting, *command], stdin=subprocess.PIPE) as service:
-        assert service.stdin is not None
-        until(lambda: bool(children_of(service.pid)))
+    (tmp_path / "form").write_bytes(form({"a.svg": curves(20_000)}))
+    reading = (
+        "import pathlib, sys, tempfile; from association import Deadline; from service.importing.bounded import "
+        "read_apart; from service.importing.reader import Bounds; tempfile.tempdir = sys.argv[1]; read_apart(bytearray("
+        "pathlib.Path(sys.argv[1], 'form').read_bytes()), sys.argv[2], Bounds(10**9, 32_000_000, 9), Deadline())"
+    )
+    with subprocess.Popen([sys.executable, "-c", reading, str(tmp_path), TYPE]) as service:
+        until(lambda: bool(list(tmp_path.glob(f"{PREFIX}*/file-0.svg"))))
+        (child,) = children_of(service.pid)
         os.kill(service.pid, signal.SIGKILL)
         service.wait()
-        service.stdin.write(bytes(form({"a.csv": SQUARE})))
-        service.stdin.close()
-        until(lambda: not folder.exists())
+        os.kill(child, signal.SIGCONT)  # it is there, and goes on for some seconds
+        until(lambda: not list(tmp_path.glob(f"{PREFIX}*")))

@@ -12,13 +12,15 @@ import pytest
 
 from association import Deadline, InvalidMapError
 from linefix.documents import examples
+from linefix.documents.errors import TooManyError
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap
+from linefix.documents.several import MapPrefix, NamedMap
 from registration import InputError
 from service.database_location import database_url
 from service.maps import CachedMap, IndexCache, MapOutline, MapStore
-from service.maps.errors import BusyStoreError, UnknownMapError
+from service.maps.errors import BusyStoreError, IndexNotReadyError, UnknownMapError
 from service.maps.lookup import OVERHEAD, FoundMap, MapLookup, outline_of
-from service.parsing.parser_process import LARGE, ParserProcess
+from service.parsing.child import LARGE, Child
 from service.telemetry.metrics import Metrics
 
 
@@ -28,7 +30,7 @@ class Lookup(MapLookup):
     def __init__(self, folder: Path) -> None:
         self.cache = IndexCache(10_000_000, Metrics())
         self.store = MapStore(database_url(f"sqlite:///{folder / 'maps.sqlite3'}"))
-        self.parser = ParserProcess()
+        self.parser = Child()
         super().__init__(self.cache, self.store, self.parser)
 
     def look(self, asked: InlineMap | StoredMap, *, oriented: bool | None) -> tuple[CachedMap, int | None]:
@@ -161,6 +163,37 @@ def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
     assert lookup.parser.pid is None
     assert lookup.look(StoredMap(map_id="large"), oriented=True)[0].index.nbytes > 0
     assert lookup.parser.pid is not None
+
+
+def test_several_maps_are_counted_by_their_records(lookup: Lookup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were loaded and parsed first, and their points were not counted: 9.6 GB."""
+    for number in range(2):
+        for kind, counts in (("segments", (150_000, 0)), ("points", (4, 150_000))):
+            lookup.store.put(f"{kind}-{number}", b"{}", MapOutline(*counts, (0.0, 0.0, 1.0, 1.0)))
+    monkeypatch.setattr(lookup.store, "load", lambda _: pytest.fail("loaded"))
+    for kind in ("segments", "points"):
+        for asked in (MapPrefix(prefix=kind), [StoredMap(map_id=f"{kind}-{number}") for number in range(2)]):
+            with pytest.raises(TooManyError, match=kind) as caught:
+                lookup.find_together(asked, "")
+            assert caught.value.pointer == "/maps"
+    found = lookup.find_together([StoredMap(map_id="points-0"), NamedMap(map_id="x", segments=examples.WALLS)], "")
+    assert found.largest_document == 2
+
+
+def test_several_maps_are_loaded_for_as_long_as_somebody_waits(lookup: Lookup, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(3):
+        lookup.put(f"m-{number}", segments=examples.WALLS)
+    load, deadline, loaded = lookup.store.load, Deadline(), []
+
+    def last(map_id: str) -> Any:
+        loaded.append(map_id)
+        deadline.cancel()
+        return load(map_id)
+
+    monkeypatch.setattr(lookup.store, "load", last)
+    with pytest.raises(IndexNotReadyError):
+        lookup.indexed_together(lookup.find_together(MapPrefix(prefix="m-"), ""), oriented=None, deadline=deadline)
+    assert loaded == ["m-0"]
 
 
 def document(rows: object) -> MapDocument:

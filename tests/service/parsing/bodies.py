@@ -7,7 +7,7 @@ import orjson
 
 from linefix.documents import examples
 from linefix.documents.limits import Limits
-from service.parsing.parser_process import LARGE
+from service.parsing.child import LARGE
 
 LIMITS = Limits(values=2_000_000, map_segments=200_000, scan_segments=2_000, beams=20_000, pairs=200_000, batch=256)
 

@@ -18,21 +18,21 @@ import registration
 from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, NotJsonError, TooManyError
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map, read_model
+from service.parsing.child import NICE, Child, receive, send
 from service.parsing.errors import ParserEndedError
-from service.parsing.parser_process import NICE, ParserProcess, receive, send
 
 from .bodies import LIMITS, large_map
 
 
 @pytest.fixture(scope="module")
-def parser() -> Iterator[ParserProcess]:
-    made = ParserProcess()
+def parser() -> Iterator[Child]:
+    made = Child()
     yield made
     made.close()
     assert made.pid is None
 
 
-def test_searches_go_before_it(parser: ParserProcess) -> None:
+def test_searches_go_before_it(parser: Child) -> None:
     assert parser.call(os.nice, 0) == os.nice(0) + NICE
 
 
@@ -44,14 +44,14 @@ def test_what_stands_in_the_working_folder_is_not_taken_for_the_service(
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("raise SystemExit(3)")
     monkeypatch.chdir(tmp_path)
-    made = ParserProcess()
+    made = Child()
     try:
         assert made.call(find_spec, "registration").origin == registration.__file__  # type: ignore[union-attr]
     finally:
         made.close()
 
 
-def test_the_other_process_reads_as_this_one_does(parser: ParserProcess) -> None:
+def test_the_other_process_reads_as_this_one_does(parser: Child) -> None:
     body = large_map()
     for data in (body, bytearray(body)):
         there, here = parser.call(read_map, data, LIMITS), read_map(body, LIMITS)
@@ -64,7 +64,7 @@ def _raise(error: Exception) -> None:
     raise error
 
 
-def test_what_is_wrong_crosses_whole(parser: ParserProcess) -> None:
+def test_what_is_wrong_crosses_whole(parser: Child) -> None:
     with pytest.raises(InvalidRequestError) as invalid:
         parser.call(read_model, MapDocument, b'{"segments": [[0, 0, 1]]}', LIMITS)
     assert invalid.value.faults == (Fault("/segments/0", "expected 4 numbers, found 3"),)
@@ -92,7 +92,7 @@ def test_objects_cross_a_channel_without_a_copy_and_its_end_is_told() -> None:
     other.close()
 
 
-def test_an_end_of_the_process_is_one_refusal(parser: ParserProcess) -> None:
+def test_an_end_of_the_process_is_one_refusal(parser: Child) -> None:
     before = parser.call(os.getpid)
     with pytest.raises(ParserEndedError):
         parser.call(os._exit, 1)
@@ -107,7 +107,7 @@ def test_an_end_of_the_process_is_one_refusal(parser: ParserProcess) -> None:
 
 
 def test_closing_ends_what_it_works_at() -> None:
-    made = ParserProcess()
+    made = Child()
     made.start()
     pid = made.pid
     made.start()
