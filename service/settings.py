@@ -118,7 +118,7 @@ class Settings(BaseSettings):
     max_import_bytes: int = Field(
         1_000_000_000,
         ge=400_000_000,
-        description="maximum bytes of memory of a process that reads an import; at most two are read at a time, of different keys",
+        description="maximum bytes of memory of a process that reads an import; at most two run, of different keys",
     )
     max_connections: int = Field(
         512,
