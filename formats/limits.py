@@ -29,5 +29,5 @@ MAX_TEXT = 200  # characters of a name taken from a file
 MAX_NAMED = 10  # names in one message
 
 MIN_RESOLUTION, MAX_RESOLUTION = 1e-3, 10.0  # m
-MAX_ORIGIN = 1e6  # m
+MAX_ORIGIN = 1e7  # m; northings of UTM
 MAX_EXTENT = 1e5  # m, of a map; as the map index has it

@@ -142,5 +142,5 @@ def _from_grid(grid: Grid, notes: Notes, name: str, frame: str, surface: float |
     notes.add_read("segments", "faces of walls", len(faces.segments))
     sigma = SURFACE_SIGMA * grid.resolution
     notes.add_assumed("sigma", f"sigma of the walls is assumed to be {sigma:g} m, half a cell")
-    meta = {"source": name, "resolution": f"{grid.resolution:g}"}
+    meta = {"source": name, "resolution": f"{grid.resolution:g}", "surface": f"{faces.depth:.2f}"}
     return LineMap(faces.segments, sigma, True, frame, meta, faces.points, sigma)

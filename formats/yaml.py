@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from .errors import MalformedFileError, TooLargeError
 from .limits import MAX_YAML_VALUES
+from .report import shown
 
 
 def yaml_of(text: str, name: str) -> object:
@@ -24,10 +25,11 @@ def yaml_of(text: str, name: str) -> object:
     Raises
     ------
     MalformedFileError
-        When it is no YAML.
+        When it is no YAML; the error names the line where it can.
     TooLargeError
         When it stands for too many values.
     """
+    text = text.expandtabs()  # that people put behind a colon, which YAML does not allow
     try:
         root = YAML(typ="safe", pure=True).compose(text)
         if root is not None and _values(root, {}) > MAX_YAML_VALUES:
@@ -36,7 +38,11 @@ def yaml_of(text: str, name: str) -> object:
     except (YAMLError, RecursionError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         if isinstance(error, TooLargeError):
             raise
-        raise MalformedFileError("is not YAML", argument=name) from error
+        where = ""
+        if isinstance(error, MarkedYAMLError) and error.problem_mark is not None:
+            problem = (error.problem or "it cannot be read").partition(" with value")[0]
+            where = f": line {error.problem_mark.line + 1}: {shown(problem)}; correct it"
+        raise MalformedFileError(f"is not YAML{where}", argument=name) from error
 
 
 def _values(node: Node, known: dict[int, int]) -> int:

@@ -148,7 +148,7 @@ def import_map(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="A log with scans of the building: estimate the thickness of walls drawn by centre lines from it.",
+            help="A log of the building: find the thickness of walls drawn by centre lines, or the surface of a grid.",
         ),
     ] = None,
     update: Annotated[
@@ -210,7 +210,7 @@ def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
 
 
 def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
-    """Check an imported map with some scans of a log; import it again where walls are thicker than assumed.
+    """Check an imported map with some scans of a log; import it again where walls lie elsewhere than assumed.
 
     Returns
     -------
@@ -220,16 +220,22 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
     scans = samples_of(log, None)
     checked = asking.check(answer["map"], scans, None)
     thicker, line_map = checked["samples"]["wall_thickness"], answer["map"]
-    drawn = float(line_map["meta"].get("thickness", 0.0)) if line_map["oriented"] else 0.0
-    made_of_centres = "thickness" in line_map["meta"] or not line_map["oriented"]
-    if thicker is None or not made_of_centres or said.thickness is not None or said.drawn == "faces":
+    meta = line_map["meta"]
+    made_of_centres = "thickness" in meta or not line_map["oriented"]
+    if thicker is not None and "surface" in meta and said.surface is None:
+        cells = max(0.0, float(meta["surface"]) - 0.5 * thicker / float(meta["resolution"]))
+        changed, replaced = replace(said, surface=round(cells, 2)), "surface"
+        message = f"wall surfaces lie {cells:.2f} cells behind the border of the free cells"
+    elif thicker is not None and made_of_centres and said.thickness is None and said.drawn != "faces":
+        thickness = max(0.0, (float(meta.get("thickness", 0.0)) if line_map["oriented"] else 0.0) + thicker)
+        changed, replaced = replace(said, drawn="centres", thickness=round(thickness, 2)), "thickness_given"
+        message = f"walls are {thickness:.2f} m thick"
+    else:
         return {**answer, "check": checked}
-    thickness = f"{max(0.0, drawn + thicker):.2f}"
-    again = imported(file, replace(said, drawn="centres", thickness=float(thickness)), None)
-    message = f"walls are {thickness} m thick, estimated from scans of {log.name}"
-    kept = [note for note in again["report"]["assumed"] if note["code"] != "thickness_given"]
-    found = {"code": "thickness_found", "message": message, "count": 0}
-    again["report"]["assumed"] = [*kept, found]
+    again = imported(file, changed, None)
+    kept = [note for note in again["report"]["assumed"] if note["code"] != replaced]
+    found = {"code": f"{replaced.partition('_')[0]}_found", "count": 0}
+    again["report"]["assumed"] = [*kept, {**found, "message": f"{message}, estimated from scans of {log.name}"}]
     return {**again, "check": asking.check(again["map"], scans, None)}
 
 

@@ -23,14 +23,20 @@ from .tuning import (
     CONTOUR_SIGMA,
     CORNER_REACH,
     COVERED,
+    DRAWN,
     GREATEST_BAND,
     LEAST_DEPTH,
     LEAST_LENGTH,
     LEAST_POINTS,
+    LEAST_STEPS,
     LONGEST_CONTOUR,
+    THIN,
 )
 
 DECIDED = ("thresholds", "unknown_grey")  # notes on how cells were told apart
+
+WHY_DRAWN = "because walls have a constant thickness, as in a drawn grid; set the option surface for another value"
+WHY_MAPPED = "by the thickness of walls that are seen from one side, as in a mapped grid"
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -46,10 +52,13 @@ class Faces:
         The faces of its walls, metres in the map frame, free space on the left.
     points : (n, 2)
         The occupied cells next to free ones that are on no face: their middles, metres in the map frame.
+    depth : float
+        From the front of the occupied cells to the segments, cells.
     """
 
     segments: Segments
     points: Floats
+    depth: float
 
 
 def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None) -> Faces:
@@ -82,7 +91,7 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     for name_of_kind, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN)):
         count = int((cells == kind).sum())
         notes.add_read(f"{name_of_kind}_cells", f"{name_of_kind} cells" if count else f"no {name_of_kind} cell", count)
-    depth = surface_depth(cells) if surface is None else surface
+    depth, drawn = surface_depth(cells) if surface is None else (surface, False)
     options = VectorizationOptions(
         sigma=CONTOUR_SIGMA * grid.resolution, min_length=max(1e-3, LEAST_LENGTH * grid.resolution)
     )
@@ -108,7 +117,10 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
             f"no wall found: expected a straight border between free and occupied cells, found {counts} cells{said}",
             argument=name,
         )
-    notes.add_assumed("surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells")
+    why = "as an option states" if surface is not None else WHY_DRAWN if drawn else WHY_MAPPED
+    notes.add_assumed(
+        "surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells, {why}"
+    )
     points = _outside_of(np.vstack(fronts), cells)
     if len(points) > MAX_POINTS:
         notes.add_dropped(
@@ -118,7 +130,7 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     elif len(points):
         notes.add_read("points", "occupied cells that are on no wall", len(points))
     placed = grid.origin.apply(points * grid.resolution)
-    return Faces(Segments.from_array(_placed(np.vstack(found), grid)), placed)
+    return Faces(Segments.from_array(_placed(np.vstack(found), grid)), placed, depth)
 
 
 def _outside_of(fronts: Floats, cells: Cells) -> Floats:
@@ -142,29 +154,49 @@ def _outside_of(fronts: Floats, cells: Cells) -> Floats:
     return np.asarray(middles[np.isinf(away)])
 
 
-def surface_depth(cells: Cells) -> float:
-    """Return how far behind the front of the occupied cells the surface of the walls lies, in cells.
+def surface_depth(cells: Cells) -> tuple[float, bool]:
+    """Return how far behind the front of the occupied cells the surface of the walls lies, in cells; True if drawn.
 
-    Returns of a range finder scatter about the surface. A wall seen from one side is a band of occupied cells with
-    nothing known behind; the thicker these bands are, the farther the returns were scattered.
+    Walls of a drawn grid are bands whose thickness hardly changes from cell to cell: their surface is the front. In a
+    mapped grid returns of a range finder scatter about the surface. A wall seen from one side is a band of occupied
+    cells with nothing known behind; the thicker these bands are, the farther the returns were scattered.
     """
-    bands = np.concatenate([_bands(np.rot90(cells, k)) for k in range(4)])
-    if len(bands) == 0:
-        return LEAST_DEPTH
-    return max(LEAST_DEPTH, BAND_SHARE * float(np.median(bands)))
+    bands = [_bands(np.rot90(cells, k)) for k in range(4)]
+    every = np.concatenate([thickness[thickness > 0] for thickness, _ in bands])
+    usual = float(np.median(every)) if len(every) >= LEAST_STEPS else 0.0
+    if usual > THIN:  # else a cell more or less is no evidence, or the surface is in the middle of the only cell
+        steps = np.concatenate([_steps(thickness) for thickness, _ in bands])
+        if float((steps <= (1 if usual > 2.0 * THIN else 0)).mean()) >= DRAWN:
+            return 0.0, True
+    one_sided = np.concatenate([thickness[behind] for thickness, behind in bands])
+    return (max(LEAST_DEPTH, BAND_SHARE * float(np.median(one_sided))) if len(one_sided) else LEAST_DEPTH), False
 
 
-def _bands(cells: Cells) -> NDArray[np.int64]:
-    """Return the thickness of each band with a free cell on its left and an unknown one on its right."""
+def _bands(cells: Cells) -> tuple[NDArray[np.int8], Flags]:
+    """Return the thickness of the band of occupied cells that begins behind each free cell, 0 where none does.
+
+    The second array tells which bands have an unknown cell behind, and so are seen from one side. Thicker bands than
+    `GREATEST_BAND` are as thick as that.
+    """
     padded = np.pad(cells, ((0, 0), (1, GREATEST_BAND + 1)), constant_values=UNKNOWN)
-    rows, columns = np.nonzero((padded[:, :-1] == FREE) & (padded[:, 1:] == OCCUPIED))
-    thickness = np.zeros(len(rows), dtype=np.int64)
-    last = padded.shape[1] - 1
+    width = cells.shape[1]
+    front = (padded[:, :width] == FREE) & (padded[:, 1 : width + 1] == OCCUPIED)
+    thickness, behind = np.zeros(front.shape, dtype=np.int8), np.zeros(front.shape, dtype=np.bool_)
     for k in range(1, GREATEST_BAND + 1):
-        thickness += (thickness == k - 1) & (padded[rows, np.minimum(columns + k, last)] == OCCUPIED)
-    behind = padded[rows, np.minimum(columns + thickness + 1, last)]
-    seen_from_one_side = (behind == UNKNOWN) & (thickness < GREATEST_BAND)
-    return np.asarray(thickness[seen_from_one_side])
+        at = padded[:, k : k + width]
+        behind |= front & (thickness == k - 1) & (k > 1) & (at == UNKNOWN)
+        thickness += front & (thickness == k - 1) & (at == OCCUPIED)
+    return thickness, behind
+
+
+def _steps(thickness: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Return how much the thickness of bands differs from that of the next row, where they begin side by side."""
+    found = []
+    for shift in (-1, 0, 1):
+        here, there = thickness[:-1], np.roll(thickness[1:], shift, axis=1)
+        both = (here > 0) & (there > 0)
+        found.append(np.abs(here[both] - there[both]))
+    return np.concatenate(found)
 
 
 def wall_contours(cells: Cells) -> Iterator[Floats]:

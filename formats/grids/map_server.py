@@ -33,6 +33,9 @@ from .cells import Grid
 from .tuning import UNKNOWN_GREYS
 
 PICTURES = ("PPM", "PNG", "BMP", "JPEG")  # what Pillow may take a picture for
+OTHERS = {b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF"}
+NAN = ("nan", "-nan", "+nan")
+WORDS = {"no": 0, "false": 0, "off": 0, "yes": 1, "true": 1, "on": 1}  # of YAML 1.1, as ROS reads it
 MODES = ("trinary", "scale", "raw")
 RAW_UNKNOWN = 100  # in mode raw: the greatest value that is an occupancy in percent
 
@@ -135,7 +138,7 @@ def read_description(path: Path, notes: Notes) -> Description:
     return Description(
         _image(values["image"], name),
         _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION),
-        _origin(values["origin"], name),
+        _origin(values["origin"], name, notes),
         bool(_number(values, "negate", name, 0, 1, 0.0)),
         _number(values, "occupied_thresh", name, 0.0, 1.0, 0.65),
         _number(values, "free_thresh", name, 0.0, 1.0, 0.196),
@@ -155,6 +158,7 @@ def _number(
     values: dict[Any, Any], key: str, name: str, low: float, high: float, default: float | None = None
 ) -> float:
     value = values.get(key, default)
+    value = WORDS.get(value.lower(), value) if isinstance(value, str) else value
     if not isinstance(value, int | float) or not low <= value <= high:
         raise MalformedFileError(
             f"expected {key} to be a number from {low:g} to {high:g}, found {kind_of(value)}", argument=name
@@ -162,14 +166,26 @@ def _number(
     return float(value)
 
 
-def _origin(value: Any, name: str) -> RigidTransform:
-    numbers = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
-    if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in value):
+def _origin(value: Any, name: str, notes: Notes) -> RigidTransform:
+    told = (
+        [math.nan if isinstance(v, str) and v.lower() in NAN else v for v in value] if isinstance(value, list) else []
+    )
+    numbers = len(told) == 3 and all(type(v) in (int, float) for v in told)
+    if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in told[:2]) or math.isinf(told[2]):
         found = ", ".join(map(kind_of, value[:4])) if isinstance(value, list) else kind_of(value)
         raise MalformedFileError(
             f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}, found {found}", argument=name
         )
-    return RigidTransform(*map(float, value))
+    if math.isnan(told[2]):
+        notes.add_assumed("orientation", "the yaw of the origin is not a number, as map_saver writes it; 0 is assumed")
+        told[2] = 0.0
+    if abs(told[2]) > math.tau:
+        raise MalformedFileError(
+            f"expected the yaw of the origin in radians, at most {math.tau:.4g}, found {told[2]:g}; if these are "
+            f"degrees, write {math.radians(told[2]):.6g}",
+            argument=name,
+        )
+    return RigidTransform(*map(float, told))
 
 
 def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
@@ -208,7 +224,9 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
             f"expected at most {MAX_CELLS} pixels, found many more; crop the map", argument=name
         ) from error
     except UnidentifiedImageError as error:
-        raise MalformedFileError("is not a picture; expected PGM, PNG, BMP or JPEG", argument=name) from error
+        kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), "not a picture")
+        said = f"is {kind}; expected PGM, PNG, BMP or JPEG. Save it as PNG"
+        raise MalformedFileError(said, argument=name) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(
             f"is a broken picture: {shown(str(error))}; expected a whole PGM, PNG, BMP or JPEG. Save it again",

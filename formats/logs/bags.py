@@ -228,4 +228,6 @@ def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iter
         for place in () if folder is None else (str(folder.resolve()), str(folder)):
             text = text.replace(place.rstrip(os.sep) + os.sep, "")
         lines = text.splitlines() or [type(error).__name__]
+        if isinstance(error, ReaderError1) and "magic" in text:  # of ROS before Diamondback, or no bag
+            lines, mended_by = ["it does not begin as a bag of version 2.0"], "; of V1.2, `rosbag fix` makes one"
         raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error

@@ -71,6 +71,10 @@ class RecordedFile(Protocol):
 
 
 def ros_type(name: str) -> str:
-    """Return the name of a message type as ROS 2 writes it: ROS 1 leaves ``msg`` out."""
-    package, slash, kind = name.partition("/")
-    return f"{package}/msg/{kind}" if slash and "/" not in kind else name
+    """Return the name of a message type as ROS 2 writes it, from those of ROS 1, C++ and DDS.
+
+    These are ``sensor_msgs/LaserScan``, ``sensor_msgs::msg::LaserScan`` and ``sensor_msgs::msg::dds_::LaserScan_``.
+    """
+    plain = name.replace("::dds_::", "/").removesuffix("_").replace("::", "/") if "::" in name else name
+    package, slash, kind = plain.partition("/")
+    return f"{package}/msg/{kind}" if slash and "/" not in kind else plain

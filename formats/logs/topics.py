@@ -9,6 +9,14 @@ from ..report import Notes, shown
 from .bags import SCAN, Bag
 from .recording import CDR, ROS1, Connection
 
+# Scans of other types, and what makes LaserScan messages of them.
+CONVERTED = {
+    "sensor_msgs/msg/PointCloud2": "convert PointCloud2 with pointcloud_to_laserscan, and record its scan",
+    "sensor_msgs/msg/MultiEchoLaserScan": "convert MultiEchoLaserScan with laser_proc, and record its first echo",
+    "foxglove/msg/LaserScan": "foxglove LaserScan messages are not read; record sensor_msgs/LaserScan",
+    "foxglove.LaserScan": "foxglove.LaserScan messages are not read; record sensor_msgs/LaserScan",
+}
+
 
 def scan_connections(bag: Bag, topic: str | None, notes: Notes) -> list[Connection]:
     """Return the connections of one topic of scans: the one that is named, or that with most messages.
@@ -24,7 +32,9 @@ def scan_connections(bag: Bag, topic: str | None, notes: Notes) -> list[Connecti
     elif any(counts.values()):
         chosen = max(sorted(counts), key=lambda one: counts[one])
     else:
-        raise IncompleteFileError(f"has no messages of LaserScan; {bag.topics()}", argument=bag.name)
+        hints = [hint for kind, hint in CONVERTED.items() if any(one.msgtype == kind for one in bag.connections())]
+        what = "".join(f"; {hint}" for hint in hints)
+        raise IncompleteFileError(f"has no messages of LaserScan{what}; {bag.topics()}", argument=bag.name)
     others = [one for one in sorted(counts) if one != chosen]
     if topic is None and others:
         told = ", ".join(map(shown, others))

@@ -7,8 +7,9 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw, ImageOps
 
 from formats import read_map
 from tests.map_quality.check.drawn import THICK, centre_lines, faces
@@ -17,6 +18,8 @@ from tests.service.importing.forms import SQUARE, room_grid
 
 from .drives import write_log
 from .running import Linefix, refused
+
+PATIENT = {"LINEFIX_MAX_DEADLINE_MS": "600000"}  # so that a busy machine finds it too
 
 
 @pytest.fixture(autouse=True)
@@ -120,7 +123,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     features = [{"type": "Feature", "properties": {"thickness": 2 * THICK}, "geometry": wall} for wall in walls]
     (folder / "floor.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     asked = ("map", "import", "floor.geojson", "--local-metres", "--log", "drive.log")
-    answer = json.loads(linefix(*asked, "--json").out)
+    answer = json.loads(linefix(*asked, "--json", **PATIENT).out)
     assert float(answer["map"]["meta"]["thickness"]) == pytest.approx(THICK, abs=0.02)
     assert [note["code"] for note in answer["report"]["assumed"]] == ["thickness_found"]
     assert "from scans of drive.log" in answer["report"]["assumed"][0]["message"]
@@ -131,6 +134,22 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     assert re.search("finding  thickness: The scans fit better if walls are (19|20) cm thinner", told)
     assert "of 5 usable" in told
     assert "omit --server" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
+
+
+def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:
+    """A grid whose walls are drawn 0.1 m thicker on each side than they are: two cells."""
+    write_log(folder / "drive.log", 5)
+    grid = Image.new("L", (480, 280), 254)
+    for x1, y1, x2, y2 in (centre_lines() + np.array([1, 6, 1, 6])) * 20:
+        ImageDraw.Draw(grid).rectangle([min(x1, x2) - 4, min(y1, y2) - 4, max(x1, x2) + 3, max(y1, y2) + 3], fill=0)
+    ImageOps.flip(grid).save(folder / "thick.pgm")
+    (folder / "thick.yaml").write_text("image: thick.pgm\nresolution: 0.05\norigin: [-1, -6, 0]\n")
+    answer = json.loads(linefix("map", "import", "thick.yaml", "--log", "drive.log", "--json", **PATIENT).out)
+    assert float(answer["map"]["meta"]["surface"]) == pytest.approx(2.0, abs=0.3)
+    assert "from scans of drive.log" in answer["report"]["assumed"][-1]["message"]
+    told = linefix("map", "import", "thick.yaml", "--log", "drive.log", "--surface", "0").out
+    assert "0.00 cells" in told
+    assert "as an option states" in told
 
 
 def test_a_server_checks_stored_maps_alone(linefix: Linefix) -> None:

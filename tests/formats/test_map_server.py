@@ -11,7 +11,15 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from formats import FormatError, ImportedMap, IncompleteFileError, MalformedFileError, TooLargeError, read_map
+from formats import (
+    FormatError,
+    ImportedMap,
+    ImportOptions,
+    IncompleteFileError,
+    MalformedFileError,
+    TooLargeError,
+    read_map,
+)
 from registration import wrap_angle
 
 FREE, UNKNOWN, WALL = 254, 205, 0
@@ -122,13 +130,38 @@ def test_other_ways_to_draw_it_give_the_same_walls(
     assert ("thresholds" in {n.code for n in imported.report.assumed}) == (drawn is grey)
 
 
-def test_thick_walls_of_scattered_returns_lie_a_third_of_their_band_behind_its_front(tmp_path: Path) -> None:
+def room_of(back: NDArray[np.int64]) -> Pixels:
+    """Return a room of 4 m by 3 m from 0.5 m on, with walls of some cells, which repeat along each wall."""
     grid = np.full((80, 100), UNKNOWN, dtype=np.uint8)
-    grid[4:76, 4:96] = WALL
+    for k in range(100):
+        most = int(back[k % len(back)])
+        row, column = min(max(k, 10), 69), min(max(k, 10), 89)
+        grid[10 - most : 70 + most, column] = WALL
+        grid[row, 10 - most : 90 + most] = WALL
     grid[10:70, 10:90] = FREE
-    imported = read_map(write(tmp_path, grid))
-    # Six cells: the surface lies two cells, 0.1 m, behind the border at 0.5 m.
-    assert walls(imported) == {(0, 0.4, 4.0), (90, -4.6, 3.0), (180, -3.6, 4.0), (270, 0.4, 3.0)}
+    return grid
+
+
+AT_FRONT = {(0, 0.5, 4.0), (90, -4.5, 3.0), (180, -3.5, 4.0), (270, 0.5, 3.0)}
+BEHIND = {(0, 0.4, 4.0), (90, -4.6, 3.0), (180, -3.6, 4.0), (270, 0.4, 3.0)}  # by 2 cells
+
+
+@pytest.mark.parametrize(
+    ("back", "surface", "expected", "said"),
+    [
+        ([6], None, AT_FRONT, "as in a drawn grid"),
+        ([3], None, AT_FRONT, "as in a drawn grid"),
+        ([2], None, AT_FRONT, "as in a drawn grid"),
+        ([6, 9, 4, 6, 3, 8, 6], None, BEHIND, "as in a mapped grid"),  # six cells: a third of them
+        ([6], 2.0, BEHIND, "as an option states"),
+    ],
+)
+def test_the_surface_of_thick_walls(
+    tmp_path: Path, back: list[int], surface: float | None, expected: set[tuple[int, float, float]], said: str
+) -> None:
+    imported = read_map(write(tmp_path, room_of(np.array(back))), ImportOptions(surface=surface))
+    assert walls(imported) == expected
+    assert said in next(note.message for note in imported.report.assumed if note.code == "surface")
 
 
 def test_the_report_counts_what_it_read(tmp_path: Path) -> None:
@@ -220,3 +253,39 @@ def test_walls_leave_no_points(tmp_path: Path) -> None:
     grid[turned < 83] = WALL
     grid[turned < 80] = FREE
     assert len(read_map(write(tmp_path, grid)).map.points) <= 8, "at the corners"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("0, 0, 0]", "0, 0, -nan]"), None),
+        (("0, 0, 0]", "0, 0, nan]"), None),
+        (("0, 0, 0]", "0, 0, .nan]"), None),
+        (("[0, 0, 0]", "[692000.25, 5336000.5, 0]"), None),
+        (("0, 0, 0]", "0, 0, 90]"), "radians, at most 6.283, found 90; if these are degrees, write 1.5708"),
+        (("0, 0, 0]", "nan, 0, 0]"), "expected origin to be"),
+        (("negate: 0", "negate: no"), None),
+        (("negate: 0", "negate:\t0"), None),
+        (("negate: 0", "negate: 0\nnegate: 1"), 'line 5: found duplicate key "negate"'),
+        (("negate: 0", "negate: [0"), "is not YAML: line 5"),
+    ],
+)
+def test_descriptions_as_people_and_tools_write_them(tmp_path: Path, change: tuple[str, str], said: str | None) -> None:
+    path = write(tmp_path, l_room())
+    path.write_text(path.read_text().replace(*change))
+    if said is None:
+        imported = read_map(path)
+        assert len(imported.map.segments) == 6
+        assert ("orientation" in {note.code for note in imported.report.assumed}) == ("nan" in change[1])
+        return
+    with pytest.raises(FormatError) as caught:
+        read_map(path)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["TIFF", "GIF", "WebP"])
+def test_pictures_of_another_kind_are_named(tmp_path: Path, kind: str) -> None:
+    path = write(tmp_path, l_room())
+    Image.fromarray(l_room()).save(tmp_path / "map.pgm", format=kind)
+    with pytest.raises(MalformedFileError, match=f"is a {kind}; expected PGM.* Save it as PNG"):
+        read_map(path)

@@ -345,3 +345,24 @@ def test_topics_without_messages_are_passed_over_and_a_slash_may_be_left_out(tmp
     recording.scans(2, "/scan")
     path = recording.done()
     assert read(path)[0] == read(path, "scan")[0] == [0, 1]
+
+
+@pytest.mark.parametrize("kind", ["sensor_msgs::msg::dds_::LaserScan_", "sensor_msgs::msg::LaserScan"])
+def test_types_by_their_names_in_dds_and_cpp(tmp_path: Path, kind: str) -> None:
+    recording = Recording(tmp_path / "a.mcap")
+    recording.put("rt/scan", BEGUN, scan_bytes(BEGUN), kind=kind)
+    assert len(list(read_log(recording.done()))) == 1
+
+
+@pytest.mark.parametrize("kind", ["PointCloud2", "MultiEchoLaserScan"])
+def test_scans_of_other_types_say_what_converts_them(tmp_path: Path, kind: str) -> None:
+    recording = Recording(tmp_path / "a.mcap")
+    recording.put("/scan", BEGUN, scan_bytes(BEGUN), kind=f"sensor_msgs/msg/{kind}")
+    with pytest.raises(FormatError, match=f"convert {kind} with"):
+        read_log(recording.done())
+
+
+def test_a_bag_of_another_version(tmp_path: Path) -> None:
+    (tmp_path / "a.bag").write_bytes(b"#ROSRECORD V1.2\n" + bytes(500))
+    with pytest.raises(MalformedFileError, match="not begin as a bag of version 2.0; of V1.2, `rosbag fix`"):
+        read_log(tmp_path / "a.bag")
