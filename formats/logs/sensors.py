@@ -21,6 +21,8 @@ from .transforms import Transforms, planar
 from .trees import BagFrames
 from .tuning import FASTEST, MOST_TILT, SAID_TILT
 
+NAMELESS = "'', the empty frame_id of the scans: set it in the driver"
+
 
 def tilt_of(matrix: Floats) -> float:
     """Return how far the x-y plane of a frame is from horizontal, radians from 0 to pi/2; upside down is 0.
@@ -235,7 +237,11 @@ class Sensors:
     def _note_missing(self, frame: str, paths: list[list[str]]) -> None:
         moving = [path for path in paths if len(path) > 1 and path[-1] != base_of(path)]
         base = base_of(moving[0]) or frame if moving else base_of(paths[0] if paths else []) or frame
-        why = f"{shown(base)} does not move in {shown(moving[0][-1])}" if moving else f"no frame is above {shown(base)}"
+        why = (
+            f"{shown(base)} does not move in {shown(moving[0][-1])}"
+            if moving
+            else f"no frame is above {shown(base) or NAMELESS}"
+        )
         self._notes.add_assumed(
             "no_odometry", f"no odometry was found: {why}, and there is no Odometry message of this robot"
         )
