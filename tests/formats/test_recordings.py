@@ -364,5 +364,5 @@ def test_scans_of_other_types_say_what_converts_them(tmp_path: Path, kind: str) 
 
 def test_a_bag_of_another_version(tmp_path: Path) -> None:
     (tmp_path / "a.bag").write_bytes(b"#ROSRECORD V1.2\n" + bytes(500))
-    with pytest.raises(MalformedFileError, match="not begin as a bag of version 2.0; of V1.2, `rosbag fix`"):
+    with pytest.raises(MalformedFileError, match=r"not begin as a bag of version 2\.0; of V1\.2, `rosbag fix`"):
         read_log(tmp_path / "a.bag")
