@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +16,7 @@ from .index.joint import JointIndex
 from .index.map_index import MapIndex
 from .layout import (
     ENDS,
-    GATES,
     HARD_PRIOR,
-    MODEL,
     NO_PRIOR,
     PRIOR,
     SOFT_PRIOR,
@@ -36,15 +34,6 @@ from .tables import Question, ScoreWork
 from .tuning import EMPTY_CELL, LATE_CROWD, MOST_LOOKED_AT, MOST_RAYS
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
-
-
-@lru_cache
-def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
-    """Put records together, which numpy does field by field: those of most searches on a map are the same."""
-    terms = record(TERMS)
-    terms["gates"], terms["prior"] = np.frombuffer(gates, GATES), np.frombuffer(prior, PRIOR)
-    terms["model"] = np.frombuffer(model, MODEL)
-    return terms.tobytes()
 
 
 @dataclass(frozen=True)
@@ -192,8 +181,9 @@ class SearchContext:
     @cached_property
     def question(self) -> Question:
         """The input of the kernels."""
-        terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes())
-        return Question(self.lines.rows, np.frombuffer(bytearray(terms), TERMS))
+        terms = record(TERMS)
+        terms["gates"], terms["prior"], terms["model"] = self.gates, self.prior_record, self.lines.model
+        return Question(self.lines.rows, terms)
 
     def maps_at(self, poses: Records) -> Integers:
         """Return the map of each pose (k,), (k,): that nearest to the sensor; 0 where there is one."""

@@ -48,10 +48,6 @@ BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at
 BASE_SLACK_SHARE = 0.1  # of its length, tables
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables
 
-# --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
-
-AT_ONCE = 256  # runs, cells and poses that go through a stage together; measured: with 64 it takes a tenth longer
-
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
 COMPLETE_ABOVE = 0.75  # of the best value, tables; a pose above it must not have been missed: the verdict weighs it

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from registration.weights import MIN_WEIGHT
 from ..context import SearchContext
 from ..index.map_index import MapIndex
 from ..layout import record
-from ..options import Estimator, Rotation
 from ..result import Correspondence
 from .consensus_set import ConsensusSet
 from .kernels.acceptance import lay_segments, weigh_pairs
@@ -85,16 +83,9 @@ def register_accepted(
     weights = _weights(context, best, accepted, sigma)
     if weights is None and index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
         sigma = wall_sigma  # nothing at all is known to be off, and pairs need a weight
-    fit = _options(options.estimator, options.rotation)
-    if weights is not None:
-        fit = RegistrationOptions(estimator=options.estimator, rotation=options.rotation, weights=weights)
+    fit = RegistrationOptions(estimator=options.estimator, rotation=options.rotation, weights=weights)
     at = None if options.estimator == "one_step" else at
     return register(index.segments, measured, accepted.pairs, sigma, fit, at)
-
-
-@lru_cache
-def _options(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
-    return RegistrationOptions(estimator=estimator, rotation=rotation)
 
 
 def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:

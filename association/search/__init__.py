@@ -1,20 +1,17 @@
 """Search: the poses on a map that explain a scan best.
 
-The method is RANSAC, in the form of PoseLib's ``ransac_impl.h``: one loop, three steps, one record of statistics. The
-loop is `kernels.searching.search_bases`:
+The method is RANSAC, in the form of PoseLib's ``ransac_impl.h``: one loop in Python, whose steps are kernels.
 
-1. Draw a minimal sample, here called a base: two scan segments that are not parallel fix a pose (`kernels.bases`).
-   Those come first whose pose is precise and whose search costs little; at random only on request.
-2. Form the hypotheses of the base: one for each pair of wall chains on which both segments may lie. Crossings of chains
-   are looked up in lists (`kernels.lookup`), or else one segment is swept along each chain (`kernels.sweeping`);
-   `kernels.hypotheses` turns what is found into poses. Each hypothesis is rejected early, or matched to the walls
-   and refined by growing and shrinking its consensus set (`kernels.scoring`). It is then stored among the best poses
-   (`kernels.best_poses`).
+1. Draw a minimal sample, here called a base: two scan segments that are not parallel fix a pose. Those come first whose
+   pose is precise and whose search costs little (`rank_bases`); at random only on request.
+2. Propose the poses of the base: one segment is swept along each wall chain, and the other one lies on the chains that
+   its midpoint crosses (`sweep_base`). Each pose is rejected early (`reject`), or matched to the walls and refined by
+   growing and shrinking its consensus set (`score_poses`), and stored among the best poses.
 3. Evaluate the stopping rule, whether a better consensus set may have been missed: by a bound on its gain, and by the
-   fraction of sampled consensus sets that hold none of the bases so far (`kernels.stopping`).
+   fraction of sampled consensus sets that hold none of the bases so far (`count_missed`).
 
-Parallel walls alone, as in a corridor, make no base: `kernels.sliding` lays their segments on each chain at even steps.
+Parallel walls alone, as in a corridor, make no base: `slide_line` lays their segments on each chain at even steps.
 
-`candidates.find_candidates` is the entry from Python. A search is not resumed. It reads a flag between two hypotheses
-and ends where the deadline has set it. The best poses so far are then the result, and its report has `complete` False.
+The deadline is looked at between two calls of kernels. The best poses so far are then the result, and its report has
+`complete` False.
 """

@@ -35,20 +35,17 @@ def match_lines(
     cover = scratch.cover
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
+    per_cell = 1.0 / shape.cell
     gain = 0.0
-    left = SUM_SLACK
-    for i in range(len(scan)):
-        left += scan[i].gain
     for i in range(len(scan)):
         match = found[i]
         match.wall = -1
         match.overlap = 0.0
         match.gain = 0.0
-        left -= scan[i].gain
         px = c * scan[i].x - s * scan[i].y + pose.x
         py = s * scan[i].x + c * scan[i].y + pose.y
-        fx = (px - shape.x0) / shape.cell
-        fy = (py - shape.y0) / shape.cell
+        fx = (px - shape.x0) * per_cell
+        fy = (py - shape.y0) * per_cell
         if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
             cell = int(fy) * shape.columns + int(fx)
             if starts[cell] < starts[cell + 1]:
@@ -91,6 +88,6 @@ def match_lines(
                             match.wall = w
                             write_match(match, scan[i], line, wall, cover, gates.least_overlap)
         gain += match.gain
-        if gain + left < threshold:
+        if gain + scan[i].later_gain + SUM_SLACK < threshold:
             return -1.0
     return gain

@@ -176,6 +176,7 @@ def sweep_base(
     items = sweep.sectors.items
     shape = sweep.sectors.shape[0]
     cell = shape.cell
+    per_cell = 1.0 / cell
     columns = shape.columns
     rows = shape.rows
     windowed = prior.kind == HARD_PRIOR
@@ -213,8 +214,8 @@ def sweep_base(
         at = wa.begin + half_a - swing
         high = wa.end - half_a + swing
         wanted = sectors_about((wa.angle + turn + math.pi) * PER_RADIAN + 0.5, spread)
-        fx = (x + at * dx - shape.x0) / cell
-        fy = (y + at * dy - shape.y0) / cell
+        fx = (x + at * dx - shape.x0) * per_cell
+        fy = (y + at * dy - shape.y0) * per_cell
         column = math.floor(fx)
         row = math.floor(fy)
         step_x = 1 if dx > 0.0 else -1
