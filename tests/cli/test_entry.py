@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import cli
 from cli.logs import spread
 from cli.printing import console
+from tests.map_quality.check.drawn import faces
+
+from .drives import write_log
+
+ROOT = Path(cli.__file__).parent.parent
 
 
 def test_it_starts_and_ends_as_a_program() -> None:
@@ -28,3 +37,23 @@ def test_some_of_many_are_spread_evenly_and_of_none_none() -> None:
     assert spread([], 3) == []
     assert spread([1, 2], 3) == [1, 2]
     assert spread(list(range(10)), 5) == [0, 2, 4, 6, 8]
+
+
+def test_help_imports_nothing_that_computes_and_a_replay_no_service(folder: Path) -> None:
+    """Each in a process of its own: what was imported is in `sys.modules`."""
+    (folder / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+    write_log(folder / "drive.log", 3)
+    heavy = ("numpy", "pydantic", "scipy", "numba", "sqlalchemy", "fastapi", "service")
+    for arguments, unwanted in (
+        (["--help"], heavy),
+        (["replay", "drive.log", "--map", "floor.json", "--json"], ("service", "sqlalchemy", "fastapi")),
+    ):
+        program = (
+            "import sys; from cli.entry import run; "
+            f"code = run({arguments!r}); print(code, [one for one in {unwanted!r} if one in sys.modules])"
+        )
+        ended = subprocess.run(
+            [sys.executable, "-c", program], cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert ended.stdout.splitlines()[-1] == "0 []", ended.stderr
