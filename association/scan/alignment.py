@@ -36,7 +36,7 @@ from .views import corrected
 def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
     """Return a scan with its views laid on one another; one of exact views is returned as it is.
 
-    After the deadline no round begins: the views stay where the rounds before have laid them. `directed`: whether the
+    After the deadline no round ends: the views stay where the rounds before have laid them. `directed`: whether the
     directions of its segments mean anything.
     """
     views = scan.views
@@ -48,7 +48,9 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
         if deadline.passed:
             break
         shifts = (views.root @ (found - views.found)).reshape(-1, 3)
-        pairs = lines.moved(shifts).pairs(views.root @ spread @ views.root.T)
+        pairs = lines.moved(shifts).pairs(views.root @ spread @ views.root.T, deadline)
+        if pairs is None:
+            break
         residuals, variances = pairs.apart.ravel(), pairs.variances.ravel()
         jacobian = (pairs.steps @ views.root[pairs.errors]).reshape(-1, len(found))
         weighed = jacobian * (ALIGNING_SHARE / variances)[:, None]
@@ -98,14 +100,22 @@ class _Lines:
         out["dx"], out["dy"] = c * dx - s * dy, s * dx + c * dy
         return _Lines(out, self.of_view, self.places + shifts[:, :2])
 
-    def pairs(self, covariance: Floats) -> _Pairs:
-        """Pair lines of each view with those of the views before it that alone they can be.
+    def pairs(self, covariance: Floats, deadline: Deadline) -> _Pairs | None:
+        """Pair lines of each view with those of the views before it that alone they can be; None past the deadline.
 
         Two can be one if they run the same way, have enough in common, and lie within the error of both and of their
         views. A line that can be two of another view, which are farther apart than one wall is, is none of them there.
         Each is paired at most once, with the nearest view before its own.
         """
-        pairs = _Pairs.of(self, *self._alike())
+        found: list[_Pairs] = [_Pairs.of(self, *np.zeros((2, 0), np.intp))]
+        for view in range(1, len(self.places)):
+            if deadline.passed:
+                return None
+            found.append(self._pairs_of(view, covariance))
+        return _Pairs(*(np.concatenate([getattr(one, field.name) for one in found]) for field in fields(_Pairs)))
+
+    def _pairs_of(self, view: int, covariance: Floats) -> _Pairs:
+        pairs = _Pairs.of(self, *self._alike(view))
         lengths = self.lines["length"][pairs.rows]
         enough = pairs.common >= np.minimum(LEAST_ALIGNED, 0.5 * lengths.min(axis=1))
         pairs = pairs.taken(enough & (np.abs(pairs.apart[:, 0]) <= MOST_APART))
@@ -114,19 +124,15 @@ class _Lines:
         variances = pairs.variances + np.maximum(0.0, steps)
         return pairs.taken((np.abs(pairs.apart) <= GATE_SIGMAS * np.sqrt(variances)).all(axis=1)).nearest()
 
-    def _alike(self) -> tuple[Indices, Indices]:
+    def _alike(self, view: int) -> tuple[Indices, Indices]:
         """List the pairs of lines of a view and of those before it that run about the same way."""
         dx, dy = self.lines["dx"], self.lines["dy"]
-        starts = np.searchsorted(self.of_view, np.arange(len(self.places) + 1)).tolist()
-        found = [np.zeros((0, 2), np.intp)]
-        for v in range(1, len(self.places)):
-            own, before = slice(starts[v], starts[v + 1]), slice(starts[max(0, v - ALIGNED_VIEWS)], starts[v])
-            sines = np.outer(dy[own], dx[before]) - np.outer(dx[own], dy[before])
-            cosines = np.outer(dx[own], dx[before]) + np.outer(dy[own], dy[before])
-            alike = np.argwhere((np.abs(sines) <= MOST_TURNED) & (cosines > 0.0))
-            found.append(alike + np.array([own.start, before.start]))
-        one, other = np.concatenate(found).T
-        return one, other
+        first, begin, end = np.searchsorted(self.of_view, [max(0, view - ALIGNED_VIEWS), view, view + 1]).tolist()
+        own, before = slice(begin, end), slice(first, begin)
+        sines = np.outer(dy[own], dx[before]) - np.outer(dx[own], dy[before])
+        cosines = np.outer(dx[own], dx[before]) + np.outer(dy[own], dy[before])
+        one, other = np.nonzero((np.abs(sines) <= MOST_TURNED) & (cosines > 0.0))
+        return one + begin, other + first
 
 
 @dataclass(frozen=True, slots=True)
