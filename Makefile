@@ -13,16 +13,22 @@ export MKL_NUM_THREADS = 1
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-# The pip that Python brings takes twice as long as the one that is named there.
-$(VENV)/.ready: pyproject.toml requirements/dev.txt
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+
+# What the demo and the service run with. The pip that Python brings takes twice as long as the one that is named there.
+$(VENV)/.runs: requirements/demo.txt
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer with venv is needed (Debian: apt-get install python3-venv)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile $(shell grep ^pip== requirements/dev.txt)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -r requirements/dev.txt
+	$(PIP) $(shell grep ^pip== requirements/dev.txt)
+	$(PIP) -r requirements/demo.txt
+	@touch $@
+
+$(VENV)/.ready: $(VENV)/.runs pyproject.toml requirements/dev.txt
+	$(PIP) -r requirements/dev.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e . -e clients/python
 	@touch $@
 
-demo: $(VENV)/.ready  ## start the service, ask it where a robot is, draw the answer
+demo: $(VENV)/.runs  ## start the service, ask it where a robot is, draw the answer
 	$(BIN)/python -m examples.demo
 
 test: lint layers  ## lint, import layers, types and tests, these in three processes or as JOBS= says
@@ -130,6 +136,7 @@ lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is m
 	$(BIN)/python $(PIN) --generate-hashes --extra formats --extra service pyproject.toml requirements/image.in -o requirements/runtime.txt
 	$(BIN)/python $(PIN) --extra service --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python $(PIN) --generate-hashes -c requirements/dev.txt --group build -o requirements/build.txt
+	$(BIN)/python $(PIN) -c requirements/dev.txt --extra service --extra formats --group demo pyproject.toml -o requirements/demo.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group docs -o requirements/docs.txt
 

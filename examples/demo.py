@@ -11,30 +11,43 @@ import time
 from pathlib import Path
 from typing import Any
 
+from cli.compiling import compile_first
 from registration import Segments
 from simulation import SimulatedScan
 
 from .building import Case, draw_cases
 from .call import call
 from .picture import Exhibit, draw
-from .running import running_service
+from .running import StartError, running_service
 from .words import comparison_in_words, pose_in_words, verdict_in_words
 
 OUT = Path("out")
+PICTURE = """
+   map of walls            one laser scan             pose and verdict
+  +-----+   +-----+            . . . .               +-----+   +-----+
+  |     |   |     |          .         .             |     |   |  R  |
+  |     +---+     |    +     .    R    .      =      |     +---+     |   usable: yes or no,
+  |               |          .       . .             |               |   and why
+  +---------------+            . . .                 +---------------+
+"""
+NEXT = """Try next:
+  make serve                           the service; open http://127.0.0.1:8000 and drag the robot
+  .venv/bin/python examples/call.py    one request to it, from Python
+  docs/tutorials/map-and-log.md        your own map and log"""
 
 
 def main() -> int:
     """Run the demo; the status is 1 when a verdict is not the honest one."""
-    print("drawing a building with furniture that no map knows, and scanning it ...", flush=True)
+    print(PICTURE, flush=True)
+    compile_first()
     building, cases = draw_cases()
-    print("starting the service (the very first start compiles its kernels, a minute or two) ...", flush=True)
     begun = time.monotonic()
     with running_service() as (url, pid):
         print(f"ready at {url} after {time.monotonic() - begun:.1f} s, process {pid}\n")
         stored = call(url, "PUT", "/v1/maps/demo", {"segments": building.endpoints.tolist(), "frame_id": "building"})
         print(f"PUT /v1/maps/demo: {stored['segment_count']} segments, revision {stored['revision']}\n")
         exhibits = [ask(url, case) for case in cases]
-    print(f"the service has ended\n\npicture: {_picture(building, exhibits)}")
+    print(f"picture of the four answers: {_picture(building, exhibits)}\n\n{NEXT}")
     wrong = [exhibit.case.title for exhibit in exhibits if exhibit.answer["status"] != exhibit.case.expected]
     for title in wrong:
         print(f"not the expected verdict: {title}", file=sys.stderr)
@@ -75,4 +88,7 @@ def _picture(building: Segments, exhibits: list[Exhibit]) -> Path:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except StartError as error:
+        sys.exit(f"demo: {error}")

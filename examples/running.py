@@ -15,7 +15,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-START_SECONDS = 300.0  # the first start of all compiles the kernels
+START_SECONDS = 300.0  # a first start compiles the kernels
+LAST_LINES = 10  # of the log, that an error shows
 STOP_SECONDS = 15.0
 
 
@@ -62,13 +63,20 @@ def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> 
     give_up = time.monotonic() + START_SECONDS
     while time.monotonic() < give_up:
         if process.poll() is not None:
-            raise StartError(f"the service ended with status {process.returncode}:\n{log.read_text()}")
+            raise StartError(f"the service ended with status {process.returncode}; its last lines:\n{_last_lines(log)}")
         try:
             with urllib.request.urlopen(f"{url}/readyz", timeout=5):
                 return
         except (urllib.error.URLError, OSError):
             time.sleep(0.1)
-    raise StartError(f"the service was not ready within {START_SECONDS:.0f} s:\n{log.read_text()}")
+    raise StartError(
+        f"the service was not ready within {START_SECONDS:.0f} s; run the command again, which goes on where it was. "
+        f"Its last lines:\n{_last_lines(log)}"
+    )
+
+
+def _last_lines(log: Path) -> str:
+    return "\n".join(log.read_text().splitlines()[-LAST_LINES:])
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
