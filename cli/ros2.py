@@ -17,7 +17,7 @@ from .errors import RefusedError, WrongUseError
 from .inputs import needing_formats
 from .options import UsableOptions, grouped
 from .printing import Json
-from .ros2_parameters import parameters_of, robots_of
+from .ros2_parameters import given_parameter, parameters_of, robots_of
 from .several import read_maps
 
 if TYPE_CHECKING:
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 MAX_FRAME = 255  # characters
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
-CHOSEN, FILE = "linefix.ros2.namespace", "linefix.ros2.file"  # of the context: what the command line has
-NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "help")
+# Of the context: what the command line has.
+CHOSEN, FILE, GIVEN = "linefix.ros2.namespace", "linefix.ros2.file", "linefix.ros2.parameters"
+NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "stdout_logs", "help")
+OF_ALL_NODES = ("use_sim_time",)  # which changes nothing here: times are those of messages
 
 
 def _read_params(context: typer.Context, file: Path | None) -> Path | None:
@@ -45,20 +47,30 @@ def _read_namespace(context: typer.Context, value: Any) -> Any:
     return value
 
 
+def _read_parameters(context: typer.Context, rules: list[str] | None) -> list[str] | None:
+    """Take the parameters of the command line: they count before those of a file."""
+    context.meta[GIVEN] = {name: value for rule in rules or [] for name, value in given_parameter(rule).items()}
+    _take_defaults(context)
+    return rules
+
+
 def _take_defaults(context: typer.Context) -> None:
     file, others = context.meta.get(FILE, (None, {}))
-    if file is None:
+    given = context.meta.get(GIVEN, {})
+    if file is None and not given:
         return
     known = {
         option.name: option
         for option in context.command.params
         if option.name is not None and option.name not in NOT_IN_FILES
     }
-    values = parameters_of(file, context.meta.get(CHOSEN))
-    for name in values:
-        if name not in known:
-            raise WrongUseError(f"{file}: found the parameter {name}, expected one of {', '.join(sorted(known))}")
-    context.default_map = {**others, **values}
+    values = {} if file is None else parameters_of(file, context.meta.get(CHOSEN), known)
+    for name in {**values, **given}:
+        if name not in known and name not in OF_ALL_NODES:
+            expected = ", ".join(sorted("map" if one == "on" else one for one in known))
+            source = "-p" if name in given else file
+            raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
+    context.default_map = {**others, **values, **given}
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +193,24 @@ class RosArguments:
         typer.Option(metavar="FILE", is_eager=True, callback=_read_params, help="A parameter file of ROS 2 (YAML)."),
     ] = None
     ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored; the options after it apply as usual.")] = False
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--param",
+            "-p",
+            metavar="NAME:=VALUE",
+            is_eager=True,
+            callback=_read_parameters,
+            help="Set a parameter, as in ROS 2.",
+        ),
+    ] = None
+    log_level: Annotated[list[str] | None, typer.Option(metavar="LEVEL", help="Ignored, as are rosout logs.")] = None
+    rosout_logs: Annotated[
+        bool, typer.Option("--enable-rosout-logs/--disable-rosout-logs", hidden=True, help="Ignored.")
+    ] = False
+    stdout_logs: Annotated[
+        bool, typer.Option("--enable-stdout-logs/--disable-stdout-logs", hidden=True, help="Ignored.")
+    ] = False
     remap: Annotated[
         list[str] | None,
         typer.Option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ ANY = "**"  # stands for each node
 Sections = dict[tuple[str, str], dict[str, Any]]
 
 
-def parameters_of(file: Path, namespace: str | None = None) -> dict[str, Any]:
+def parameters_of(file: Path, namespace: str | None = None, known: Container[str] = ()) -> dict[str, Any]:
     """Return the parameters of a file for a robot, by the names of options.
 
     The sections ``/**`` and ``linefix`` apply to each robot, ``/robot1/linefix`` to that one and with precedence.
@@ -24,6 +25,8 @@ def parameters_of(file: Path, namespace: str | None = None) -> dict[str, Any]:
     file : Path
     namespace : str, optional
         Of the robot, such as ``/robot1``. None: that of the file, if all its sections have one at most.
+    known : container of str
+        Names of options; others in sections of all nodes are left out.
 
     Raises
     ------
@@ -39,9 +42,27 @@ def parameters_of(file: Path, namespace: str | None = None) -> dict[str, Any]:
             f"{file}: found parameters of {', '.join(robots)}, expected those of /{chosen}; correct --namespace"
         )
     values: dict[str, Any] = {}
-    for key in keys:
-        values.update(_with_maps(sections.get(key, {}), file))
+    for above, node in keys:
+        section = _with_maps(sections.get((above, node), {}), file)
+        # What all nodes share may be meant for others.
+        values.update({name: value for name, value in section.items() if node == NODE or name in known})
     return {key: value for key, value in values.items() if value is not None}
+
+
+def given_parameter(rule: str) -> dict[str, Any]:
+    """Return a parameter of the command line, ``name:=value``, by the name of its option; raises `WrongUseError`."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    name, found, text = rule.partition(":=")
+    try:
+        value = YAML(typ="safe").load(text) if len(text) <= MAX_PARAMETERS else None
+    except (YAMLError, ValueError, RecursionError):
+        value = None
+    node, _, name = name.rpartition(":")
+    if not found or not name or value is None or node.strip("/").rpartition("/")[2] not in ("", NODE):
+        raise WrongUseError(f"-p: found {rule[:80]!r}, expected NAME:=VALUE, such as agree:=5")
+    return _with_maps({name: value}, Path("-p"))
 
 
 def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:

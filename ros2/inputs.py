@@ -112,6 +112,10 @@ class Inputs:
         elif not silent and now - self._searched >= SILENT_SECONDS:
             self._log("scans arrive, but none can be searched; read the problem on /diagnostics")
         self._look_at_odometry()
+        for one in self._topics.transforms:
+            if one.subscription.incompatible:
+                name = one.subscription.name
+                self._log(f"a publisher of {name} has an incompatible QoS; publish {name} with reliable QoS")
         if self._topics.initial.incompatible:
             self._log(
                 f"a subscriber of {self._topics.initial.name} requests an incompatible QoS; expected reliable or best "

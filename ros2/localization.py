@@ -54,10 +54,12 @@ class Localization:
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
         self._transformed = 0  # the time of the last transform that was published, nanoseconds
 
-    def use(self, maps: Maps) -> None:
-        """Take other maps, and forget the pose; the walls of a single map are published at once."""
-        self._maps, self._map_name, self._localizer_map = maps, UNNAMED, None
-        self.begin_again()
+    def use(self, maps: Maps, *, kept: bool = False) -> None:
+        """Take other maps, and forget the pose unless it is kept; the walls of a single map are published at once."""
+        self._maps = maps
+        if not kept:
+            self._map_name, self._localizer_map = UNNAMED, None
+            self.begin_again()
         if not maps.several:
             self._publish_walls(None)
 

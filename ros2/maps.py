@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 import linefix
 
+SAME = 0.1  # m; two cells of most grids: a wall that is nearer is the same one
 UNNAMED = ""  # the name of a map that came over a topic
 
 
@@ -44,3 +47,25 @@ class Maps:
         if isinstance(self.index, linefix.MapSet):
             return self.index.parts[self.index.ids.index(self.name_of(map_id))].segments
         return self.index.segments.take(np.arange(self.index.directed))
+
+    def similarity(self, before: Maps | None) -> float:
+        """Return which fraction of the walls is where walls were before, or the other way round; the lesser one."""
+        if (
+            before is None
+            or self.several
+            or before.several
+            or list(self.frames.values()) != list(before.frames.values())
+        ):
+            return 0.0
+        mine, theirs = (_points_of(one.walls_of(None)) for one in (self, before))
+        return float(min(np.mean(cKDTree(b).query(a)[0] <= SAME) for a, b in ((mine, theirs), (theirs, mine))))
+
+
+def _points_of(walls: linefix.Segments) -> NDArray[np.float64]:
+    """Return points on walls, `SAME` apart."""
+    begins, ends = walls.endpoints[:, :2], walls.endpoints[:, 2:]
+    counts = np.ceil(np.linalg.norm(ends - begins, axis=1) / SAME).astype(int) + 1
+    which = np.repeat(np.arange(len(counts)), counts)
+    along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[which]
+    points: NDArray[np.float64] = begins[which] + along[:, None] * (ends - begins)[which]
+    return points

@@ -28,7 +28,7 @@ from .reporting import answer_marker, stamped_pose, values_of, verdict_of
 from .searching import Found, Searcher
 from .topics import Topics
 from .transforms import NS, FrameError, planar
-from .tuning import END_SECONDS, ODOMETRY_SECONDS, TRANSFORM_PERIOD_NS
+from .tuning import END_SECONDS, ODOMETRY_SECONDS, SAME_MAP, TRANSFORM_PERIOD_NS
 from .wire import Waiting
 
 BEAT = 0.2  # s between two checks whether to end
@@ -73,6 +73,7 @@ class Node:
         self._frames, self._odometry = Frames(), OdometryHistory()
         self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
+        self._unused = ""  # why the last map is not used
         self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
         self._beat = TRANSFORM_PERIOD_NS / NS if options.publish_tf else BEAT
@@ -171,13 +172,17 @@ class Node:
             return
         topic = self._topics.maps[0].name
         if converted.maps is None:
-            self._health.problem(f"the map on {topic} is not used: {converted.problem}")
+            self._unused = f"the map on {topic} is not used: {converted.problem}"
+            self._health.problem(self._unused)
             return
+        same = converted.maps.similarity(self._maps)
         self._maps = converted.maps
         self._generation += 1
-        self._localization.use(self._maps)
+        self._localization.use(self._maps, kept=same >= SAME_MAP)
         walls, frame = len(self._maps.walls_of(None)), self._maps.frame_of(None)
-        self._health.note(f"map from {topic}: {converted.size}, {walls} walls, frame {quoted(frame)}")
+        changed = f"; {100.0 * (1.0 - same):.1f} % of the walls are new or gone" if self._generation > 1 else ""
+        kept = "" if not changed else ", the pose is kept" if same >= SAME_MAP else ", the pose is discarded"
+        self._health.log(f"map from {topic}: {converted.size}, {walls} walls, frame {quoted(frame)}{changed}{kept}")
 
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
@@ -244,7 +249,7 @@ class Node:
             problem = (
                 "the map is being converted; scans are searched afterwards"
                 if converting
-                else "no usable map has been received; start map_server, or set --map"
+                else self._unused or "no usable map has been received; start map_server, or set --map"
             )
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
             return

@@ -26,6 +26,8 @@ END_SECONDS = 0.5  # s that the end waits for a search
 ODOMETRY_SECONDS = 0.5  # s that a result waits for odometry of its time; the slowest usual odometry has 10 Hz
 REPEAT_SECONDS = 1.0  # s within which the same problem is published once
 
+SAME_MAP = 0.8  # of the walls; a map of which more has changed may be another one, and its pose is found again
+
 # When scans agree.
 AGREEING_CHI_SQUARE = 16.27  # quantile of 99.9 % at three degrees of freedom
 ODOMETRY_DISTANCE = 0.03  # m, standard deviation of a step of any length: times of scans and odometry differ

@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import linefix
-from ros2 import NodeOptions, messages
+from ros2 import Maps, NodeOptions, messages
 from ros2.odometry import OdometryHistory
 from ros2.transforms import matrix_in_space
 
-from .robot import is_at_truth, mount, quaternion, running, scan, wait_until
+from .robot import ROOM, grid_of_room, is_at_truth, mount, quaternion, running, scan, wait_until
 from .test_agreement import STRAIGHT, drive, first_agreed
 from .test_fleet import Fleet, moved
 
@@ -72,6 +73,32 @@ def test_a_slow_robot_without_odometry_does_not_rest() -> None:
 
 def test_scans_of_different_parts_of_odometry_do_not_agree() -> None:
     assert first_agreed([replace(one, part=(k,)) for k, one in enumerate(drive(STRAIGHT))]) is None
+
+
+def test_a_map_with_few_changes_keeps_the_pose(room: linefix.MapIndex) -> None:
+    before = Maps(room, {"": "map"})
+    walls = ROOM.tolist()
+    added = linefix.index_map(np.array([*walls, [1.0, 1.0, 1.5, 1.0]]))
+    assert 0.8 < Maps(added, {"": "map"}).similarity(before) < 1.0
+    assert Maps(room, {"": "map"}).similarity(before) == 1.0
+    assert Maps(room, {"": "floor"}).similarity(before) == 0.0
+    assert Maps(linefix.index_map(ROOM + 0.5), {"": "map"}).similarity(before) < 0.8
+    assert Maps(room, {"": "map"}).similarity(None) == 0.0
+
+
+def test_a_map_that_changes_keeps_the_agreed_pose(domain: int) -> None:
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain, agree=1, map_topic="map", base_frame="laser"), None, logged.append):
+        robot, grid = Fleet(domain), grid_of_room()
+        robot.maps.publish(grid)
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+        for cell in range(70 * 140 + 30, 70 * 140 + 33):
+            grid.data[cell] = 100
+        robot.maps.publish(grid)
+        wait_until(lambda: any("are new or gone, the pose is kept" in line for line in logged), lambda: logged)
+        grid.info.origin.position.x += 1.0
+        robot.maps.publish(grid)
+        wait_until(lambda: any("are new or gone, the pose is discarded" in line for line in logged), lambda: logged)
 
 
 @pytest.fixture

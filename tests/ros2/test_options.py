@@ -79,7 +79,12 @@ def test_a_file_of_parameters_is_that_of_ros(tmp_path: Path) -> None:
         "/robot1/linefix:\n  ros__parameters:\n    agree: 5\n    map: hq.yaml\n    scan: [/a, /b]\n"
         "amcl:\n  ros__parameters:\n    agree: 9\n"
     )
-    assert parameters_of(file) == {"agree": 5, "base": "chassis", "on": ["hq.yaml"], "scan": ["/a", "/b"]}
+    assert parameters_of(file, None, ("agree", "base")) == {
+        "agree": 5,
+        "base": "chassis",
+        "on": ["hq.yaml"],
+        "scan": ["/a", "/b"],
+    }
     for text in ("", "[1]", "linefix: 3", "a: b: c", "\x00", "other:\n  ros__parameters: {}", "x: &a 1\ny: {<<: *a}"):
         file.write_text(text)
         with pytest.raises(WrongUseError, match="ros__parameters"):
@@ -92,8 +97,8 @@ def test_maps_are_a_list_and_a_later_section_replaces_them(tmp_path: Path) -> No
         "/**:\n  ros__parameters: {maps: [hq-1.yaml, hq-2.yaml]}\n"
         "/robot1/linefix:\n  ros__parameters: {map: hall.yaml}\n"
     )
-    assert parameters_of(file, "/robot2") == {"on": ["hq-1.yaml", "hq-2.yaml"]}
-    assert parameters_of(file, "/robot1") == {"on": ["hall.yaml"]}
+    assert parameters_of(file, "/robot2", ("on",)) == {"on": ["hq-1.yaml", "hq-2.yaml"]}
+    assert parameters_of(file, "/robot1", ("on",)) == {"on": ["hall.yaml"]}
 
 
 FLEET = (
@@ -156,6 +161,33 @@ def test_a_wrong_parameter_ends_with_2(
     file.write_text(f"linefix:\n  ros__parameters:\n    {text}\n")
     assert run(["ros2", "--params-file", str(file)]) == 2
     assert expected in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["-p", "map:=one.yaml"], "one.yaml: there is no such file"),
+        (["--params-file", "FILE", "-p", "linefix:map:=one.yaml"], "one.yaml: there is no such file"),
+        (["-p", "use_sim_time:=true", "--log-level", "linefix:=debug", "--disable-rosout-logs"], "two.yaml"),
+        (["-p", "agrees:=3"], "-p: found the parameter agrees, expected one of agree, base,"),
+        (["-p", "agree=3"], "-p: found 'agree=3', expected NAME:=VALUE"),
+        (["-p", "agree:=many"], "agree"),
+    ],
+)
+def test_arguments_of_ros_are_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], expected: str
+) -> None:
+    """A file that other nodes share has parameters that this one does not."""
+    file = tmp_path / "shared.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {use_sim_time: true, robot_radius: 0.3}\n"
+        "amcl:\n  ros__parameters: {agrees: 9}\nlinefix:\n  ros__parameters: {map: two.yaml}\n"
+    )
+    arguments = [str(file) if one == "FILE" else one for one in arguments]
+    files = [] if "--params-file" in arguments else ["--params-file", str(file)]
+    assert run(["ros2", "--ros-args", *arguments, *files]) == 2
+    assert expected in (said := capsys.readouterr().err)
+    assert " on," not in said
 
 
 @pytest.mark.parametrize(
