@@ -20,7 +20,6 @@ from linefix.warmup import warm_up
 from .admission.budget import ByteBudget
 from .admission.entrance import Entrance
 from .admission.gate import Gate
-from .admission.key_file import KeyFile
 from .admission.keys import Keyring
 from .admission.origins import Origins
 from .admission.readiness import Readiness
@@ -95,7 +94,9 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
         if isinstance(route, APIRoute):
             route.operation_id = route.operation_id or route.name  # generated clients name their functions so
     handle_errors(app)
-    if settings.cors_origins:
+    routes = frozenset(getattr(route, "path", "") for route in app.routes)
+    app.add_middleware(RequestMiddleware, services=services, routes=routes)
+    if settings.cors_origins:  # outside of it: a page may read refusals, too
         app.add_middleware(
             CORSMiddleware,
             allow_origins=settings.cors_origins,
@@ -110,22 +111,22 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
             ),
             expose_headers=("ETag", "Retry-After", "X-Request-Id"),
         )
-    app.add_middleware(RequestMiddleware, services=services)
     return app
 
 
 def _services(settings: Settings) -> Services:
     """Put the parts together; of several workers each has its share."""
     metrics = Metrics()
-    gate = Gate(settings.share(settings.searches), settings.share(settings.queue))
-    indexing = Gate(settings.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE, 0)
+    searches = settings.share(settings.searches)
+    gate = Gate(searches, searches + settings.share(settings.queue))
+    indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0)
     budget = _budget(settings, settings.max_bodies_bytes)
     store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(settings.share(settings.cache_bytes), metrics)
     parser = Child()
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
-    keyring = Keyring(settings.keys, None if settings.keys_file is None else KeyFile(settings.keys_file))
+    keyring = Keyring(settings.keys, settings.keys_file)
     origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
@@ -142,8 +143,8 @@ def _services(settings: Settings) -> Services:
         entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
         # The number that waits there is bounded by their bytes.
-        parsing=Gate(1, settings.max_connections, "parsing", long_per_slot=0),
-        parsing_apart=Gate(1, settings.max_connections, "parsing-apart", long_per_slot=0),
+        parsing=Gate(1, None, "parsing", long_per_slot=0),
+        parsing_apart=Gate(1, None, "parsing-apart", long_per_slot=0),
         indexing=indexing,
         keyring=keyring,
         answers=_budget(settings, settings.max_answers_bytes),
@@ -155,7 +156,7 @@ def _services(settings: Settings) -> Services:
         documents=_budget(settings, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
         # A second one when the first takes long, and not for the same key: each takes memory.
-        importing=Gate(1, settings.max_connections, "importing", long_per_slot=1),
+        importing=Gate(1, None, "importing", long_per_slot=1),
         import_bounds=Bounds(
             max(LEAST_IMPORT_BYTES, settings.share(settings.max_import_bytes)),
             settings.max_body_bytes,

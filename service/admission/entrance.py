@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from linefix.documents.errors import BodyTooLargeError
 
 from .errors import ForeignMapError, MissingRoleError
-from .gate import Gate
-from .grants import GUARDED, Asked, Grant, asked_of
+from .gate import Gate, Ticket
+from .key_file import EVERY_ROLE, Grant, Role
 from .keys import Keyring
 from .origins import Origins
-from .ticket import Ticket
 
-Head = Mapping[str, Any]
-"""An ASGI scope: method, path, headers, client."""
-Headers = Sequence[tuple[bytes, bytes]]
-
-
-def search_of(method: str, path: str) -> str | None:
-    """Return the route of a request that needs a slot at the gate, a map's id left out; None where it needs none."""
-    access = asked_of(method, path).access
-    return access.path if access is not None and access.searches else None
+GUARDED = "/v1/"
+"""Prefix of the paths that require a key; probes and pages stay open."""
+LIMITS = GUARDED + "limits"
+"""The one of them for which any key will do."""
+MAPS = GUARDED + "maps/"
+ROLES = {"GET": Role.READ, "HEAD": Role.READ, "POST": Role.ASSOCIATE, "PUT": Role.WRITE, "DELETE": Role.WRITE}
+"""The role that a method requires. What a POST sends is searched, converted or checked, and never stored."""
 
 
 class Entrance:
@@ -34,13 +31,8 @@ class Entrance:
         self._origins = origins
         self._max_body_bytes = max_body_bytes
 
-    def admit(self, head: Head) -> Ticket:
-        """Return the ticket of a request.
-
-        Parameters
-        ----------
-        head : Head
-            The path without its query, its escapes undone; names of headers in lower case.
+    def admit(self, head: Mapping[str, Any]) -> Ticket:
+        """Return the ticket of a request, given its ASGI scope.
 
         Raises
         ------
@@ -57,32 +49,27 @@ class Entrance:
         """
         method, path, headers = head["method"], head["path"], head["headers"]
         self._origins.require(headers)
-        if not path.startswith(GUARDED) or self._origins.is_preflight(method, headers):
-            grant, searches = Grant(), False
-        else:
-            asked = asked_of(method, path)
+        grant, searches = Grant(), False
+        if path.startswith(GUARDED):
             grant = self._keyring.grant(headers, head.get("client"))
-            _require(grant, asked)
-            searches = asked.access is not None and asked.access.searches
+            _require(grant, method, path)
+            searches = method == "POST" or (path.endswith(":check") and method in ("GET", "HEAD"))
         if method in ("POST", "PUT"):
-            self._check_length(headers)
-        if not searches:
-            return Ticket(grant.holder, maps=grant.maps)
-        self._gate.require_place(grant.holder)
-        return Ticket(grant.holder, self._gate, grant.maps)
-
-    def _check_length(self, headers: Headers) -> None:
-        for name, value in headers:
-            if name == b"content-length" and value.isdigit() and int(value) > self._max_body_bytes:
-                raise BodyTooLargeError(self._max_body_bytes)
+            for name, value in headers:
+                if name == b"content-length" and value.isdigit() and int(value) > self._max_body_bytes:
+                    raise BodyTooLargeError(self._max_body_bytes)
+        if searches:
+            self._gate.require_place(grant.holder)
+        return Ticket(grant.holder, grant.maps)
 
 
-def _require(grant: Grant, asked: Asked) -> None:
+def _require(grant: Grant, method: str, path: str) -> None:
     """Raise where the caller lacks the permission for this request."""
-    access = asked.access
-    # A path outside the table may belong to a route that is missing there.
-    allowed = grant.is_whole if access is None else access.role is None or access.role in grant.roles
-    if not allowed:
-        raise MissingRoleError(None if access is None else access.role)
-    if asked.map_id is not None and not grant.sees(asked.map_id):
+    role = ROLES.get(method)
+    if role is None and (grant.roles, grant.maps) != (EVERY_ROLE, ""):
+        raise MissingRoleError("the key lacks every role and all maps, which this method requires; send a key that has")
+    if role is not None and role not in grant.roles and path != LIMITS:
+        raise MissingRoleError(f"the key lacks the role `{role}`; send a key that has it")
+    # An id ends where a prefix cannot go on, so that the rest of the path begins like the id.
+    if path.startswith(MAPS) and not path.startswith(MAPS + grant.maps):
         raise ForeignMapError

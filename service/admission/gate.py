@@ -1,4 +1,4 @@
-"""Admit searches: at most one per core, a short queue shared fairly, and a refusal for the rest.
+"""Run searches: a bounded number at a time, the others in a queue that keys share fairly, and a refusal for the rest.
 
 A search that has run for long goes on in a thread of lower priority and gives its slot back: the operating system runs
 it in the time that short searches leave. The number of these is bounded, for all callers and for each.
@@ -7,18 +7,21 @@ it in the time that short searches leave. The number of these is bounded, for al
 from __future__ import annotations
 
 import asyncio
+import os
+import queue
+import sys
+import threading
 import time
-from collections import Counter
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
 
 from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
-from .fair_queue import FairQueue, Holder, Waiter
-from .threads import GateThreads, Running
-from .ticket import Ticket
+from .key_file import Holder
 
 T = TypeVar("T")
 HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end
@@ -28,107 +31,133 @@ LONG_PER_SLOT = 2  # long searches for each slot: each has a thread, and the mem
 
 
 @dataclass(eq=False, slots=True)
-class _Run:
-    """A function that runs.
+class Ticket:
+    """One request's admission: its caller, the prefix of the ids of its maps, and whether it has a place and a slot."""
 
-    Attributes
-    ----------
-    holder : Holder
-    running : Running
-        In which thread.
-    begun : float
-        `time.monotonic()` seconds.
-    timer : TimerHandle or None
-        When it counts as long; None where it never does.
-    long : bool
-        True once it has given its slot back.
-    """
+    holder: Holder = None
+    maps: str = ""
+    has_place: bool = False
+    had_slot: bool = False
+
+
+@dataclass(eq=False, slots=True)
+class _Share:
+    """What one holder has of a gate: requests with a place, what runs, what is long, what waits; and seconds used."""
+
+    used: float
+    places: int = 0
+    running: int = 0
+    long: int = 0
+    waiting: deque[tuple[Ticket, asyncio.Future[None]]] = field(default_factory=deque)
+
+
+@dataclass(eq=False, slots=True)
+class _Run:
+    """A function that runs, and the answer that its caller waits for."""
 
     holder: Holder
-    running: Running
+    deadline: Deadline
+    answer: asyncio.Future[Any]
     begun: float
-    timer: asyncio.TimerHandle | None = None
+    worker: _Worker
+    timers: list[asyncio.TimerHandle] = field(default_factory=list)
     long: bool = False
 
 
 class Gate:
-    """Runs functions in threads of its own, a bounded number at a time and a bounded number waiting.
-
-    Belongs to one event loop.
+    """Runs functions in threads of its own; belongs to one event loop.
 
     Parameters
     ----------
     slots : int
-        Searches that run at once, long ones apart.
-    queue : int
-        Searches that may wait, or run for long.
+        Functions that run at once, long ones apart.
+    places : int or None
+        Requests that may be on their way, wait or run; None where something else bounds them.
     name : str
         Of the threads.
     nice : int
-        By how much they go behind other threads.
+        By how much these go behind other threads.
     long_per_slot : int
-        Long searches that may run next to those that have slots; 0: every function keeps its slot until it returns.
+        Long functions that may run next to those that have slots; 0: each keeps its slot until it returns.
     """
 
     def __init__(
-        self, slots: int, queue: int, name: str = "search", nice: int = 0, long_per_slot: int = LONG_PER_SLOT
+        self,
+        slots: int,
+        places: int | None = None,
+        name: str = "search",
+        nice: int = 0,
+        long_per_slot: int = LONG_PER_SLOT,
     ) -> None:
         self.slots = slots
-        self._places = slots + queue
+        self._most = sys.maxsize if places is None else places
         self._most_long = long_per_slot * slots
         self._most_long_of_one = max(1, self._most_long // 2)
-        self._threads = GateThreads(name, nice)
-        self._queue = FairQueue()
-        self._long: Counter[Holder] = Counter()
-        self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
-        self._taken = 0
-        self._expected = 0
-        self._over: asyncio.Future[None] | None = None
+        self._name, self._nice = name, nice
+        self._idle: list[_Worker] = []
+        self._closed = False
+        self._runs: set[_Run] = set()
+        self._shares: dict[Holder, _Share] = {}
+        self._places = self._taken = self._long = 0
 
     @property
     def running(self) -> int:
-        """The number of searches that run, long ones included."""
-        return self._taken + self._long.total()
+        """The number of functions that run, long ones included."""
+        return len(self._runs)
 
     @property
     def waiting(self) -> int:
-        """The number of searches that wait."""
-        return self._queue.waiting
+        """The number of functions that wait."""
+        return sum(len(share.waiting) for share in self._shares.values())
 
-    @property
-    def full(self) -> bool:
-        """Return whether every place is taken or reserved; a holder with less than its share may still be let in."""
-        return self.running + self.waiting + self._expected >= self._places
-
-    def expect(self, holder: Holder) -> None:
-        """Note that a request is on its way to the gate, its body complete."""
-        self._expected += 1
-        self._queue.expect(holder)
-
-    def expect_no_longer(self, holder: Holder) -> None:
-        """Note that one that was expected is there, or will never come."""
-        self._expected -= 1
-        self._queue.expect_no_longer(holder)
-
-    def require_place(self, holder: Holder = None) -> None:
-        """Refuse a request whose body is still to be read, when there is no place for it.
-
-        A full queue is shared. A holder that has less than its share of the places is let in all the same. The holder
-        with the most gives up one.
+    def require_place(self, holder: Holder) -> None:
+        """Refuse a request when every place is taken, unless its holder has less than its share of them.
 
         Raises
         ------
         QueueFullError, ShareUsedError
         """
-        if self.full:
-            self._require_share(holder)
+        if self._places < self._most:
+            return
+        mine = self._shares[holder].places if holder in self._shares else 0
+        holders = sum(share.places > 0 for share in self._shares.values()) + (mine == 0)
+        if holders > 1 and mine * holders >= self._most:
+            raise ShareUsedError
+        if (mine + 1) * holders > self._most:
+            raise QueueFullError
 
-    async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool]) -> T:
-        """Run a function as soon as it has a slot.
+    def enter(self, ticket: Ticket) -> None:
+        """Take a place for a request whose body has arrived, once; where all are taken, from the holder with the most.
+
+        Raises
+        ------
+        QueueFullError, ShareUsedError
+        """
+        if ticket.has_place:
+            return
+        self.require_place(ticket.holder)
+        share = self._share(ticket.holder)
+        if self._places >= self._most:
+            self._evict(share.places + 1)
+        ticket.has_place = True
+        share.places += 1
+        self._places += 1
+
+    def leave(self, ticket: Ticket) -> None:
+        """Give a request's place back, where it has one."""
+        if ticket.has_place:
+            ticket.has_place = False
+            self._places -= 1
+            self._shares[ticket.holder].places -= 1
+            self._forget(ticket.holder)
+
+    async def run(
+        self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool] = lambda: True
+    ) -> T:
+        """Run a function as soon as it has a slot; a request that had one is not refused later.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns or is long, so
-        that there are never more running than slots. Cancel the deadline to make it return soon. A further part of a
-        request that had one is waited for however long the queue is.
+        that there are never more running than slots. Cancel the deadline to make it return soon.
 
         Parameters
         ----------
@@ -139,159 +168,207 @@ class Gate:
 
         Raises
         ------
-        QueueFullError, ShareUsedError
-            When the queue is full, or the place went to a holder that has fewer.
+        ShareUsedError
+            When the place went to a holder that has fewer.
         DeadlinePassedError
             When the deadline passes before there is a slot, or before the function heeds it.
         CancelledError
             When every search is cancelled.
         """
-        ticket.arrive()
-        await self._enter(deadline, ticket)
-        ticket.admitted = True
-        return await self._outcome(self._start(function, deadline, ticket.holder), deadline, heeds)
-
-    def _start(self, function: Callable[[], T], deadline: Deadline, holder: Holder) -> asyncio.Future[T]:
-        """Start a function in a thread, in the slot that its holder has."""
+        if deadline.passed:
+            raise DeadlinePassedError
+        share = self._share(ticket.holder)
+        if self._taken < self.slots and self._may_start(share):
+            self._take(share)
+        else:
+            await self._wait(share, deadline, ticket)
+        ticket.had_slot = True
+        answer = self._start(function, deadline, ticket.holder, heeds)
         try:
-            run = _Run(holder, self._threads.start(function), time.monotonic())
-        except BaseException:
-            self._free_slot(holder, 0.0)
-            raise
-        work: asyncio.Future[T] = asyncio.wrap_future(run.running.result)
-        self._deadlines[work] = deadline
-        self._watch(run)
-        work.add_done_callback(lambda done: self._finish(done, run))
-        return work
-
-    async def _outcome(self, work: asyncio.Future[T], deadline: Deadline, heeds: Callable[[], bool]) -> T:
-        """Wait for what runs, as long as it is waited for."""
-        if self._over is None:
-            self._over = work.get_loop().create_future()
-        either: set[asyncio.Future[Any]] = {work, self._over}
-        ended, _ = await asyncio.wait(either, timeout=_left(deadline), return_when=asyncio.FIRST_COMPLETED)
-        if not ended and heeds():
-            await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
-        if work.done():
-            try:
-                return work.result()
-            finally:
-                del work, either, ended  # else a cycle: the traceback of an error holds this frame
-        if self._over.done():
-            raise CancelledError
-        raise DeadlinePassedError
+            return await answer
+        finally:
+            del answer  # else a cycle: an error holds this frame, and everything that the function worked with
 
     def cancel_all(self) -> None:
         """Cancel everything that runs, and soon wait no longer for functions that do not end, as indexing a map."""
-        for deadline in self._deadlines.values():
-            deadline.cancel()
-        if self._over is not None:
-            self._over.get_loop().call_later(HEARING_SECONDS, self._end, self._over)
+        for run in self._runs:
+            run.deadline.cancel()
+            run.answer.get_loop().call_later(HEARING_SECONDS, _fail, run.answer, CancelledError())
 
     def close(self) -> None:
-        """Give the threads back; does not wait for them."""
-        self._threads.close()
+        """End the free threads; does not wait for the others, which end with their functions."""
+        self._closed = True
+        for worker in self._idle:
+            worker.todo.put(None)
+        self._idle.clear()
 
-    def _watch(self, run: _Run) -> None:
-        """Look again whether a function is long, once it has run for so long."""
-        if self._most_long:
-            run.timer = asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run)
+    async def _wait(self, share: _Share, deadline: Deadline, ticket: Ticket) -> None:
+        loop = asyncio.get_running_loop()
+        one = ticket, loop.create_future()
+        share.waiting.append(one)
+        timer = _at(deadline, _fail, one[1], DeadlinePassedError())
+        try:
+            await one[1]
+        except BaseException:
+            if one in share.waiting:
+                share.waiting.remove(one)
+                self._forget(ticket.holder)
+            elif not one[1].cancelled() and one[1].exception() is None:  # a slot came as the caller left
+                self._free(ticket.holder, 0.0)
+            raise
+        finally:
+            if timer is not None:
+                timer.cancel()
+
+    def _start(
+        self, function: Callable[[], T], deadline: Deadline, holder: Holder, heeds: Callable[[], bool]
+    ) -> asyncio.Future[T]:
+        """Start a function in a thread, in the slot that its holder has."""
+        loop = asyncio.get_running_loop()
+        try:
+            if self._closed:
+                raise RuntimeError("this gate is closed")
+            worker = self._idle.pop() if self._idle else _Worker(self._name, self._nice)
+        except BaseException:
+            self._free(holder, 0.0)
+            raise
+        run = _Run(holder, deadline, loop.create_future(), time.monotonic(), worker)
+        self._runs.add(run)
+
+        def expire() -> None:
+            if not heeds():
+                _fail(run.answer, DeadlinePassedError())
+
+        timers = [_at(deadline, expire), loop.call_later(LONG_SECONDS, self._lower, run) if self._most_long else None]
+        run.timers = [timer for timer in timers if timer is not None]
+        worker.todo.put((function, lambda *outcome: loop.call_soon_threadsafe(self._finish, run, *outcome)))
+        return run.answer
+
+    def _finish(self, run: _Run, result: object, error: BaseException | None) -> None:
+        for timer in run.timers:
+            timer.cancel()
+        self._runs.remove(run)
+        if run.long or self._closed:  # a priority that was lowered cannot be raised again without rights
+            run.worker.todo.put(None)
+        else:
+            self._idle.append(run.worker)
+        if run.long:
+            self._long -= 1
+            share = self._shares[run.holder]
+            share.long -= 1
+            share.running -= 1
+            self._forget(run.holder)
+            self._fill()
+        else:
+            self._free(run.holder, time.monotonic() - run.begun)
+        if error is not None:
+            _fail(run.answer, error)
+        elif not run.answer.done():
+            run.answer.set_result(result)
 
     def _lower(self, run: _Run) -> None:
         """Have a long search go on behind short ones, and hand on its slot; later where too many do so."""
-        if self._long.total() >= self._most_long or self._long[run.holder] >= self._most_long_of_one:
-            self._watch(run)
+        share = self._shares[run.holder]
+        if self._long >= self._most_long or not self._may_start(share):
+            run.timers.append(asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run))
             return
         run.long = True
-        run.running.lower(LONG_NICE)
-        self._long[run.holder] += 1
-        self._queue.spent(run.holder, time.monotonic() - run.begun)
+        _go_behind(run.worker.native_id, LONG_NICE)
+        share.used += time.monotonic() - run.begun
+        share.long += 1
+        self._long += 1
         self._taken -= 1
         self._fill()
 
-    def _may_start(self, holder: Holder) -> bool:
-        """Return whether a holder may start a search: not while it has its share of the long ones."""
-        return not self._most_long or self._long[holder] < self._most_long_of_one
+    def _share(self, holder: Holder) -> _Share:
+        """Return what a holder has. A new one starts where the least served is, without credit."""
+        found = self._shares.get(holder)
+        if found is None:
+            found = _Share(min((share.used for share in self._shares.values()), default=0.0))
+            self._shares[holder] = found
+        return found
 
-    def _require_share(self, holder: Holder) -> None:
-        """Raise unless a holder has less than its share of a full queue."""
-        mine = self._queue.places_of(holder)
-        holders = self._queue.holders + (mine == 0)
-        share = self._places / holders
-        if holders > 1 and mine >= share:
-            raise ShareUsedError
-        if mine + 1 > share:
-            raise QueueFullError
+    def _forget(self, holder: Holder) -> None:
+        share = self._shares[holder]
+        if not (share.places or share.running or share.waiting):
+            del self._shares[holder]
 
-    def _end(self, over: asyncio.Future[None]) -> None:
-        if not over.done():
-            over.set_result(None)
+    def _may_start(self, share: _Share) -> bool:
+        """Return whether a holder may start a search, or have one more long: not while it has its share of these."""
+        return not self._most_long or share.long < self._most_long_of_one
 
-    async def _enter(self, deadline: Deadline, ticket: Ticket) -> None:
-        if deadline.passed:
-            raise DeadlinePassedError
-        holder = ticket.holder
-        if self._taken < self.slots and self._may_start(holder):
-            self._taken += 1
-            self._queue.started(holder)
-            return
-        if not ticket.admitted:
-            self._make_room(holder)
-        waiter = self._queue.join(holder, fixed=ticket.admitted)
-        try:
-            await asyncio.wait({waiter}, timeout=_left(deadline))
-        except asyncio.CancelledError:
-            self._give_up(holder, waiter)
-            raise
-        if not waiter.done():
-            self._queue.leave(holder, waiter)
-            raise DeadlinePassedError
-        waiter.result()
+    def _take(self, share: _Share) -> None:
+        self._taken += 1
+        share.running += 1
 
-    def _make_room(self, holder: Holder) -> None:
-        """Raise when the queue is full; for a holder with less than its share take a place from another."""
-        if self.running + self.waiting < self._places:
-            return
-        self._require_share(holder)
-        taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
-        if taken is None:
-            raise QueueFullError
-        taken.set_exception(ShareUsedError())
-
-    def _give_up(self, holder: Holder, waiter: Waiter) -> None:
-        """Leave the queue, or hand on the slot that has just come."""
-        if not waiter.done():
-            self._queue.leave(holder, waiter)
-        elif waiter.exception() is None:
-            self._free_slot(holder, 0.0)
-
-    def _finish(self, done: asyncio.Future[Any], run: _Run) -> None:
-        del self._deadlines[done]
-        if run.timer is not None:
-            run.timer.cancel()
-        if not done.cancelled():
-            done.exception()  # looked at, also where the caller has gone
-        if not run.long:
-            self._free_slot(run.holder, time.monotonic() - run.begun)
-            return
-        self._long[run.holder] -= 1
-        if not self._long[run.holder]:
-            del self._long[run.holder]
-        self._queue.finished(run.holder, 0.0)
-        self._fill()
-
-    def _free_slot(self, holder: Holder, seconds: float) -> None:
-        self._queue.finished(holder, seconds)
+    def _free(self, holder: Holder, seconds: float) -> None:
         self._taken -= 1
+        share = self._shares[holder]
+        share.running -= 1
+        share.used += seconds
+        self._forget(holder)
         self._fill()
 
     def _fill(self) -> None:
-        """Hand free slots to those that wait and may start."""
-        while self._taken < self.slots and (waiter := self._queue.next(self._may_start)) is not None:
-            self._taken += 1
-            waiter.set_result(None)
+        """Hand free slots to those that wait and may start; the holder that has used the least time is first."""
+        while self._taken < self.slots:
+            ready = [share for share in self._shares.values() if share.waiting and self._may_start(share)]
+            if not ready:
+                return
+            share = min(ready, key=lambda one: one.used)
+            _, waiter = share.waiting.popleft()
+            if not waiter.done():
+                self._take(share)
+                waiter.set_result(None)
+
+    def _evict(self, most: int) -> None:
+        """Take the place of the youngest that still waits for its first slot, of the holder with the most places."""
+        for share in sorted(self._shares.values(), key=lambda one: one.places, reverse=True):
+            for ticket, waiter in reversed(share.waiting):
+                if share.places > most and not ticket.had_slot and not waiter.done():
+                    self.leave(ticket)
+                    _fail(waiter, ShareUsedError())
+                    return
+        raise QueueFullError
 
 
-def _left(deadline: Deadline) -> float | None:
-    """Return the seconds until a deadline, None where it has no time."""
-    return None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+class _Worker(threading.Thread):
+    """A thread that runs one function after the other; it does not keep the process, for some cannot be interrupted."""
+
+    def __init__(self, name: str, nice: int) -> None:
+        super().__init__(name=name, daemon=True)
+        self._nice = nice
+        self.todo: queue.SimpleQueue[tuple[Callable[[], Any], Callable[..., Any]] | None] = queue.SimpleQueue()
+        self.start()
+
+    def run(self) -> None:
+        _go_behind(self.native_id, self._nice)
+        while (task := self.todo.get()) is not None:
+            function, report = task
+            result, error = None, None
+            try:
+                result = function()
+            except BaseException as raised:
+                error = raised
+            with suppress(RuntimeError):  # the loop has ended
+                report(result, error)
+            del task, function, report, result, error  # an error holds this frame
+
+
+def _fail(waiter: asyncio.Future[Any], error: BaseException) -> None:
+    if not waiter.done():
+        waiter.set_exception(error)
+
+
+def _at(deadline: Deadline, call: Callable[..., None], *arguments: Any) -> asyncio.TimerHandle | None:
+    """Call when a deadline passes; None where it has no time."""
+    if deadline.at is None:
+        return None
+    return asyncio.get_running_loop().call_later(max(0.0, deadline.at - time.monotonic()), call, *arguments)
+
+
+def _go_behind(thread: int | None, nice: int) -> None:
+    """Give a thread a lower priority, where threads have priorities of their own."""
+    if nice and thread is not None and sys.platform == "linux":
+        with suppress(OSError):  # it has ended
+            os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + nice)

@@ -13,17 +13,36 @@
 
 from __future__ import annotations
 
-import logging
 import tomllib
+from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-from .grants import EVERY_ROLE, Grant, Role
+Holder = bytes | None
+"""Whose request it is: the digest of a key, or an address where the service has no keys; None where unknown."""
 
-logger = logging.getLogger("linefix")
-Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+
+class Role(StrEnum):
+    """A permission of a key; none includes another."""
+
+    READ = "read"
+    ASSOCIATE = "associate"
+    WRITE = "write"
+
+
+EVERY_ROLE = frozenset(Role)
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The permissions of a caller: its roles, and the prefix of the ids of its maps. No other maps exist for it."""
+
+    holder: Holder = None
+    roles: frozenset[Role] = EVERY_ROLE
+    maps: str = ""
 
 
 class KeyFileError(Exception):
@@ -36,7 +55,7 @@ class Key(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(min_length=1, max_length=64)
-    sha256: Digest
+    sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
     roles: frozenset[Role] = Field(EVERY_ROLE, min_length=1)
     maps: str = Field("", min_length=1, max_length=128, pattern="^[A-Za-z0-9._-]+$")
 
@@ -45,6 +64,11 @@ class _File(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     key: tuple[Key, ...] = ()
+
+
+def parse_keys(text: str) -> tuple[Key, ...]:
+    """Return the keys that a file's text describes; raises `ValueError` where it is not as it has to be."""
+    return _File.model_validate(tomllib.loads(text)).key
 
 
 def read_keys(path: Path) -> dict[bytes, Grant]:
@@ -56,48 +80,19 @@ def read_keys(path: Path) -> dict[bytes, Grant]:
         When a file cannot be read, is no TOML, or not as described above; when it names a key twice.
     """
     keys = [key for file in _files(path) for key in _read(file)]
-    found = {bytes.fromhex(key.sha256): key for key in keys}
-    if len(found) < len(keys):
+    digests = [bytes.fromhex(key.sha256) for key in keys]
+    if len(set(digests)) < len(keys):
         raise KeyFileError(f"{path}: contains a key twice; remove one")
-    return {digest: Grant(digest, key.roles, key.maps) for digest, key in found.items()}
+    return {digest: Grant(digest, key.roles, key.maps) for digest, key in zip(digests, keys, strict=True)}
 
 
-class KeyFile:
-    """The keys of a file as it is now.
-
-    Parameters
-    ----------
-    path : Path
-        Of a file, or of a directory of them, as secrets are mounted.
-
-    Raises
-    ------
-    KeyFileError
-        When it cannot be used to begin with.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._seen = _state(path)
-        self.grants = read_keys(path)
-
-    def refresh(self) -> None:
-        """Read it again where it has changed; what cannot be used leaves the keys as they were, and is logged."""
-        state = _state(self._path)
-        if state == self._seen:
-            return
-        self._seen = state
-        try:
-            self.grants = read_keys(self._path)
-        except KeyFileError as error:
-            logger.error("the keys stay as they were: %s", error)
-        else:
-            logger.info("keys read", extra={"keys": len(self.grants)})
-
-
-def parse_keys(text: str) -> tuple[Key, ...]:
-    """Return the keys that a file's text describes; raises `ValueError` where it is not as it has to be."""
-    return _File.model_validate(tomllib.loads(text)).key
+def state_of(path: Path) -> object:
+    """Return values that differ between contents, found without reading them."""
+    try:
+        stats = [file.stat() for file in _files(path)]
+    except (KeyFileError, OSError):
+        return None
+    return [(stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for stat in stats]
 
 
 def _files(path: Path) -> list[Path]:
@@ -120,12 +115,3 @@ def _read(file: Path) -> tuple[Key, ...]:
         raise KeyFileError(f"{file}: {where}") from None
     except ValueError:
         raise KeyFileError(f"{file}: is not TOML in UTF-8") from None
-
-
-def _state(path: Path) -> object:
-    """Return values that differ between contents, found without reading them."""
-    try:
-        stats = [file.stat() for file in _files(path)]
-    except (KeyFileError, OSError):
-        return None
-    return [(stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for stat in stats]

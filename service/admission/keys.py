@@ -1,49 +1,40 @@
-"""Identification of callers: by a key, or by an address where the service has none."""
+"""Identification of callers: by a key, or by an address where the service has no keys."""
 
 from __future__ import annotations
 
 import hashlib
-import hmac
 import ipaddress
+import logging
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from pathlib import Path
 
 from pydantic import SecretStr
 
 from .errors import MissingKeyError, UnknownKeyError
-from .fair_queue import Holder
-from .grants import Grant
-from .key_file import KeyFile
+from .key_file import Grant, Holder, KeyFileError, read_keys, state_of
 
+logger = logging.getLogger("linefix")
 Client = tuple[str, int] | None
 
 
 class Keyring:
-    """The keys that are known, as digests.
+    """The keys that are known, as digests: those of the settings, with every permission, and those of a file.
 
-    Parameters
-    ----------
-    keys : sequence of SecretStr
-        Keys with every permission.
-    file : KeyFile, or None
-        Without both every caller is let in.
+    `file` may be a directory of them, as secrets are mounted. Without keys every caller is let in. Raises
+    `KeyFileError` where the file cannot be used to begin with.
     """
 
-    def __init__(self, keys: Sequence[SecretStr], file: KeyFile | None = None) -> None:
-        digests = (digest_of(key.get_secret_value().encode()) for key in keys)
+    def __init__(self, keys: Sequence[SecretStr], file: Path | None = None) -> None:
+        digests = [hashlib.sha256(key.get_secret_value().encode()).digest() for key in keys]
         self._whole = {digest: Grant(digest) for digest in digests}
         self._file = file
+        self._seen = None if file is None else state_of(file)
+        self.grants = self._whole if file is None else read_keys(file) | self._whole
         self._guarded = bool(keys) or file is not None
 
     def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
         """Return the permissions of a request; where the service has no keys, all, for the address it comes from.
-
-        Parameters
-        ----------
-        headers : iterable of (bytes, bytes)
-            Names in lower case, as ASGI has them.
-        client : (str, int) or None
-            Address and port of the other end, where they are known.
 
         Raises
         ------
@@ -55,29 +46,27 @@ class Keyring:
         if not self._guarded:
             return Grant(address_of(client))
         sent = [value for name, value in headers if name == b"authorization"]
-        if len(sent) != 1:
-            raise MissingKeyError
-        scheme, _, key = sent[0].partition(b" ")
+        scheme, _, key = (sent[0] if len(sent) == 1 else b"").partition(b" ")
         key = key.strip()
         if scheme.lower() != b"bearer" or not key:
             raise MissingKeyError
-        # Digests of one length, all of them compared: the time taken shows nothing of the keys.
-        digest = digest_of(key)
-        known: list[Grant] = [*self._whole.values(), *(self._file.grants.values() if self._file else ())]
-        found = [grant for grant in known if hmac.compare_digest(digest, grant.holder or b"")]
-        if found:
-            return found[0]
-        raise UnknownKeyError
+        # Looked up by its digest: the time taken shows nothing of the keys.
+        found = self.grants.get(hashlib.sha256(key).digest())
+        if found is None:
+            raise UnknownKeyError
+        return found
 
     def refresh(self) -> None:
-        """Look for keys of the file that came or went; off the event loop."""
-        if self._file is not None:
-            self._file.refresh()
-
-
-def digest_of(key: bytes) -> bytes:
-    """Return the digest that is stored of a key."""
-    return hashlib.sha256(key).digest()
+        """Read the file again where it has changed; what cannot be used leaves the keys as they were, and is logged."""
+        if self._file is None or (state := state_of(self._file)) == self._seen:
+            return
+        self._seen = state
+        try:
+            self.grants = read_keys(self._file) | self._whole
+        except KeyFileError as error:
+            logger.error("the keys stay as they were: %s", error)
+        else:
+            logger.info("keys read", extra={"keys": len(self.grants)})
 
 
 @lru_cache(maxsize=256)

@@ -15,34 +15,24 @@ from urllib.parse import urlsplit
 
 from .errors import ForeignHostError, ForeignOriginError
 
-LOCAL = frozenset(("localhost", "localhost."))
+_READ = frozenset((b"host", b"origin", b"sec-fetch-site"))
+_HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")
+_PORTS = {"http": 80, "https": 443}
 
 
 class Origins:
-    """Check the hosts and origins of requests.
+    """Checks the hosts and origins of requests to a service without keys.
 
-    Parameters
-    ----------
-    hosts : sequence of str
-        Names in addition to `localhost` and every address.
-    guarded : bool
-        True when the service has keys: then nothing is refused here.
-    named : sequence of str
-        Origins whose pages may send requests.
+    `hosts` are names in addition to `localhost` and every address; pages of the origins `named` may send requests.
     """
 
     def __init__(self, hosts: Sequence[str], *, guarded: bool, named: Sequence[str] = ()) -> None:
-        self._named = frozenset(name.encode() for name in named)
-        self._hosts = LOCAL | {host.lower() for host in hosts}
+        self._hosts = {"localhost", "localhost.", *(host.lower() for host in hosts)}
+        self._named = frozenset(named)
         self._guarded = guarded
 
     def require(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
         """Refuse requests that the page of another site may have sent.
-
-        Parameters
-        ----------
-        headers : iterable of (bytes, bytes)
-            Names in lower case, as ASGI has them.
 
         Raises
         ------
@@ -54,31 +44,18 @@ class Origins:
         """
         if self._guarded:
             return
-        found = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _LOOKED_AT}
-        host = found.get(b"host")
+        sent = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _READ}
+        host, origin = sent.get(b"host"), sent.get(b"origin")
         if host is not None and not self._is_known(host):
             raise ForeignHostError
-        origin = found.get(b"origin")
-        if origin is not None and origin.encode("latin-1") in self._named:
+        if origin in self._named:
             return
-        if found.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
+        if sent.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
             raise ForeignOriginError
-
-    def is_preflight(self, method: str, headers: Iterable[tuple[bytes, bytes]]) -> bool:
-        """Return whether this is a browser's preflight request for the page of a named origin; it has no key."""
-        if method != "OPTIONS" or not self._named:
-            return False
-        found = dict(headers)
-        return b"access-control-request-method" in found and found.get(b"origin") in self._named
 
     def _is_known(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
         return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
-
-
-_LOOKED_AT = frozenset((b"host", b"origin", b"sec-fetch-site"))
-_HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")
-_PORTS = {"http": 80, "https": 443}
 
 
 @lru_cache(maxsize=256)
@@ -93,8 +70,7 @@ def _is_address(name: str) -> bool:
 def _is_same(origin: str, host: str | None) -> bool:
     """Return whether a page's origin is the host of its request, whichever scheme a proxy before it speaks."""
     try:
-        page = urlsplit(origin)
-        asked = urlsplit(f"//{host or ''}")
+        page, asked = urlsplit(origin), urlsplit(f"//{host or ''}")
         usual = _PORTS.get(page.scheme)
         return bool(page.hostname) and (page.hostname, page.port or usual) == (asked.hostname, asked.port or usual)
     except ValueError:

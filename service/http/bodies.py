@@ -17,7 +17,7 @@ from starlette.types import Message, Receive
 from linefix.documents.errors import BodyTooLargeError
 
 from ..admission.budget import ByteAccount, ByteBudget
-from ..admission.fair_queue import Holder
+from ..admission.key_file import Holder
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"

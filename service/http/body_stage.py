@@ -42,7 +42,8 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
     """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends."""
     services, holder = exchange.services, exchange.ticket.holder
     async with services.bodies.receiving(exchange.request, exchange.state.arrived, holder, form=form) as body:
-        exchange.ticket.announce()
+        if exchange.request.method == "POST":
+            services.gate.enter(exchange.ticket)
         exchange.watch = Stopwatch()
         data = body.data
         if body.gzipped:
@@ -50,7 +51,7 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
             call = partial(unpack, data, max_bytes, body.account.take)
             data = await in_slot_of(services.parsing_apart, exchange, call, exchange.job().deadline)
             body.data.clear()
-            body.account.give_back(packed)
+            body.account.take(-packed)
         yield data
 
 

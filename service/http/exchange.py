@@ -13,7 +13,7 @@ from starlette.types import Scope
 
 from linefix.answering import Stopwatch
 
-from ..admission.ticket import Ticket
+from ..admission.gate import Ticket
 from ..work.job import Job
 from .services import Services, services_of
 

@@ -14,7 +14,6 @@ from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import AssociateRequest, BatchRequest
 
 from ..admission.errors import DeadlinePassedError, ForeignMapError
-from ..admission.ticket import Ticket
 from ..maps import CachedMap, CachedMaps
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap, FoundMaps
@@ -105,7 +104,7 @@ async def index_map(
         return None
     with services.documents.account(exchange.ticket.holder) as account:
         account.take(held)
-        return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)
+        return await services.indexing.run(call, deadline, exchange.ticket, lambda: False)
 
 
 async def _ask_in_time(services: Services, call: Callable[[], T], deadline: Deadline) -> T:

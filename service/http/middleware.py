@@ -15,7 +15,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from linefix.documents.errors import RequestError
 
-from ..admission.entrance import search_of
 from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
 from .bodies import Intake
 from .errors import ControlCharacterError, HttpError, NotHttpError
@@ -35,6 +34,7 @@ STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
 ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
 _HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
+_STORED = re.compile("^/v1/maps/[^/:]+")
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
 
 
@@ -49,8 +49,9 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
 class RequestMiddleware:
     """Written as plain ASGI: Starlette's `BaseHTTPMiddleware` would hide that a client hung up."""
 
-    def __init__(self, app: ASGIApp, services: Services) -> None:
+    def __init__(self, app: ASGIApp, services: Services, routes: frozenset[str]) -> None:
         self._app = app
+        self._routes = routes
         self._services = services
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -79,7 +80,8 @@ class RequestMiddleware:
         if isinstance(error, ShareUsedError):
             await asyncio.sleep(LATER)
         kind, method = RAISED[type(error)], scope["method"]
-        route = search_of(method, scope["path"]) or OTHER
+        route = _STORED.sub("/v1/maps/{map_id}", scope["path"])
+        route = route if route in self._routes else OTHER
         self._services.refusals.count(route, method, kind.code, kind.status)
         problem = problem_of(error)
         assert problem is not None
@@ -121,7 +123,7 @@ class RequestMiddleware:
             await (problem or INTERNAL).response(state.request_id)(scope, intake.receive, send_with_id)
         finally:
             assert state.ticket is not None
-            state.ticket.arrive()
+            self._services.gate.leave(state.ticket)
             self._report(inner, scope["method"], status, time.perf_counter() - started, span)
 
     def _report(self, scope: Scope, method: str, status: int, seconds: float, span: Span | None) -> None:

@@ -13,7 +13,7 @@ from pydantic.json_schema import models_json_schema
 from linefix.documents import analysis, parts, replies, requests, updates
 from linefix.documents.encoding import encode
 
-from ..admission.grants import GUARDED
+from ..admission.entrance import GUARDED
 from ..thread_pool import Threads
 
 DESCRIPTION = """

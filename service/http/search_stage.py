@@ -11,7 +11,6 @@ from starlette.types import Receive
 from association import Deadline
 
 from ..admission.gate import Gate
-from ..admission.ticket import Ticket
 from ..telemetry.traces import queued
 from .exchange import Exchange
 
@@ -35,8 +34,7 @@ async def in_search_slot(
 
 async def in_slot_of(gate: Gate, exchange: Exchange, call: Callable[[], T], deadline: Deadline) -> T:
     """Run a part of this request, which is short or heeds the deadline, in a slot of another gate."""
-    # By a ticket of its own: the request is still on its way to its search.
-    return await gate.run(call, deadline, Ticket(exchange.ticket.holder), lambda: True)
+    return await gate.run(call, deadline, exchange.ticket)
 
 
 async def unless_hung_up(receive: Receive, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:

@@ -11,8 +11,7 @@ import pytest
 import yaml
 
 from service.admission.errors import UnknownKeyError
-from service.admission.grants import Role
-from service.admission.key_file import KeyFile
+from service.admission.key_file import Role
 from service.admission.keys import Keyring
 from tests.service.issuing import key_lines
 
@@ -84,7 +83,7 @@ def test_a_key_is_refused_however_its_files_change(
     lay: Callable[[Path], Path], take_back: Callable[[Path], None], tmp_path: Path
 ) -> None:
     """A service that runs reads them again, too: test_roles."""
-    ring = Keyring([], KeyFile(lay(tmp_path)))
+    ring = Keyring([], lay(tmp_path))
     first, other = ([(b"authorization", b"Bearer " + key)] for key in (b"sesame", b"other"))
     assert ring.grant(first).roles == {Role.READ}
     take_back(tmp_path)

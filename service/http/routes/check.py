@@ -49,6 +49,7 @@ async def get_check(
 ) -> Response:
     """Check a map: its directions, its drawing, its size, and its similar places."""
     exchange = begin_search(request)
+    exchange.services.gate.enter(exchange.ticket)
     job = exchange.job(deadline_ms)
     return await answer(exchange, _work(exchange, map_id, None, job), job.deadline)
 

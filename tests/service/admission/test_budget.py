@@ -14,7 +14,7 @@ def test_all_together_hold_no_more_than_allowed() -> None:
         one.take(4)
         other.take(5)
         one.take(1)
-        one.give_back(2)
+        one.take(-2)
         one.take(2)
         assert budget.held == 10
         for account in (one, other):
@@ -46,7 +46,7 @@ def test_nobody_holds_more_than_half() -> None:
             with pytest.raises(ShareHeldError):
                 account.take(1)
         other.take(5)
-        one.give_back(1)
+        one.take(-1)
         with pytest.raises(ShareHeldError):
             other.take(1)
         again.take(1)

@@ -9,8 +9,7 @@ import pytest
 
 from cli.entry import run
 from service.admission.errors import UnknownKeyError
-from service.admission.grants import EVERY_ROLE, Role
-from service.admission.key_file import KeyFile, KeyFileError, read_keys
+from service.admission.key_file import EVERY_ROLE, KeyFileError, Role, read_keys
 from service.admission.keys import Keyring
 from tests.service.issuing import key_lines
 
@@ -23,7 +22,7 @@ def test_a_new_key_is_good_for_what_was_said(tmp_path: Path, capsys: pytest.Capt
     assert key.strip() not in lines
     path = tmp_path / "keys.toml"
     path.write_text(lines)
-    grant = Keyring([], KeyFile(path)).grant([(b"authorization", b"Bearer " + key.strip().encode())])
+    grant = Keyring([], path).grant([(b"authorization", b"Bearer " + key.strip().encode())])
     assert (grant.roles, grant.maps) == ({Role.READ, Role.ASSOCIATE}, "hq-")
     assert run(["key", "admin"]) == 0
     path.write_text(capsys.readouterr().out)
@@ -68,7 +67,7 @@ def test_a_file_that_is_wrong_is_named_and_not_repeated(tmp_path: Path, text: st
     path = tmp_path / "file.toml"
     path.write_text(text)
     with pytest.raises(KeyFileError, match=message) as caught:
-        KeyFile(path)
+        Keyring([], path)
     assert str(path) in str(caught.value)
     assert "sesame" not in str(caught.value)
     assert DIGEST not in str(caught.value)
@@ -85,7 +84,7 @@ def test_names_and_maps_may_be_that_long(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("name", "message"), [("none", "No such file"), ("x" * 300, "too long")])
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, message: str) -> None:
     with pytest.raises(KeyFileError, match=f"{name}.*{message}"):
-        KeyFile(tmp_path / name)
+        Keyring([], tmp_path / name)
 
 
 def test_the_files_of_a_directory_count_together(tmp_path: Path) -> None:
@@ -104,14 +103,14 @@ def test_the_files_of_a_directory_count_together(tmp_path: Path) -> None:
 def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
     path = tmp_path / "keys.toml"
     path.write_text(key_lines("sesame", ["read"]))
-    keys = KeyFile(path)
+    keys = Keyring([], path)
     first = keys.grants
-    Keyring([], keys).refresh()
+    keys.refresh()
     assert keys.grants is first, "nothing to read"
     for text, roles in ((key_lines("sesame", ["read", "write"]), {Role.READ, Role.WRITE}), ("[[", None)):
         path.write_text(text)
         before = keys.grants
-        Keyring([], keys).refresh()
+        keys.refresh()
         assert (keys.grants is before) is (roles is None), "what is wrong leaves them"
         assert [grant.roles for grant in keys.grants.values()] == [{Role.READ, Role.WRITE}]
 
@@ -120,13 +119,13 @@ def test_an_empty_file_lets_nobody_in(tmp_path: Path) -> None:
     path = tmp_path / "keys.toml"
     path.write_text("")
     with pytest.raises(UnknownKeyError):
-        Keyring([], KeyFile(path)).grant([(b"authorization", b"Bearer x")])
+        Keyring([], path).grant([(b"authorization", b"Bearer x")])
 
 
 def test_a_file_that_is_gone_leaves_the_keys(tmp_path: Path) -> None:
     path = tmp_path / "keys.toml"
     path.write_text(key_lines("sesame", ["read"]))
-    keys = KeyFile(path)
+    keys = Keyring([], path)
     path.unlink()
     keys.refresh()
     assert len(keys.grants) == 1

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from pathlib import Path
 
 import pytest
 from pydantic import SecretStr
 
 from service.admission.errors import MissingKeyError, UnknownKeyError
-from service.admission.grants import Grant, Role
-from service.admission.keys import Keyring, address_of, digest_of
+from service.admission.keys import Keyring, address_of
+from tests.service.issuing import key_lines
 
 RING = Keyring([SecretStr("sesame"), SecretStr("open")])
 
@@ -29,16 +29,11 @@ def test_each_key_is_a_holder_of_its_own() -> None:
     assert b"sesame" not in sesame
 
 
-def test_a_key_of_the_settings_may_do_everything_though_a_file_has_it_too() -> None:
-    class Narrow:
-        grants: ClassVar = {digest_of(b"sesame"): Grant(digest_of(b"sesame"), frozenset({Role.READ}), "hq-")}
-
-        def refresh(self) -> None:
-            pass
-
-    granted = Keyring([SecretStr("sesame")], Narrow()).grant(sent(b"Bearer sesame"))
+def test_a_key_of_the_settings_may_do_everything_though_a_file_has_it_too(tmp_path: Path) -> None:
+    (tmp_path / "keys").write_text(key_lines("sesame", ["read"], "hq-"))
+    granted = Keyring([SecretStr("sesame")], tmp_path / "keys").grant(sent(b"Bearer sesame"))
     assert granted == RING.grant(sent(b"Bearer sesame"))
-    assert Keyring([SecretStr("open")], Narrow()).grant(sent(b"Bearer sesame")).maps == "hq-"
+    assert Keyring([SecretStr("open")], tmp_path / "keys").grant(sent(b"Bearer sesame")).maps == "hq-"
 
 
 @pytest.mark.parametrize(

@@ -117,17 +117,6 @@ def test_the_page_of_a_named_origin_may_ask() -> None:
         NAMED.require(sent(host="evil.example", origin="https://page.example"))
 
 
-def test_what_a_browser_asks_first_for_a_named_origin_needs_no_key() -> None:
-    asks = sent(origin="https://page.example", access_control_request_method="POST")
-    assert NAMED.is_preflight("options".upper(), asks)
-    for method in ("GET", "POST", "PUT"):
-        assert not NAMED.is_preflight(method, asks)
-    assert not OPEN.is_preflight("OPTIONS", asks)
-    assert not NAMED.is_preflight("OPTIONS", asks[:1])
-    assert not NAMED.is_preflight("OPTIONS", asks[1:])
-    assert not NAMED.is_preflight("OPTIONS", sent(origin="https://other.example", access_control_request_method="PUT"))
-
-
 def test_with_keys_all_may_ask() -> None:
     guarded = Origins((), guarded=True)
     guarded.require(sent(host="evil.example", origin="http://evil.example", sec_fetch_site="cross-site"))
