@@ -98,7 +98,7 @@ class MapSet:
         """Return which map has a name; raises `InvalidSearchError` where none has."""
         if map_id not in self.ids:
             raise InvalidSearchError(
-                f"found {map_id!r}, expected the id of one of the {len(self)} maps that are searched", argument=argument
+                f"expected the id of one of the {len(self)} maps that are searched, found another", argument=argument
             )
         return self.ids.index(map_id)
 

@@ -27,7 +27,7 @@ from .http.bodies import BodyReceiver
 from .http.middleware import RequestMiddleware
 from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
-from .http.refusing import handle_errors
+from .http.problems import handle_errors
 from .http.routes import (
     analyze,
     associate,
@@ -41,7 +41,7 @@ from .http.routes import (
     update,
     vectorize,
 )
-from .http.services import KEY, Services
+from .http.services import Services
 from .importing.folders import remove_abandoned
 from .importing.reader import Bounds
 from .maps import IndexCache, MapStore
@@ -144,7 +144,6 @@ def _services(settings: Settings) -> Services:
         gate=gate,
         # The number that waits there is bounded by their bytes.
         parsing=Gate(1, None, "parsing", long_per_slot=0),
-        parsing_apart=Gate(1, None, "parsing-apart", long_per_slot=0),
         indexing=indexing,
         keyring=keyring,
         answers=_budget(settings, settings.max_answers_bytes),
@@ -175,7 +174,7 @@ def _budget(settings: Settings, most: int) -> ByteBudget:
 
 
 @asynccontextmanager
-async def _lifespan(app: FastAPI, services: Services, started: Started | None) -> AsyncIterator[dict[str, Services]]:
+async def _lifespan(app: FastAPI, services: Services, started: Started | None) -> AsyncIterator[None]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
     following = asyncio.create_task(_follow(services.key_threads, services.keyring.refresh))
@@ -184,7 +183,7 @@ async def _lifespan(app: FastAPI, services: Services, started: Started | None) -
     if services.settings.workers > 1 or is_complete():  # no request comes to a process that has to refuse it
         await getting_ready
     try:
-        yield {KEY: services}
+        yield
     finally:
         getting_ready.cancel()
         refreshing.cancel()

@@ -21,8 +21,6 @@ T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]
 """A function from JSON to a checked request; a module's function, so that another process can call it."""
 
-SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
-
 
 async def read(exchange: Exchange, reader: Reader[T]) -> T:
     """Receive the body and check it, off the event loop where that takes long.
@@ -31,7 +29,7 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
     """
     async with receive(exchange) as data:
         with stage("parse"):
-            if len(data) <= SMALL:
+            if len(data) <= LARGE:
                 return reader(data, exchange.services.settings.limits())
             deadline = exchange.job().deadline
             return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data, deadline), deadline)
@@ -41,7 +39,7 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
 async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[bytearray]:
     """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends."""
     services, holder = exchange.services, exchange.ticket.holder
-    async with services.bodies.receiving(exchange.request, exchange.state.arrived, holder, form=form) as body:
+    async with services.bodies.receiving(exchange.request, exchange.arrived, holder, form=form) as body:
         if exchange.request.method == "POST":
             services.gate.enter(exchange.ticket)
         exchange.watch = Stopwatch()
@@ -49,21 +47,20 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
         if body.gzipped:
             packed, max_bytes = len(data), services.settings.max_body_bytes
             call = partial(unpack, data, max_bytes, body.account.take)
-            data = await in_slot_of(services.parsing_apart, exchange, call, exchange.job().deadline)
+            data = await in_slot_of(services.parsing, exchange, call, exchange.job().deadline)
             body.data.clear()
             body.account.take(-packed)
         yield data
 
 
 async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray, deadline: Deadline) -> T:
-    """Check a body as soon as it has a slot.
+    """Check a large body, in another process, as soon as it has a slot; a small one at once: it takes a millisecond.
 
-    These slots are shared between callers, and are not those of the searches: no search waits for a large body. A small
-    body does not wait for a larger one, which another process parses.
+    These slots are shared between callers, and are not those of the searches: no search waits for a large body.
     """
     services = exchange.services
     limits = services.settings.limits()
     if len(data) <= LARGE:
-        return await in_slot_of(services.parsing, exchange, partial(reader, data, limits), deadline)
+        return reader(data, limits)
     call = partial(services.parser.call, reader, data, limits)
-    return await in_slot_of(services.parsing_apart, exchange, call, deadline)
+    return await in_slot_of(services.parsing, exchange, call, deadline)

@@ -1,13 +1,14 @@
-"""One request while it is served: its state from the first byte to the line in the log, and the exchange of its stages.
+"""One request while it is served, from its head to its line in the log; routes get it by `Depends`.
 
-The stages are functions of `body_stage`, `map_stage` and `search_stage`, each of which takes an exchange.
+Its stages are functions of `body_stage`, `map_stage` and `search_stage`, each of which takes an exchange.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Annotated
 
+from fastapi import Depends
 from starlette.requests import Request
 from starlette.types import Scope
 
@@ -15,90 +16,68 @@ from linefix.answering import Stopwatch
 
 from ..admission.gate import Ticket
 from ..work.job import Job
-from .services import Services, services_of
+from .services import Services
 
-_KEY = "request"  # in `scope["state"]`, next to the application's own
-
-
-@dataclass(slots=True)
-class RequestState:
-    """State of one request.
-
-    Attributes
-    ----------
-    arrived : float
-        When its head arrived, by the event loop's clock, seconds.
-    request_id : str
-    ticket : Ticket, or None
-        Its admission; None until it is admitted.
-    noted : dict
-        Further fields of its line in the log.
-    """
-
-    arrived: float
-    request_id: str
-    ticket: Ticket | None = None
-    noted: dict[str, object] = field(default_factory=dict)
-
-
-def attach(scope: Scope, state: RequestState) -> None:
-    """Store the state of a request in its scope."""
-    cast("dict[str, Any]", scope.setdefault("state", {}))[_KEY] = state
-
-
-def state_of(scope: Scope) -> RequestState | None:
-    """Return the state of a request, None where it has none yet."""
-    found = scope.get("state", {}).get(_KEY)
-    return found if isinstance(found, RequestState) else None
+KEY = "exchange"
+"""Key of the exchange in the state of a request's scope."""
 
 
 @dataclass(slots=True)
 class Exchange:
-    """One admitted request.
+    """One request.
 
     Attributes
     ----------
-    request : Request
     services : Services
         Of its application.
-    state : RequestState
+    request : Request
+    arrived : float
+        When its head arrived, by the event loop's clock, seconds.
+    request_id : str
     ticket : Ticket
+        Its admission.
     watch : Stopwatch
         Since the body had arrived.
+    noted : dict
+        Further fields of its line in the log.
     """
 
-    request: Request
     services: Services
-    state: RequestState
-    ticket: Ticket
+    request: Request
+    arrived: float
+    request_id: str
+    ticket: Ticket = field(default_factory=Ticket)
     watch: Stopwatch = field(default_factory=Stopwatch)
+    noted: dict[str, object] = field(default_factory=dict)
 
     def note(self, **fields: object) -> None:
         """Add fields to the log's line of this request."""
-        self.state.noted.update(fields)
+        self.noted.update(fields)
 
     def job(self, deadline_ms: float | None = None) -> Job:
         """Return the job of this request; without a deadline of its own it has the service's."""
         deadline = self.watch.deadline(deadline_ms, self.services.settings.max_deadline_ms)
-        return Job(self.state.request_id, self.watch, deadline)
+        return Job(self.request_id, self.watch, deadline)
 
 
-def begin(request: Request) -> Exchange:
-    """Return the exchange of a request that was admitted."""
-    state = state_of(request.scope)
-    assert state is not None
-    assert state.ticket is not None
-    return Exchange(request, services_of(request.scope), state, state.ticket)
+def exchange_of(scope: Scope) -> Exchange:
+    """Return the exchange of a request, which the middleware has put into its scope."""
+    found = scope["state"][KEY]
+    assert isinstance(found, Exchange)
+    return found
 
 
-def begin_search(request: Request) -> Exchange:
-    """Return the exchange of a request that needs the kernels.
+async def _any(request: Request) -> Exchange:
+    return exchange_of(request.scope)
 
-    Raises
-    ------
-    NotReadyError
-        When they are not there yet; before the body is read.
-    """
-    exchange = begin(request)
-    exchange.services.readiness.require_warm()
+
+async def _searching(request: Request) -> Exchange:
+    exchange = exchange_of(request.scope)
+    exchange.services.readiness.require_warm()  # before the body is read
     return exchange
+
+
+Admitted = Annotated[Exchange, Depends(_any)]
+"""A request that was let in."""
+Searching = Annotated[Exchange, Depends(_searching)]
+"""One that needs the kernels; `NotReadyError` when they are not there yet."""

@@ -5,12 +5,18 @@ Nothing here repeats what a caller sent: messages are ours, pointers name places
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import orjson
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.routing import Match
 
 from association import CancelledError
 from linefix.documents.errors import (
@@ -21,6 +27,7 @@ from linefix.documents.errors import (
     TooManyError,
     in_one_line,
 )
+from linefix.documents.faults import faults_of
 from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
 from linefix.documents.replies import ProblemCode
@@ -32,28 +39,23 @@ from ..maps import errors as maps
 from ..parsing import errors as parsing
 from . import errors as http
 from .etags import etag
+from .exchange import exchange_of
+from .search_stage import HangUpError
 
+logger = logging.getLogger("linefix")
 MEDIA_TYPE = "application/problem+json"
 MAX_MESSAGE = 200
 MAX_DETAIL = 400
 MAX_POINTER = 120
+NAMED_BY_CALLER = "/map_weights"  # an object whose fields are ids of maps
+CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 CLOSE = {"Connection": "close"}
 """Of an answer that is given before the body was read: its rest is of no use."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A row of the table.
-
-    Attributes
-    ----------
-    code : ProblemCode
-        Stable; programs branch on it.
-    status : int
-    title : str
-    raised_as : tuple of exception types
-        The exceptions that become this problem.
-    """
+    """A row of the table: a stable code, on which programs branch, and the exceptions that become this problem."""
 
     code: ProblemCode
     status: int
@@ -61,41 +63,25 @@ class Kind:
     raised_as: tuple[type[Exception], ...] = ()
 
 
+NOT_HTTP = (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError)
+STRANGE = (admission.UnknownKeyError, admission.ForeignHostError, admission.ForeignOriginError)
+WRONG_KIND = (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError)
+BUSY = (admission.QueueFullError, admission.TooMuchHeldError, maps.BusyStoreError)
+LATE = (admission.DeadlinePassedError, maps.IndexNotReadyError, importing.TooLateError)
+TOO_LARGE = (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),
-    Kind(
-        "invalid_http",
-        400,
-        "The request is not HTTP",
-        (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError),
-    ),
+    Kind("invalid_http", 400, "The request is not HTTP", NOT_HTTP),
     Kind("unauthorized", 401, "A key is required", (admission.MissingKeyError,)),
-    Kind(
-        "forbidden",
-        403,
-        "The request is not permitted",
-        (
-            admission.UnknownKeyError,
-            admission.MissingRoleError,
-            admission.ForeignHostError,
-            admission.ForeignOriginError,
-        ),
-    ),
+    Kind("forbidden", 403, "The request is not permitted", (*STRANGE, admission.MissingRoleError)),
     Kind("not_found", 404, "No resource has this path", (http.NotFoundError,)),
     Kind("unknown_map", 404, "No map has this id", (maps.UnknownMapError, admission.ForeignMapError)),
     Kind("method_not_allowed", 405, "This path does not support the method", (http.MethodNotAllowedError,)),
     Kind("request_timeout", 408, "The request did not arrive in time", (http.BodyTooSlowError,)),
     Kind("map_corrupt", 409, "The stored map is damaged", (maps.CorruptMapError,)),
     Kind("revision_conflict", 412, "The precondition on the map's revision failed", (maps.RevisionConflictError,)),
-    Kind(
-        "too_large", 413, "The request exceeds a limit", (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
-    ),
-    Kind(
-        "unsupported_media_type",
-        415,
-        "The media type is not supported",
-        (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError),
-    ),
+    Kind("too_large", 413, "The request exceeds a limit", TOO_LARGE),
+    Kind("unsupported_media_type", 415, "The media type is not supported", WRONG_KIND),
     Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, http.RefusedError)),
     Kind(
         "rate_limited",
@@ -105,25 +91,9 @@ TABLE = (
     ),
     Kind("internal", 500, "The service has a defect"),
     Kind("not_ready", 503, "The service is not ready", (admission.NotReadyError, maps.StoreAwayError, CancelledError)),
-    Kind(
-        "overloaded",
-        503,
-        "The service is busy",
-        (
-            admission.QueueFullError,
-            admission.TooMuchHeldError,
-            maps.BusyStoreError,
-            parsing.ParserEndedError,
-            importing.NoRoomError,
-        ),
-    ),
+    Kind("overloaded", 503, "The service is busy", (*BUSY, parsing.ParserEndedError, importing.NoRoomError)),
     Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
-    Kind(
-        "deadline_exceeded",
-        504,
-        "The deadline passed before the search started",
-        (admission.DeadlinePassedError, maps.IndexNotReadyError, importing.TooLateError),
-    ),
+    Kind("deadline_exceeded", 504, "The deadline passed", LATE),
     Kind("storage_full", 507, "The store is full", (maps.StoreFullError,)),
 )
 KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})
@@ -142,7 +112,7 @@ class Problem:
 
     def as_json(self, request_id: str, move: Callable[[str], str] = str) -> dict[str, object]:
         """Return the problem document; `move` turns each pointer into the one to be sent."""
-        faults = [Fault(move(one.pointer)[:MAX_POINTER], one.message[:MAX_MESSAGE]) for one in self.faults[:MAX_FAULTS]]
+        faults = [Fault(_bounded(move(one.pointer)), one.message[:MAX_MESSAGE]) for one in self.faults[:MAX_FAULTS]]
         document: dict[str, object] = {
             "type": f"urn:linefix:problem:{self.kind.code}",
             "title": self.kind.title,
@@ -167,6 +137,7 @@ INTERNAL = Problem(
     KINDS["internal"], "the service failed because of a defect; report it with the log entry that has this request id"
 )
 """The answer to a defect, without any detail of it."""
+ENDING = "the service is shutting down; send the request to another instance, or again after its restart"
 
 
 def problem_of(error: Exception) -> Problem | None:
@@ -176,9 +147,7 @@ def problem_of(error: Exception) -> Problem | None:
         return None
     match error:
         case CancelledError():
-            return Problem(
-                kind, "the service is shutting down; send the request to another instance, or again after its restart"
-            )
+            return Problem(kind, ENDING)
         case InputError():
             fault = fault_of(error)
             return Problem(kind, str(fault), (fault,))
@@ -186,10 +155,58 @@ def problem_of(error: Exception) -> Problem | None:
             return Problem(kind, str(error), error.faults)
         case TooManyError(pointer=pointer) if pointer:
             return Problem(kind, str(error), (Fault(pointer, str(error)),))
-    return Problem(kind, str(error), headers=headers_of(error))
+    return Problem(kind, str(error), headers=_headers_of(error))
 
 
-def headers_of(error: Exception) -> Mapping[str, str]:
+def problem_or_defect(error: Exception, request_id: str) -> Problem:
+    """Return the problem that an exception stands for; that of a defect is logged with the exception."""
+    problem = problem_of(error)
+    if problem is None:
+        logger.error("a defect", exc_info=error, extra={"request_id": request_id})
+    return problem or INTERNAL
+
+
+def handle_errors(app: FastAPI) -> None:
+    """Have an application answer with problems."""
+    for kind in (*RAISED, RequestValidationError, HTTPException, ClientDisconnect):
+        app.add_exception_handler(kind, _refuse)
+    app.add_exception_handler(HangUpError, _nobody)
+
+
+async def _refuse(request: Request, error: Exception) -> Response:
+    exchange = exchange_of(request.scope)
+    problem = problem_or_defect(_own(request, error), exchange.request_id)
+    exchange.note(code=problem.kind.code)
+    return problem.response(exchange.request_id)
+
+
+async def _nobody(request: Request, error: Exception) -> Response:
+    return Response(status_code=CLIENT_CLOSED_REQUEST)
+
+
+def _own(request: Request, error: Exception) -> Exception:
+    """Return an exception of ours for what FastAPI and Starlette refuse by themselves."""
+    match error:
+        case RequestValidationError():
+            return InvalidRequestError(faults_of(error.errors()))
+        case ClientDisconnect():  # while the body was received; from the server, malformed chunks look the same
+            return http.BodyBrokenError()
+        case HTTPException(status_code=404):
+            return http.NotFoundError()
+        case HTTPException(status_code=405):  # the framework names the methods of one route only
+            matching = (route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE)
+            methods = {method for route in matching for method in getattr(route, "methods", ())}
+            return http.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+        case HTTPException():
+            return http.RefusedError()
+    return error
+
+
+def _bounded(pointer: str) -> str:
+    return NAMED_BY_CALLER if pointer.startswith(NAMED_BY_CALLER + "/") else pointer[:MAX_POINTER]
+
+
+def _headers_of(error: Exception) -> Mapping[str, str]:
     """Return the headers that belong to an error."""
     match error:
         case admission.MissingKeyError():

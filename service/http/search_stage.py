@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
 from starlette.types import Receive
 
-from association import Deadline
+from association import CancelledError, Deadline
 
+from ..admission.errors import DeadlinePassedError
 from ..admission.gate import Gate
 from ..telemetry.traces import queued
 from .exchange import Exchange
@@ -30,6 +31,52 @@ async def in_search_slot(
     A call that does not heed the deadline is waited for until then and no longer: see `Gate.run`.
     """
     return await exchange.services.gate.run(queued(call), deadline, exchange.ticket, heeds)
+
+
+async def in_search_slots(
+    exchange: Exchange,
+    calls: Sequence[Callable[[], T]],
+    deadline: Deadline,
+    failed: Callable[[int, Exception], T],
+) -> list[T]:
+    """Run parts of this request, as many at once as there are slots; other requests get slots in between.
+
+    `failed` returns what stands in the place of a part that raised, given its number, or raises: then all end.
+    """
+    results: dict[int, T] = {}
+    todo = iter(enumerate(calls))
+
+    async def work_through() -> None:
+        for number, call in todo:
+            try:
+                results[number] = await in_search_slot(exchange, call, deadline)
+            except CancelledError:
+                raise
+            except Exception as error:
+                results[number] = failed(number, error)
+
+    tasks = [asyncio.ensure_future(work_through()) for _ in range(min(exchange.services.gate.slots, len(calls)))]
+    try:
+        await asyncio.gather(*tasks)
+    except BaseException:
+        deadline.cancel()
+        for task in tasks:
+            task.cancel()
+        raise
+    return [results[number] for number in range(len(calls))]
+
+
+async def in_short_slots(exchange: Exchange, step: Callable[[], bool], deadline: Deadline) -> bool:
+    """Take steps on one core until there are none, each in a slot of its own; return whether there was time for all.
+
+    The other cores, and the time between two steps, are left to searches that robots wait for.
+    """
+    try:
+        while await in_search_slot(exchange, step, deadline):
+            await asyncio.sleep(0)
+    except DeadlinePassedError:
+        return False
+    return True
 
 
 async def in_slot_of(gate: Gate, exchange: Exchange, call: Callable[[], T], deadline: Deadline) -> T:

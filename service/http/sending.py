@@ -16,9 +16,8 @@ from starlette.types import Receive, Scope, Send
 from association import Deadline
 
 from ..work.job import Done
-from .exchange import Exchange, state_of
+from .exchange import Exchange, exchange_of
 from .search_stage import unless_hung_up
-from .services import services_of
 
 PIECE = 32_768  # bytes; the server holds a few
 LARGE = 65_536  # bytes; smaller answers are handed over in one piece
@@ -33,7 +32,8 @@ class PiecewiseResponse(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send it."""
-        state, seconds = state_of(scope), services_of(scope).settings.request_timeout_s
+        exchange = exchange_of(scope)
+        seconds = exchange.services.settings.request_timeout_s
         whole = memoryview(self.body)
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
         for begin in range(0, len(whole), PIECE):
@@ -42,8 +42,7 @@ class PiecewiseResponse(Response):
                 async with asyncio.timeout(seconds):
                     await send({"type": "http.response.body", "body": piece, "more_body": more})
             except TimeoutError:
-                if state is not None:
-                    state.noted["sent_bytes"] = begin
+                exchange.note(sent_bytes=begin)
                 return  # the server ends the connection
 
 
@@ -58,9 +57,8 @@ class CountedResponse(PiecewiseResponse):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send it."""
-        state = state_of(scope)
-        holder = None if state is None or state.ticket is None else state.ticket.holder
-        with services_of(scope).answers.account(holder) as account:
+        exchange = exchange_of(scope)
+        with exchange.services.answers.account(exchange.ticket.holder) as account:
             account.take(len(self.body))
             await super().__call__(scope, receive, send)
 

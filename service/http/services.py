@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from starlette.types import Scope
-
 from ..admission.budget import ByteBudget
 from ..admission.entrance import Entrance
 from ..admission.gate import Gate
@@ -23,9 +21,6 @@ from ..work.association import Associator
 from .bodies import BodyReceiver
 from .probe import StoreProbe
 
-KEY = "services"
-"""Key of the services in the state that the application gives to each request."""
-
 
 @dataclass(frozen=True, slots=True)
 class Services:
@@ -39,8 +34,8 @@ class Services:
     readiness : Readiness
     entrance : Entrance
     gate : Gate
-    parsing, parsing_apart, indexing : Gate
-        Slots to parse bodies, in a thread and in another process, and to index large maps.
+    parsing, indexing : Gate
+        Slots to parse large bodies, in another process, and to index large maps.
     keyring : Keyring
     bodies : BodyReceiver
     answers : ByteBudget
@@ -69,7 +64,6 @@ class Services:
     entrance: Entrance
     gate: Gate
     parsing: Gate
-    parsing_apart: Gate
     indexing: Gate
     keyring: Keyring
     bodies: BodyReceiver
@@ -89,7 +83,7 @@ class Services:
 
     @property
     def _gates(self) -> tuple[Gate, ...]:
-        return self.gate, self.parsing, self.parsing_apart, self.indexing, self.importing
+        return self.gate, self.parsing, self.indexing, self.importing
 
     def give_up(self) -> None:
         """Cancel everything that runs, and wait no longer for functions that do not check for it."""
@@ -108,10 +102,3 @@ class Services:
         self.store.close()
         if self.traces is not None:
             self.traces.close()
-
-
-def services_of(scope: Scope) -> Services:
-    """Return the parts of the application that a request came to."""
-    services = scope["state"][KEY]
-    assert isinstance(services, Services)
-    return services

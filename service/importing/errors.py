@@ -39,7 +39,7 @@ class TooLateError(ImportingError):
     """The deadline passed meanwhile."""
 
     def __init__(self) -> None:
-        super().__init__("the deadline passed while the file was read; send a smaller file, or extend deadline_ms")
+        super().__init__("the import took longer than its time; send a smaller file, or send the request again later")
 
 
 class NoRoomError(ImportingError):

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import asyncio
 from functools import partial
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.reading import read_model
 
-from ...admission.errors import DeadlinePassedError
-from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
+from ...work.analyzing import analysis_done, begin_analysis, take_looks
 from ...work.job import Done, Job
 from ..body_stage import read
-from ..exchange import Exchange, begin_search
+from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map
-from ..search_stage import in_search_slot
+from ..search_stage import in_search_slot, in_short_slots
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -36,9 +34,8 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
     openapi_extra=takes(AnalyzeRequest, {"a robot": examples.ANALYZE}),
     summary="Analyze a stored map",
 )
-async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
+async def post_analyze(exchange: Searching, map_id: MapIdPath) -> Response:
     """Simulate scans on a grid of poses and report where localization succeeds."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AnalyzeRequest))
     return await _answer(exchange, StoredMap(map_id=map_id), asked)
 
@@ -51,9 +48,8 @@ async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
     openapi_extra=takes(MapAnalyzeRequest, {"a room": examples.ANALYZE_ROOM}),
     summary="Analyze a map that comes with the request",
 )
-async def post_analyze_inline(request: Request) -> Response:
+async def post_analyze_inline(exchange: Searching) -> Response:
     """Simulate scans on a grid of poses of a map in the request."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, MapAnalyzeRequest))
     return await _answer(exchange, asked.map, asked)
 
@@ -70,16 +66,6 @@ async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: Analyze
         await index_map(exchange, source, job.deadline, oriented=None)
         work = partial(begin_analysis, lookup, source, asked, job)
         tally = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
-    await _take_looks(exchange, tally, job)
+    if not tally.done:
+        await in_short_slots(exchange, partial(take_looks, tally, job.deadline), job.deadline)
     return await exchange.services.parse_threads.run(partial(analysis_done, tally, asked, job))
-
-
-async def _take_looks(exchange: Exchange, tally: Tally, job: Job) -> None:
-    """Try the places on one core, so that an analysis leaves the others to searches that robots wait for."""
-    more = not tally.done
-    while more:
-        try:
-            more = await in_search_slot(exchange, partial(take_looks, tally, job.deadline), job.deadline)
-        except DeadlinePassedError:
-            return
-        await asyncio.sleep(0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.reading import read_model
@@ -13,13 +13,13 @@ from linefix.documents.requests import AssociateRequest
 
 from ...work.job import Done, Job
 from ..body_stage import read
-from ..exchange import Exchange, begin_search
+from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps
 from ..search_stage import in_search_slot
 from ..sending import answer
-from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["associate"], route_class=DirectRoute)
+router = APIRouter(tags=["associate"])
 
 
 @router.post(
@@ -37,9 +37,8 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
     ),
     summary="Find the pose without knowing correspondences",
 )
-async def post_associate(request: Request) -> Response:
+async def post_associate(exchange: Searching) -> Response:
     """Estimate the pose of a scan in a map, or on one of several, with a verdict and its probability."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
     return await answer(exchange, _work(exchange, asked, job), job.deadline)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 
 from linefix.documents import examples
 from linefix.documents.checks import CheckAnswer
@@ -21,9 +19,9 @@ from ...maps.lookup import FoundMap
 from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
 from ..body_stage import read
-from ..exchange import Exchange, begin_search
+from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map
-from ..search_stage import in_search_slot
+from ..search_stage import in_search_slot, in_search_slots
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -40,7 +38,7 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "invalid_request
     summary="Check a map",
 )
 async def get_check(
-    request: Request,
+    exchange: Searching,
     map_id: MapIdPath,
     deadline_ms: Annotated[
         float | None,
@@ -48,7 +46,6 @@ async def get_check(
     ] = None,
 ) -> Response:
     """Check a map: its directions, its drawing, its size, and its similar places."""
-    exchange = begin_search(request)
     exchange.services.gate.enter(exchange.ticket)
     job = exchange.job(deadline_ms)
     return await answer(exchange, _work(exchange, map_id, None, job), job.deadline)
@@ -62,9 +59,8 @@ async def get_check(
     openapi_extra=takes(CheckRequest, {"two scans": examples.CHECK}),
     summary="Check a map with sample scans",
 )
-async def post_check(request: Request, map_id: MapIdPath) -> Response:
+async def post_check(exchange: Searching, map_id: MapIdPath) -> Response:
     """Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, CheckRequest))
     job = exchange.job(asked.deadline_ms)
     return await answer(exchange, _work(exchange, map_id, asked, job), job.deadline)
@@ -79,7 +75,7 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
         work = partial(check, lookup, source, asked, job)
         begun = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
     calls = [] if asked is None else [partial(sample, begun, asked, number, job) for number in range(len(asked.scans))]
-    concluding = partial(conclude, begun, await _try_all(exchange, calls, job), job)
+    concluding = partial(conclude, begun, await in_search_slots(exchange, calls, job.deadline, _too_late), job)
     try:
         checked = await in_search_slot(exchange, concluding, job.deadline) if calls else concluding()
     except DeadlinePassedError:  # no slot is left: it then concludes from what it has, and searches nothing
@@ -87,17 +83,8 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
     return await exchange.services.parse_threads.run(partial(check_done, begun, checked, asked, job))
 
 
-async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | None]], job: Job) -> list[Sample | None]:
-    """Try every sample, as many at once as there are cores; those whose slot comes too late are left out."""
-    found: list[Sample | None] = [None] * len(calls)
-    todo = iter(enumerate(calls))
-
-    async def work_through() -> None:
-        for index, call in todo:
-            try:
-                found[index] = await in_search_slot(exchange, call, job.deadline)
-            except DeadlinePassedError:
-                return
-
-    await asyncio.gather(*(work_through() for _ in range(min(exchange.services.gate.slots, len(calls)))))
-    return found
+def _too_late(_: int, error: Exception) -> Sample | None:
+    """Leave out a sample whose slot came too late."""
+    if not isinstance(error, DeadlinePassedError):
+        raise error
+    return None

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents.imports import FORM as MAP_FORM
 from linefix.documents.imports import SCANS_FORM, ImportAnswer, ScansAnswer
 from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
 
+from ...admission.errors import DeadlinePassedError
 from ...importing.bounded import ReadScans, read_apart, read_scans_apart
+from ...importing.errors import TooLateError
 from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM
 from ..body_stage import parse, receive
-from ..exchange import Exchange, begin_search
+from ..exchange import Exchange, Searching
 from ..search_stage import in_search_slot, in_slot_of
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
@@ -40,13 +42,12 @@ def _takes(schema: dict[str, Any]) -> dict[str, Any]:
     openapi_extra=_takes(MAP_FORM),
     summary="Read the map of another tool",
 )
-async def post_import(request: Request) -> Response:
+async def post_import(exchange: Searching) -> Response:
     """Convert files of another tool to a map, and report conversions and findings; nothing is stored."""
-    exchange = begin_search(request)
     async with receive(exchange, form=True) as content:
         job = exchange.job()
-        work = _work(exchange, content, request.headers.get("content-type", ""), job)
-        return await answer(exchange, work, job.deadline)
+        work = _work(exchange, content, exchange.request.headers.get("content-type", ""), job)
+        return await _in_time(exchange, work, job)
 
 
 async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
@@ -64,6 +65,13 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     return await in_search_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
 
 
+async def _in_time(exchange: Exchange, work: Coroutine[Any, Any, Done], job: Job) -> Response:
+    try:
+        return await answer(exchange, work, job.deadline)
+    except DeadlinePassedError:  # it is no search that has not begun
+        raise TooLateError from None
+
+
 @router.post(
     "/v1/scans:import",
     operation_id="import_scans",
@@ -72,15 +80,14 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     openapi_extra=_takes(SCANS_FORM),
     summary="Read scans of a log",
 )
-async def post_scans(request: Request) -> Response:
+async def post_scans(exchange: Searching) -> Response:
     """Read some scans of a bag or another log, evenly spread; nothing is stored."""
-    exchange = begin_search(request)
     async with receive(exchange, form=True) as content:
         job = exchange.job()
-        content_type = request.headers.get("content-type", "")
+        content_type = exchange.request.headers.get("content-type", "")
         reading = partial(read_scans_apart, content, content_type, exchange.services.import_bounds, job.deadline)
         work = _scans(exchange, reading, job)
-        return await answer(exchange, work, job.deadline)
+        return await _in_time(exchange, work, job)
 
 
 async def _scans(exchange: Exchange, reading: Callable[[], ReadScans], job: Job) -> Done:

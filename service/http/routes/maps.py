@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Response
 
 from linefix.documents import examples
 from linefix.documents.encoding import encode
@@ -16,7 +16,7 @@ from linefix.documents.replies import MapList, MapSummaryAnswer
 from ...maps.lookup import outline_of
 from ..body_stage import read
 from ..etags import demands_of, etag, is_conditional, is_unchanged
-from ..exchange import begin
+from ..exchange import Admitted
 from ..map_stage import ask_store
 from ..sending import json_response
 from .declaring import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
@@ -54,9 +54,9 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
     },
     summary="Store a map",
 )
-async def put_map(request: Request, map_id: MapIdPath) -> Response:
+async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Store a map durably: after the answer it survives the loss of process and power."""
-    exchange, demands = begin(request), demands_of(request)
+    demands = demands_of(exchange.request)
     services = exchange.services
     asked, document = await read(exchange, read_map)
     outline = await services.parse_threads.run(partial(outline_of, asked))
@@ -79,12 +79,12 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     openapi_extra={"parameters": _conditional("If-None-Match")},
     summary="Get a map",
 )
-async def get_map(request: Request, map_id: MapIdPath) -> Response:
+async def get_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Return a map as it was stored."""
-    services = begin(request).services
-    if is_conditional(request):
+    services = exchange.services
+    if is_conditional(exchange.request):
         record = await ask_store(services, partial(services.store.record, map_id))
-        if is_unchanged(request, record.revision):
+        if is_unchanged(exchange.request, record.revision):
             return Response(status_code=304, headers={"ETag": etag(record.revision)})
     stored = await ask_store(services, partial(services.store.load, map_id))
     return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
@@ -97,14 +97,13 @@ async def get_map(request: Request, map_id: MapIdPath) -> Response:
     summary="List the maps",
 )
 async def list_maps(
-    request: Request,
+    exchange: Admitted,
     limit: Annotated[int, Query(ge=1, le=1000, description="maps on one page")] = 100,
     cursor: Annotated[
         str, Query(max_length=128, pattern="^[A-Za-z0-9._-]*$", description="`next` of the page before")
     ] = "",
 ) -> Response:
     """List the stored maps, by id."""
-    exchange = begin(request)
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
     items = [record.as_json() for record in page.maps]
@@ -121,9 +120,9 @@ async def list_maps(
     openapi_extra={"parameters": _conditional("If-Match")},
     summary="Delete a map",
 )
-async def delete_map(request: Request, map_id: MapIdPath) -> Response:
+async def delete_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Delete a map."""
-    exchange, demands = begin(request), demands_of(request)
+    demands = demands_of(exchange.request)
     services = exchange.services
     await ask_store(services, partial(services.store.delete, map_id, demands))
     services.metrics.map_changes.labels("deleted").inc()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents.encoding import encode
 from linefix.documents.replies import Limits, Live, Version
 
 from ...version import VERSION
+from ..exchange import Admitted
 from ..sending import json_response
-from ..services import services_of
 from .declaring import EVERYWHERE, problems
 
 router = APIRouter(tags=["operations"])
@@ -27,9 +27,9 @@ async def livez() -> Response:
     responses=problems("internal", "not_ready", "read_only"),
     summary="Report whether the service is ready for requests",
 )
-async def readyz(request: Request) -> Response:
+async def readyz(exchange: Admitted) -> Response:
     """Answer 200 while the kernels are loaded, the store responds, and the service is not shutting down."""
-    services = services_of(request.scope)
+    services = exchange.services
     services.readiness.require_all()
     await services.probe.check()
     return json_response(b'{"status":"ok"}')
@@ -44,22 +44,10 @@ async def version() -> Response:
 @router.get(
     "/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE), summary="Return the limits of requests"
 )
-async def limits(request: Request) -> Response:
+async def limits(exchange: Admitted) -> Response:
     """Name the limits beyond which a request is refused with 413, or waits no longer."""
-    settings = services_of(request.scope).settings
-    names = (
-        "max_body_bytes",
-        "max_values",
-        "max_bodies_bytes",
-        "max_answers_bytes",
-        "max_connections",
-        "request_timeout_s",
-        "max_map_segments",
-        "max_scan_segments",
-        "max_beams",
-        "max_correspondences",
-    )
-    more = ("max_batch", "max_deadline_ms", "searches", "queue")
+    settings = exchange.services.settings
+    names = [name for name in Limits.model_fields if name in type(settings).model_fields]
     fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
     held = settings.limits()
     fixed |= {
@@ -67,7 +55,7 @@ async def limits(request: Request) -> Response:
         "max_beams_together": held.beams_together,
         "max_segments_together": held.segments_together,
     }
-    return json_response(encode({name: getattr(settings, name) for name in (*names, *more)} | fixed))
+    return json_response(encode({name: getattr(settings, name) for name in names} | fixed))
 
 
 @router.get(
@@ -79,7 +67,7 @@ async def limits(request: Request) -> Response:
     },
     summary="Counts for Prometheus",
 )
-async def metrics(request: Request) -> Response:
+async def metrics(exchange: Admitted) -> Response:
     """Give the counts, over all workers."""
-    text = await services_of(request.scope).metrics.exposition()
+    text = await exchange.services.metrics.exposition()
     return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

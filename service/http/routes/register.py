@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.reading import read_model
@@ -13,12 +13,12 @@ from linefix.documents.requests import RegisterRequest
 
 from ...work.association import answer_registration
 from ..body_stage import read
-from ..exchange import begin_search
+from ..exchange import Searching
 from ..search_stage import in_search_slot
 from ..sending import answer
-from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["register"], route_class=DirectRoute)
+router = APIRouter(tags=["register"])
 
 
 @router.post(
@@ -29,9 +29,8 @@ router = APIRouter(tags=["register"], route_class=DirectRoute)
     openapi_extra=takes(RegisterRequest, {"a corner": examples.REGISTER}),
     summary="Find the pose from known correspondences",
 )
-async def post_register(request: Request) -> Response:
+async def post_register(exchange: Searching) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, RegisterRequest))
     job = exchange.job()
     return await answer(

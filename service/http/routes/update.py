@@ -5,21 +5,20 @@ from __future__ import annotations
 import asyncio
 from functools import partial
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.parts import StoredMap
 from linefix.documents.reading import read_model
 from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
 
-from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
 from ...work.job import Done, Job
-from ...work.updating import Progress, answer_apply, begin_update, take_steps, update_done
+from ...work.updating import answer_apply, begin_update, take_steps, update_done
 from ..body_stage import read
-from ..exchange import Exchange, begin_search
+from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map
-from ..search_stage import in_search_slot
+from ..search_stage import in_search_slot, in_short_slots
 from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
@@ -36,9 +35,8 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
     openapi_extra=takes(UpdateRequest, {"two visits": examples.UPDATE}),
     summary="Propose changes of a stored map",
 )
-async def post_update(request: Request, map_id: MapIdPath) -> Response:
+async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
     """Propose changes of a map that scans of several visits show; nothing is stored."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, UpdateRequest))
     job = exchange.job(asked.deadline_ms)
     return await answer(exchange, _work(exchange, map_id, asked, job), job.deadline)
@@ -52,9 +50,8 @@ async def post_update(request: Request, map_id: MapIdPath) -> Response:
     openapi_extra=takes(ApplyRequest, {"a rack is gone": examples.APPLY}),
     summary="Apply the accepted changes of an update",
 )
-async def post_apply(request: Request) -> Response:
+async def post_apply(exchange: Searching) -> Response:
     """Return a map with those changes of an update that are accepted; nothing is searched or stored."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, ApplyRequest))
     job = exchange.job()
     return await answer(
@@ -68,18 +65,10 @@ async def _work(exchange: Exchange, map_id: str, asked: UpdateRequest, job: Job)
     async with looking_up_map(exchange, StoredMap(map_id=map_id), job.deadline, oriented=None) as source:
         assert isinstance(source, FoundMap)  # what is stored is found, or else an exception
         await index_map(exchange, source, job.deadline, oriented=None)
-        work = partial(begin_update, lookup, source, asked, job)
-        progress = await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
-    await _take_steps(exchange, progress, job)
-    return await exchange.services.parse_threads.run(partial(update_done, progress, asked, job))
-
-
-async def _take_steps(exchange: Exchange, progress: Progress, job: Job) -> None:
-    """Go on on one core, so that an update leaves the others to searches that robots wait for."""
+        begin = partial(begin_update, lookup, source, asked, job)
+        progress = await in_search_slot(exchange, begin, job.deadline, job.searching.is_set)
     work = partial(take_steps, progress, job.deadline)
-    try:
-        while await in_search_slot(exchange, work, job.deadline):
-            await asyncio.sleep(0)
-    except DeadlinePassedError:  # no slot is left: it then ends without a proposal, and searches nothing
+    if not await in_short_slots(exchange, work, job.deadline):  # it then ends without a proposal, and searches nothing
         while await exchange.services.parse_threads.run(work):
             await asyncio.sleep(0)
+    return await exchange.services.parse_threads.run(partial(update_done, progress, asked, job))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.reading import read_model
@@ -13,12 +13,12 @@ from linefix.documents.requests import VectorizeRequest
 
 from ...work.association import answer_vectorization
 from ..body_stage import read
-from ..exchange import begin_search
+from ..exchange import Searching
 from ..search_stage import in_search_slot
 from ..sending import answer
-from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["vectorize"], route_class=DirectRoute)
+router = APIRouter(tags=["vectorize"])
 
 
 @router.post(
@@ -29,9 +29,8 @@ router = APIRouter(tags=["vectorize"], route_class=DirectRoute)
     openapi_extra=takes(VectorizeRequest, {"a corner": examples.VECTORIZE}),
     summary="Find the segments in ranges or points",
 )
-async def post_vectorize(request: Request) -> Response:
+async def post_vectorize(exchange: Searching) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
-    exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, VectorizeRequest))
     job = exchange.job()
     return await answer(

@@ -106,8 +106,8 @@ def with_maps(change: Any) -> dict[str, Any]:
         (with_maps(lambda maps: maps[1].update(segments=[[0, 0, 0, 0]])), "/maps/1/segments"),
         ({**ASKED, "maps": {"prefix": ""}}, "/maps/prefix"),
         ({**ASKED, "maps": {"prefix": "a/b"}}, "/maps/prefix"),
-        ({**ASKED, "map_weights": {"roof": 0.5}}, "/map_weights/roof"),
-        ({**ASKED, "map_weights": {"room": 1.5}}, "/map_weights/room"),
+        ({**ASKED, "map_weights": {"roof": 0.5}}, "/map_weights"),
+        ({**ASKED, "map_weights": {"room": 1.5}}, "/map_weights"),
         ({**ASKED, "map_weights": {"room": 0.6, "hall": 0.6}}, "/map_weights"),
         ({**ASKED, "prior": PRIOR}, "/prior/map_id"),
         ({**ASKED, "prior": {**PRIOR, "map_id": "roof"}}, "/prior/map_id"),
@@ -121,6 +121,7 @@ def test_misuse_is_told_with_its_place(client: httpx.Client, body: dict[str, Any
     problem = response.json()
     assert problem["code"] == "invalid_request"
     assert problem["errors"][0]["pointer"].startswith(pointer)
+    assert "roof" not in response.text, "ids that were sent"
     if not pointer:
         assert problem["errors"][0]["pointer"] == ""
         assert "map and maps" in problem["detail"]
