@@ -20,13 +20,10 @@ from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .kernels.things import compare_things
 from .tuning import (
-    AS_SCORED,
     COMPARED,
     COUNTED,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
-    MOST_AS_SCORED,
-    TEMPERATURE,
     UNCOUNTED,
 )
 
@@ -51,7 +48,7 @@ class Comparison:
     @property
     def weights(self) -> Floats:
         """The probability of each other over that of the explanation."""
-        return np.asarray(self.counted * np.exp(-np.clip(self.gaps / TEMPERATURE, -20.0, 500.0)))
+        return np.asarray(self.counted * np.exp(-np.clip(self.gaps, -20.0, 500.0)))
 
     @property
     def probability(self) -> float:
@@ -67,8 +64,8 @@ def compare(
     Each explanation is matched again with wide gates, since of many similar places the one that fits best shows smaller
     errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
     what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
-    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most. Next to that a
-    fraction of the difference in score counts, `MOST_AS_SCORED` of it at most: one thing alone never decides.
+    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most, and one thing
+    alone never decides.
     """
     others = tuple(others[:COMPARED])
     if not others:
@@ -79,7 +76,6 @@ def compare(
     ratios = posteriors[1:] / posteriors[0] if posteriors[0] > 0.0 else np.ones(len(others))
     counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
     gaps = _gaps(context, sets, wall_sigma) + priors[0] - priors[1:]
-    gaps += AS_SCORED * np.minimum(posteriors[0] - posteriors[1:], MOST_AS_SCORED)
     return Comparison(others, gaps, counted)
 
 
