@@ -32,10 +32,10 @@ def read_scan(name: str) -> Json:
     RefusedError
         When the content is neither JSON nor YAML, or no scan.
     """
-    scan = _parsed(bytes_of(name), name)
-    if not isinstance(scan, dict):
+    message = _parsed(bytes_of(name), name)
+    if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
-    scan = _unwrapped(scan, name)
+    scan: Json = _unwrapped(message, name)
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
     for part in (scan, *_views(scan)):

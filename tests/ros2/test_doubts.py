@@ -139,7 +139,13 @@ def test_a_pose_without_scans_is_stale_and_its_transform_ends(
         expected = "no scan arrives on /scan" if seen is None else "no scan has a range"
         assert expected in stale.message
         assert {one.key: one.value for one in stale.values}["input problem"].startswith(expected)
-        wait_until(lambda: not (blind(), time.sleep(0.5), robot.transforms.take())[2], lambda: logged)
+
+        def silent() -> bool:
+            blind()
+            time.sleep(0.5)
+            return not robot.transforms.take()
+
+        wait_until(silent, lambda: logged)
         assert any(line.startswith("state stale") for line in logged)
         robot.until(robot.status, drives, lambda one: one.message == "the pose is agreed")
 
