@@ -92,7 +92,7 @@ def test_who_keeps_others_waiting_is_told_so_a_little_later(start_service: Calla
             heard = b""
             while data := connection.recv(65_536):
                 heard += data
-            assert heard.count(b"\r\n\r\n") == 1
+            assert heard.count(b"HTTP/1.1 ") == 1
         time.sleep(2 * LATER)
     log = running.log()
     assert "a defect" not in log
