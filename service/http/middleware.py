@@ -35,7 +35,6 @@ OTHER = "unmatched"
 STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
-NO_HOST = (b"host", b"")  # the server's header in place of a host if none was sent
 CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
 ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
 CLOSE = (b"connection", b"close")
@@ -57,14 +56,19 @@ class RequestMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        if NO_HOST in scope["headers"]:
-            scope["headers"] = [field for field in scope["headers"] if field != NO_HOST]
         # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
         intake = Intake(receive, scope["headers"])
         request = Request(inner, intake.receive)
         exchange = Exchange(self._services, request, asyncio.get_running_loop().time(), _id_of(scope["headers"]))
-        inner.setdefault("state", {})[KEY] = exchange
+        state = inner.setdefault("state", {})
+        state[KEY] = exchange
+        try:
+            await self._admit(exchange, intake, scope, send)
+        finally:
+            del state[KEY]  # the exchange refers to the request: heads would wait for the garbage collector
+
+    async def _admit(self, exchange: Exchange, intake: Intake, scope: Scope, send: Send) -> None:
         try:
             _require_plain(scope)
             exchange.ticket = self._services.entrance.admit(scope)
@@ -86,11 +90,12 @@ class RequestMiddleware:
         route = route if route in self._routes else OTHER
         self._services.refusals.count(route, scope["method"], kind.code, kind.status)
         stranger = isinstance(error, STRANGERS)
-        await intake.drop_rest(STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes)
+        most_bytes = STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes
+        ends = not await intake.drop_rest(most_bytes) or stranger
 
         async def send_refusal(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(message, exchange.request_id, *((CLOSE,) if stranger else ()))
+                _add_headers(message, exchange.request_id, close=ends)
             await send(message)
 
         problem = problem_of(error)
@@ -104,8 +109,9 @@ class RequestMiddleware:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                await intake.drop_rest(self._services.settings.max_body_bytes)
-                _add_headers(message, exchange.request_id)
+                # The server would read on without end.
+                ends = not await intake.drop_rest(self._services.settings.max_body_bytes)
+                _add_headers(message, exchange.request_id, close=ends)
             await send(message)
 
         scope = exchange.request.scope
@@ -159,7 +165,7 @@ def _require_plain(scope: Scope) -> None:
                 raise ControlCharacterError(f"{found}; expected none; remove it")
 
 
-def _add_headers(message: Message, request_id: str, *more: tuple[bytes, bytes]) -> None:
+def _add_headers(message: Message, request_id: str, *, close: bool) -> None:
     """Add the headers that all answers have."""
-    own = ((b"x-request-id", request_id.encode("ascii")), *ALWAYS, *more)
+    own = ((b"x-request-id", request_id.encode("ascii")), *ALWAYS, *((CLOSE,) if close else ()))
     message["headers"] = [*message.get("headers", ()), *own]
