@@ -34,6 +34,7 @@ OPTIONS = {
     "when": ("", "start, lost or always"),
     "min_sigma": ("", "least standard deviation of initialpose, metres"),
     "min_sigma_theta": ("", "least standard deviation of its heading, radians"),
+    "tf_max_age_s": ("", "seconds without scans after which publish_tf stops; 0: never"),
     "hardware_id": ("", "of the diagnostics"),
     "params_file": ("", "a YAML file of parameters"),
 }
