@@ -196,7 +196,8 @@ def _reasons(verdict: Verdict, on_map: float, usable_from: float) -> tuple[Reaso
         weighed = weighed_reasons(
             verdict.model, verdict.described.features, on_map, verdict.described.comparison.probability
         )
-        weighed = weighed[: None if verdict.by_model < usable_from else 0]
+        # Two probabilities that each reach the threshold may miss it together.
+        weighed = weighed if verdict.by_model < usable_from or not settled else []
     vetoes = [
         veto
         for veto in verdict.vetoes
