@@ -15,7 +15,7 @@ from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score
 from ..consensus.tuning import BEAMS_PASSED, BEAMS_READ, BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, NEAR, SIGHT_TOLERANCE
 from ..context import SearchContext
-from ..scan.beams import together
+from ..scan.beams import rays_to_lines, together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .kernels.things import compare_things
@@ -89,10 +89,14 @@ def _gaps(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: floa
     estimates = np.concatenate([one.estimate for one in sets])
     _, matches = score(loose, estimates)
     lines = context.rays_to_lines
+    seen = len(lines) > 0 or context.with_beams
+    if not seen:  # from where is not known: the lines alone are evidence, and they are where they are
+        sightings = context.lines.sightings
+        lines = rays_to_lines(sightings, np.zeros_like(context.viewpoints), np.ones(len(context.viewpoints)))
     beams = together(lines, context.beams) if context.with_beams else lines
     table = cast(context, beams, estimates)
     ranges = beams.rows["range"]
-    passes = (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
+    passes = seen & (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
     distances = np.where(passes, table["distance"], np.where(np.isfinite(ranges), ranges, beams.reach))
     # The score of each scan line, for each of the rays to it.
     rays = np.maximum(1, np.bincount(lines.line, minlength=matches.shape[1]))
