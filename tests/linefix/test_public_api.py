@@ -29,6 +29,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "analyzing",
         "answering",
         "checking",
+        "compiling",
         "documents",
         "driving",
         "explaining",
@@ -37,6 +38,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "public",
         "ranges",
         "updating",
+        "warmup",
         "Any",
         "TYPE_CHECKING",
     }

@@ -761,6 +761,7 @@ class UpdateScan(TypedDict):
     twist: NotRequired[Twist | None]
     pose: NotRequired[Pose | None]
     covariance: NotRequired[list[list[float]] | None]
+    flipped: NotRequired[bool]
     odometry: NotRequired[Pose | None]
 
 
