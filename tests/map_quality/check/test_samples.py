@@ -94,7 +94,6 @@ def test_a_map_with_y_pointing_down() -> None:
     assert codes(told(reversed_ends(faces() * MIRROR))) == ["mirrored"]
 
 
-@pytest.mark.xfail(strict=True, reason="thickness is found in place of reversed")
 def test_a_map_the_wrong_way_round() -> None:
     report = told(reversed_ends(faces()))
     assert codes(report) == ["reversed"]
