@@ -163,8 +163,9 @@ def test_a_robot_that_starts_again_gets_the_state_and_the_pose(
                 way = Way(robot, second)
                 robot.until("initialpose", way)
                 robot.until("diagnostics linefix: localization: the pose is agreed", way)
-        with peer(program, domain) as late:
-            late.until("status 0 the pose is agreed")
+                if second > 1.0:
+                    with peer(program, domain) as late:  # while the robot sends scans: without them the pose is stale
+                        late.until("status 0 the pose is agreed", way)
 
 
 def test_a_grid_is_received(domain: int, program: Path) -> None:
