@@ -44,7 +44,7 @@ def parameters_of(file: Path, namespace: str | None = None, known: Container[str
     values: dict[str, Any] = {}
     for above, node in keys:
         section = _with_maps(sections.get((above, node), {}), file)
-        # What all nodes share may be meant for others.
+        # Parameters of all nodes may be meant for others.
         values.update({name: value for name, value in section.items() if node == NODE or name in known})
     return {key: value for key, value in values.items() if value is not None}
 

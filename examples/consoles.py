@@ -45,7 +45,7 @@ class Shown:
     numbers : tuple of str
         As the document has them; "" where the number is a time.
     spans : tuple of (int, int)
-        Where they are in the text.
+        Their places in the text.
     """
 
     pattern: re.Pattern[str]

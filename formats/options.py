@@ -60,7 +60,7 @@ class ImportOptions:
     level : str or None
         Floor of a drawing that has several, as it names it, or the height of its lines in metres.
     surface : float or None
-        How far behind the front of the occupied cells of a grid the surface of walls lies, cells, 0 to 10; None: found.
+        Depth of the walls' surface behind the front of a grid's occupied cells, cells, 0 to 10; None: estimated.
 
     Raises
     ------

@@ -21,7 +21,7 @@ USUAL_SCAN = 0.2  # s; of a slow scanner, assumed in its place
 
 MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
 
-# How far angle_max may be from the last beam. Drivers set it to the end of the field of view and round the number of
+# Greatest distance of angle_max from the last beam. Drivers set it to the end of the field of view and round the number of
 # ranges down (LDS-01, neato, velodyne_laserscan), which makes less than two beams; filters cut ranges and leave it.
 BEAMS_OFF = 2.0
 ANGLE_OFF = math.radians(3.0)

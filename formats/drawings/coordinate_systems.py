@@ -1,4 +1,4 @@
-"""What the coordinates of a GeoJSON are: degrees, metres, or another unit of length."""
+"""The coordinates of a GeoJSON: degrees, metres, or another unit of length."""
 
 from __future__ import annotations
 

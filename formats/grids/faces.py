@@ -74,7 +74,7 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     name : str
         Of the file, for errors.
     surface : float or None
-        How far behind the front the surface of walls lies, cells; None: found from the grid.
+        Depth of the walls' surface behind the front, cells; None: estimated from the grid.
 
     Returns
     -------

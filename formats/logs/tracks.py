@@ -166,7 +166,7 @@ class Track:
     most : int or None
         Values to keep, of the newest part only, for a robot that runs for weeks; None: all.
     topics : set of str
-        Where the values come from.
+        Sources of the values.
     """
 
     static: bool

@@ -55,7 +55,7 @@ class _Field:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """How results become an answer; `all_at_once` where no field needs a conversion."""
+    """The conversion of results to an answer; `all_at_once` if no field needs one."""
 
     fields: tuple[_Field, ...]
     names: tuple[str, ...]

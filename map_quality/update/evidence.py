@@ -23,7 +23,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """What the evidence shows about the chunks that beams met.
+    """The evidence about the chunks that beams met.
 
     Attributes
     ----------

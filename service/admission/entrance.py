@@ -19,7 +19,7 @@ LIMITS = GUARDED + "limits"
 """The one of them for which any key will do."""
 MAPS = GUARDED + "maps/"
 ROLES = {"GET": Role.READ, "HEAD": Role.READ, "POST": Role.ASSOCIATE, "PUT": Role.WRITE, "DELETE": Role.WRITE}
-"""The role that a method requires. What a POST sends is searched, converted or checked, and never stored."""
+"""The role that a method requires. A POST searches, converts or checks its content, and never stores it."""
 
 
 class Entrance:

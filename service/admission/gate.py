@@ -42,7 +42,7 @@ class Ticket:
 
 @dataclass(eq=False, slots=True)
 class _Share:
-    """What one holder has of a gate: requests with a place, what runs, what is long, what waits; and seconds used."""
+    """The share of one holder of a gate: its requests with a place, running, long and waiting; and the seconds used."""
 
     used: float
     places: int = 0

@@ -1,4 +1,4 @@
-"""What runs in the child of an import: from a form to a map and a report.
+"""The program of the child of an import: it turns a form into a map and a report.
 
 The files come from untrusted senders, and the libraries that read them are many and large. So the child has no more
 memory and time than it was given and no keys in its environment. Its answer is JSON, which is checked.
@@ -64,7 +64,7 @@ def read_form_apart(content: bytes, content_type: str, folder: str, bounds: Boun
         lines = [{"missing": True}]
     except (MemoryError, RecursionError):
         lines = [{"too_large": "reading the file takes more memory than is allowed; simplify the file"}]
-    except Exception as error:  # a defect, or a full disk; only its kind is told, nothing of the file
+    except Exception as error:  # a defect, or a full disk; only its kind is returned, nothing of the file
         full = isinstance(error, OSError) and error.errno in FULL
         lines = [{"no_room": True} if full else {"failed": type(error).__name__}]
     printed = _printed(lines)

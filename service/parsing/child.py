@@ -159,7 +159,7 @@ class Child:
                         pass_fds=[theirs.fileno()],
                         process_group=0,  # so that Ctrl-C is for the service, which then ends this
                         stdin=subprocess.DEVNULL,
-                        # What libraries print of files of unknown senders is not for the log.
+                        # Libraries may print parts of the files of unknown senders: not into the log.
                         stderr=None if self._folder is None else subprocess.DEVNULL,
                     )
                 except OSError:  # no memory, or no descriptors
@@ -178,7 +178,7 @@ class Child:
         if self._connection is not None:
             self._connection.close()
         if self._process is not None:
-            for _ in range(2):  # one that ended by itself has a status of its own soon
+            for _ in range(2):  # a process that ended by itself has its status soon
                 with suppress(subprocess.TimeoutExpired):
                     status = self._process.wait(END_SECONDS / 5)
                     break

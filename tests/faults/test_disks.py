@@ -74,7 +74,7 @@ def test_a_full_disk_loses_nothing(start_service: Callable[..., Any], disk: Path
 
     with pytest.raises(OSError, match="No space"):
         (disk / "other").write_bytes(bytes(2_000_000))
-    # What makes room works without any.
+    # Requests that make room need none.
     for name in ("m", "m03"):
         answer = client.delete(f"/v1/maps/{name}")
         assert answer.status_code == 204, answer.text

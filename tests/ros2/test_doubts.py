@@ -1,4 +1,4 @@
-"""What is not known is not believed: odometry that is missing or contradicts itself, scans that end."""
+"""Missing or contradicting odometry, and scans that end, are no evidence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where an element of an SVG is drawn: transform, transform-origin, and the properties translate, rotate and scale."""
+"""The place of an element of an SVG: transform, transform-origin, and the properties translate, rotate and scale."""
 
 from __future__ import annotations
 
