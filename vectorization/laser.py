@@ -21,8 +21,8 @@ USUAL_SCAN = 0.2  # s; of a slow scanner, assumed in its place
 
 MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
 
-# Greatest distance of angle_max from the last beam. Drivers set it to the end of the field of view and round the number of
-# ranges down (LDS-01, neato, velodyne_laserscan), which makes less than two beams; filters cut ranges and leave it.
+# Greatest distance of angle_max from the last beam. Drivers set it to the end of the field of view and round the number
+# of ranges down (LDS-01, neato, velodyne_laserscan), which makes less than two beams; filters cut ranges and leave it.
 BEAMS_OFF = 2.0
 ANGLE_OFF = math.radians(3.0)
 ROUNDING = 1e-3  # of a beam, as float32 has it

@@ -31,7 +31,7 @@ FIELDS_OF_VIEW = (
     | dict.fromkeys((541, 811, 1081), 270.0) | {540: 269.5, 1080: 269.75}
 )  # fmt: skip
 HALF_TURN = (180, 181, 360, 361, 720, 721)  # beams of a scanner of 180 degrees
-FEW_BEAMS = 100  # which the log does not describe
+FEW_BEAMS = 100  # up to which the report has no note
 
 
 Settings = dict[str, str]
