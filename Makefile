@@ -105,8 +105,10 @@ $(VENV)-peers/.peers: requirements/peers.txt
 peers: $(VENV)-peers/.peers  ## print Linefix beside other solvers, installed apart from the rest
 	$(VENV)-peers/bin/python -m benchmarks peers
 
-page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node)
-	cd web && npm ci --no-audit --no-fund && npm run build
+page: $(VENV)/.ready  ## make the page's types from the schema, and build it from web/ into service/page/ (needs node)
+	cd web && npm ci --no-audit --no-fund
+	$(BIN)/python -m clients.types | npm --prefix web run --silent contract
+	cd web && npm run build
 	$(BIN)/python -m examples.scenes
 
 pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need no data; the page with chromium

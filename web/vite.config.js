@@ -5,7 +5,9 @@ import { join } from "node:path";
 import { defineConfig } from "vite";
 
 const OUT = "../service/page/built";
-const SOURCES = ["index.html", "package.json", "tsconfig.json", "vite.config.js", ...readdirSync("src").map((name) => `src/${name}`)];
+const TYPES = "contract.ts"; // nothing of it is in the page
+const sources = readdirSync("src").filter((name) => name !== TYPES);
+const SOURCES = ["index.html", "package.json", "tsconfig.json", "vite.config.js", ...sources.map((name) => `src/${name}`)];
 
 function hashes(folder, names) {
   const of = (name) => createHash("sha256").update(readFileSync(join(folder, name))).digest("hex");

@@ -28,7 +28,7 @@ button.addEventListener("click", async () => {
   const drive = Number(value("#drive"));
   // The analysis reports each place without the added boxes and with them.
   const stored = asStored() || (state.mapId !== null && own.length === state.own);
-  const map = stored ? { map_id: state.mapId } : { ...state.map, segments: own };
+  const map = stored ? { map_id: state.mapId! } : { ...state.map, segments: own };
   button.disabled = true;
   text.textContent = drive || landmark.length ? "Analyzing, which may take half a minute ..." : "Analyzing ...";
   const of = state.walls;

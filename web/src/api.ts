@@ -1,6 +1,7 @@
 // Requests to the service that this page comes from.
 
-import type { Analysis, Answer, Imported, ImportedScans, MapDocument, Proposal, Scan, StoredMap } from "./types";
+import type * as contract from "./contract";
+import type { Asked, Imported, ImportedScans, MapDocument, Proposal, Scan } from "./types";
 
 export class Problem extends Error {
   constructor(
@@ -51,35 +52,25 @@ function problemOf(status: number, answer: unknown): Problem {
 const JSON_TYPE = "application/json";
 const post = <T>(path: string, body: unknown, signal?: AbortSignal) => call<T>("POST", path, JSON.stringify(body), JSON_TYPE, signal);
 
-type Named = { map_id: string };
-export interface Asked {
-  map?: MapDocument | Named;
-  maps?: (Named | (MapDocument & Named))[];
-  scan: Scan;
-  prior?: Record<string, number | string>;
-  options: { on_map: number; usable_from: number };
-}
-
-export const associate = (asked: Asked, signal: AbortSignal) => post<Answer>("/v1/associate", asked, signal);
-export const analyze = (asked: Record<string, unknown>) => post<Analysis>("/v1/analyze", asked);
+export const associate = (asked: Asked, signal: AbortSignal) => post<Required<contract.AssociateAnswer>>("/v1/associate", asked, signal);
+export const analyze = (asked: contract.MapAnalyzeRequest) => post<contract.AnalyzeAnswer>("/v1/analyze", asked);
 export const example = <T>(name: string) => call<T>("GET", `/page/examples/${name}.json`);
 
 const pathOf = (id: string) => `/v1/maps/${encodeURIComponent(id)}`;
 export const listMaps = (cursor: string, limit = 50) =>
-  call<{ maps: StoredMap[]; next: string | null }>("GET", `/v1/maps?limit=${limit}&cursor=${encodeURIComponent(cursor)}`);
+  call<contract.MapList>("GET", `/v1/maps?limit=${limit}&cursor=${encodeURIComponent(cursor)}`);
 export const getMap = (id: string) => call<MapDocument>("GET", pathOf(id));
 /** Store a map; with a revision, only in place of that one. */
-export const putMap = (id: string, map: MapDocument, revision?: number) =>
-  call<StoredMap>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE, undefined, revision === undefined ? {} : { "If-Match": `"${revision}"` });
+export const putMap = (id: string, map: MapDocument, revision: number | null = null) =>
+  call<contract.MapSummaryAnswer>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE, undefined, revision === null ? {} : { "If-Match": `"${revision}"` });
 export const deleteMap = (id: string) => call<void>("DELETE", pathOf(id));
-export const checkMap = (id: string) =>
-  call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
+export const checkMap = (id: string) => call<contract.CheckAnswer>("GET", `${pathOf(id)}:check`);
 
 /** Propose changes of a stored map that the scans of several visits show. */
 export const updateMap = (id: string, visits: { visit: string; scans: Scan[] }[]) => post<Proposal>(`${pathOf(id)}:update`, { visits });
 /** Return a map with those changes of a proposal that are accepted; the service stores nothing. */
-export const applyChanges = (map: MapDocument, { changes, sharpened }: Proposal) => post<{ map: MapDocument }>("/v1/maps:apply", { map, changes, sharpened });
-export const limits = () => call<{ max_batch: number }>("GET", "/v1/limits");
+export const applyChanges = (map: MapDocument, { changes, sharpened }: Proposal) => post<contract.ApplyAnswer>("/v1/maps:apply", { map, changes, sharpened });
+export const limits = () => call<contract.Limits>("GET", "/v1/limits");
 
 /** Convert files of another tool to a map; the service stores nothing. */
 export const importMap = (files: File[], units: string) => importing<Imported>("/v1/maps:import", files, units ? { units } : {});

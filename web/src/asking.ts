@@ -1,9 +1,9 @@
 // From what is on the page to a request, and its answer back to the page.
 
-import { associate, Problem, type Asked } from "./api";
+import { associate, Problem } from "./api";
 import { noisy, takeScan } from "./geometry";
 import { asStored, changed, forget, state } from "./state";
-import type { Alternative, Answer } from "./types";
+import type { Alternative, Answer, Asked } from "./types";
 import { showProblem, showWaiting } from "./verdict";
 
 const NEAR = { radius: 1, angle: Math.PI / 6 };
@@ -49,8 +49,8 @@ export async function ask(): Promise<boolean> {
   const mine = (running = new AbortController());
   const of = state.mapId;
   try {
-    const answer = await associate(made.asked, mine.signal);
-    answer.unmatched_scan = answer.unmatched_scan.map((one: number | { scan: number }) => (typeof one === "number" ? one : one.scan));
+    const found = await associate(made.asked, mine.signal);
+    const answer: Answer = { ...found, unmatched_scan: found.unmatched_scan.map((one) => (typeof one === "number" ? one : one.scan)) };
     const sentTo = state.floors.length && answer.map?.map_id !== of ? [] : made.sentTo;
     Object.assign(state, { answer, sent: made.asked, sentTo, others: countedOf(answer), other: -1 });
   } catch (error) {

@@ -91,7 +91,8 @@ export function pointsOf(scan: Scan): [number, number][] {
   if (scan.views) return scan.views.flatMap((one) => pointsOf({ ...one, views: undefined }).map(([x, y]) => fromView(one, x, y)));
   if (scan.points && Array.isArray(scan.points[0])) return scan.points;
   if (!scan.laser) return [];
-  const { angle_min, angle_increment, ranges, range_min = 0, range_max = Infinity } = scan.laser;
+  const { angle_min, angle_increment, ranges } = scan.laser;
+  const [range_min, range_max] = [scan.laser.range_min ?? 0, scan.laser.range_max ?? Infinity];
   const points: [number, number][] = [];
   ranges.forEach((r, k) => {
     if (r === null || r < range_min || r > range_max || r <= 0) return;

@@ -1,11 +1,11 @@
 // Maps that the service stores.
 
 import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
+import type { MapList } from "./contract";
 import { askSoon } from "./asking";
 import { openSeveral } from "./floors";
 import { kept, setMap, state } from "./state";
 import { isLatest, showAll, supersede } from "./scene";
-import type { StoredMap } from "./types";
 import { list } from "./verdict";
 
 const box = document.querySelector<HTMLDetailsElement>("#stored")!;
@@ -106,7 +106,7 @@ async function chosen(): Promise<string[]> {
   if (!prefix.value) throw new Error("Tick two maps at least, or enter how their names begin.");
   const found: string[] = [];
   for (let next: string | null = ""; next !== null; ) {
-    const page: { maps: StoredMap[]; next: string | null } = await listMaps(next, 1000);
+    const page: MapList = await listMaps(next, 1000);
     found.push(...page.maps.map((one) => one.map_id).filter((id) => id.startsWith(prefix.value)));
     next = page.next;
   }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from hashlib import sha256
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tests.running import RunningService
 ROOT = Path(__file__).parents[3]
 BUILT = ROOT / "service" / "page" / "built"
 WEB = ROOT / "web"
+CONTRACT = WEB / "src" / "contract.ts"
 
 
 def hashes(folder: Path, names: list[str]) -> dict[str, str]:
@@ -25,12 +27,25 @@ def hashes(folder: Path, names: list[str]) -> dict[str, str]:
 def test_the_page_was_built_from_these_sources() -> None:
     """Where this fails: `make page`."""
     manifest = json.loads((BUILT / "manifest.json").read_text())
-    sources = [path.relative_to(WEB).as_posix() for path in WEB.glob("src/*")]
+    sources = [path.relative_to(WEB).as_posix() for path in WEB.glob("src/*") if path != CONTRACT]
     sources += ["index.html", "package.json", "tsconfig.json", "vite.config.js"]
     assert manifest["sources"] == hashes(WEB, sorted(sources))
     built = sorted(path.name for path in BUILT.iterdir() if path.name != "manifest.json")
     assert built == ["index.html", "page.css", "page.js"]
     assert manifest["built"] == hashes(BUILT, built)
+
+
+def test_its_types_are_those_of_the_contract(client: httpx.Client) -> None:
+    """Where this fails: `make page`."""
+    text = CONTRACT.read_text()
+    for name, schema in client.get("/openapi.json").json()["components"]["schemas"].items():
+        found = re.search(rf"^ {{8}}{name}: (.*?;)$\n^ {{8}}\S", text, re.MULTILINE | re.DOTALL)
+        assert found is not None, name
+        fields = dict(re.findall(r"^ {12}(\w+)(\??): ", found[1], re.MULTILINE))
+        required = {field for field, mark in fields.items() if not mark}
+        assert (fields.keys(), required) == (schema.get("properties", {}).keys(), {*schema.get("required", ())}), name
+        values = ",".join(re.findall(r'"enum":\[(.*?)\]', orjson.dumps(schema).decode())).split(",")
+        assert [value for value in values if value not in found[1]] == [], name
 
 
 def test_no_file_names_another_host() -> None:
