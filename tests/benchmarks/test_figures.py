@@ -34,7 +34,7 @@ SETTINGS = {
     "docs/guides/security.md": ["32 MB", "96 MB", "64 MB", "50 ms"],
     "docs/explanation/method.md": ["0.4 %"],
     "docs/guides/read-the-answer.md": ["0.4 %"],
-    "docs/reference/http/associate.md": ["20 ms"],
+    "docs/reference/http/associate.md": ["0.4 %"],
     "docs/reference/http/check.md": ["50 MB"],
     "docs/reference/http/operations.md": ["50 ms"],
     "docs/reference/limits.md": ["99.9 %"],
