@@ -19,7 +19,7 @@ from .smoothness import smoothness
 from .starts import starts
 from .table import Row, machine, print_rows
 from .views import views
-from .worlds import worlds
+from .worlds.measured import worlds
 
 DEFAULT = ("localization", "ranges")
 

@@ -25,17 +25,17 @@ from association.verdict.vetoes import applied
 from batch import Engine, Lost, Processes
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.segments import Beams
-from simulation import CONDITIONS, FAMILIES
-from simulation import Case as DrawnCase
 from vectorization import vectorize
 
 from .collection import Collection, MapKey, Query, fold
 from .outcomes import OPTIONS, offset, other_map, progress
 from .queries import floor_plans, logs
 from .ranges import Log
-from .worlds.cases import in_map, questions
-from .worlds.outcomes import share_read
-from .worlds.tables import TOLD
+from .worlds import CONDITIONS, FAMILIES
+from .worlds import Case as DrawnCase
+from .worlds.measured.outcomes import share_read
+from .worlds.measured.questions import in_map, questions
+from .worlds.measured.tables import TOLD
 
 Item = TypeVar("Item")
 

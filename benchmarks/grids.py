@@ -27,7 +27,6 @@ from formats.grids.map_server import read_grid
 from formats.options import DEFAULT_OPTIONS
 from formats.report import Notes
 from registration import RigidTransform, Segments
-from simulation import draw_case
 from vectorization import LaserScan
 
 from .grid_scans import GRIDS, PosedScan, grid_path, simulated
@@ -35,7 +34,8 @@ from .outcomes import offset, progress
 from .peers.grid_matcher import GridMatcher
 from .queries import DATA, data_found
 from .table import Row, mean, print_rows, print_table, quantile
-from .worlds.cases import laser
+from .worlds import draw_case
+from .worlds.measured.questions import laser
 
 Floats = NDArray[np.float64]
 

@@ -22,14 +22,14 @@ from ros2.agreement import Agreement, Event, Observation
 from ros2.locating import OPTIONS, Located
 from ros2.messages import Time
 from simulation import Scanner, scan
-from simulation.buildings import FAMILIES
-from simulation.changes import rearranged
-from simulation.places import free_place, is_free
 
 from .outcomes import progress
 from .queries import logs
 from .ranges import Log
 from .table import Row, at_most, print_rows, quantile
+from .worlds.buildings import FAMILIES
+from .worlds.changes import rearranged
+from .worlds.places import free_place, is_free
 
 SECOND = 1_000_000_000
 BUILDINGS = 40

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
-from simulation import OfficePlan, Scanner, SimulatedScan, World, oblique, offices, scan, with_obstacles
-from simulation.worlds import outline
+from simulation import OfficePlan, Scanner, SimulatedScan, World, oblique, offices, outline, scan, with_obstacles
 
 Floats = NDArray[np.float64]
 

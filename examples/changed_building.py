@@ -11,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import linefix
+from benchmarks.worlds import FAMILIES, free_place
+from benchmarks.worlds.changes import rearranged
 from formats.colours import CHANGES, INK, WALL
 from map_quality import MapUpdate
 from registration import RigidTransform, Segments
-from simulation import FAMILIES, Scanner, free_place
-from simulation.changes import rearranged
+from simulation import Scanner
 
 PICTURE = Path(__file__).parents[1] / "docs" / "keep-the-map-true.png"
 SCANNER = Scanner.over(math.tau, 720, range_max=20.0, sigma=0.02)

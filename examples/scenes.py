@@ -15,9 +15,9 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
+from benchmarks.worlds import FAMILIES, free_place
 from registration import RigidTransform, Segments
-from simulation import FAMILIES, OfficePlan, corridor, free_place, offices
-from simulation.worlds import outline
+from simulation import OfficePlan, corridor, offices, outline
 
 FOLDER = Path(__file__).parents[1] / "service" / "page" / "examples"
 DIGITS = 3  # millimetres

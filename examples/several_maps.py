@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 import linefix
 from association import MapVerdict
+from benchmarks.worlds import FLOOR_KINDS, draw_floors
 from formats.colours import INK, MATCHED, UNMATCHED, WALL
 from registration.layout import Floats
-from simulation import FLOOR_KINDS, draw_floors
 
 PICTURE = Path(__file__).parents[1] / "docs" / "several-maps.png"
 KIND = FLOOR_KINDS["laboratories"]

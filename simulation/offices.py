@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import SimulationError
+from .scanner import SimulationError
 from .worlds import World, drawn
 
 Floats = NDArray[np.float64]

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RigidTransform, Segments
+from registration import InputError, RigidTransform, Segments
 from registration.layout import Floats
 from registration.limits import MAX_ANGLE, MAX_BEAMS
 
-from .errors import SimulationError
 from .kernels.casting import cast
 
 Indices = NDArray[np.int64]
+
+
+class SimulationError(InputError):
+    """An argument of a scanner, a scan or a world is wrong: the one error of this package."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
 
-from .errors import SimulationError
+from .scanner import SimulationError
 
 Floats = NDArray[np.float64]
 Corner = tuple[float, float]

@@ -8,12 +8,12 @@ import numpy as np
 
 from association import AssociationOptions, MapIndex, associate
 from registration import RigidTransform, Segments
-from simulation import FAMILIES, draw_case, scan
-from simulation.errors import SimulationError
+from simulation import SimulationError, scan
 
 from ..drawn import SCANNER
 from ..outcomes import progress
 from ..table import Row, at_most, mean
+from ..worlds import FAMILIES, draw_case
 from .drives import could_be_told, drive, look, way_back, world_looks
 from .trials import NEAR, TURNED, Trial, is_near, tried, usable_share, wrong_share
 

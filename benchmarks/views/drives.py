@@ -11,16 +11,17 @@ import numpy as np
 from association import Scan, View, assemble
 from linefix.ranges import ranges_scan
 from registration import IDENTITY, RigidTransform, Segments
-from simulation import CONDITIONS, Case, Scanner, scan
-from simulation.conditions import Stranger
-from simulation.places import is_free
+from simulation import Scanner, scan
 from vectorization import LaserScan
 
 from ..collection import Query
 from ..ranges import Log
 from ..table import mean
-from ..worlds.outcomes import share_that_reads
-from ..worlds.tables import TOLD
+from ..worlds import CONDITIONS, Case
+from ..worlds.conditions import Stranger
+from ..worlds.measured.outcomes import share_that_reads
+from ..worlds.measured.tables import TOLD
+from ..worlds.places import is_free
 
 DRIFT_DISTANCE = 0.02  # of a metre, and
 DRIFT_ANGLE = math.radians(1.0)  # rad; standard deviations after a metre, of a random walk

@@ -9,13 +9,13 @@ import numpy as np
 
 from association import MapIndex, Scan
 from registration import RigidTransform
-from simulation import FAMILIES, draw_case
-from simulation.errors import SimulationError
+from simulation import SimulationError
 
 from ..outcomes import progress
 from ..queries import logs
 from ..ranges import Log
 from ..table import Row, at_most
+from ..worlds import FAMILIES, draw_case
 from .drives import Look, before, drive, looks_of, world_looks
 from .trials import NEAR, TURNED, Trial, tried, wrong_share
 

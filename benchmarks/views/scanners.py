@@ -10,13 +10,13 @@ import numpy as np
 from association import MapIndex, Scan, View, assemble
 from linefix.ranges import ranges_scan
 from registration import RigidTransform, Segments
-from simulation import Scanner, free_place, scan
-from simulation.changes import clutter
-from simulation.errors import SimulationError
+from simulation import Scanner, SimulationError, scan
 from vectorization import LaserScan, Motion
 
 from ..queries import floor_plans
 from ..table import Row, at_least, mean, quantile
+from ..worlds import free_place
+from ..worlds.changes import clutter
 from .trials import NEAR, TURNED, Trial, tried, usable_share, wrong_share
 
 PLAN_NEAR, PLAN_TURNED = 0.1, 1.0

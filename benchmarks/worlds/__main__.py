@@ -9,15 +9,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from simulation import CONDITIONS, FAMILIES
-
 from ..engines import add_engine, engine_of
 from ..table import machine
-from .cases import HALVES
-from .outcomes import read, write
-from .pictures import draw_worlds
-from .report import report
-from .running import Choice, run
+from .buildings import FAMILIES
+from .conditions import CONDITIONS
+from .measured.outcomes import read, write
+from .measured.pictures import draw_worlds
+from .measured.questions import HALVES
+from .measured.report import report
+from .measured.running import Choice, run
 
 
 def main() -> None:

@@ -10,16 +10,16 @@ import pytest
 
 from association import Status
 from batch import Processes
+from benchmarks.worlds import CONDITIONS, FAMILIES, draw_case
 from benchmarks.worlds.__main__ import _worlds as worlds_named
 from benchmarks.worlds.__main__ import main
-from benchmarks.worlds.cases import FORMS, question, questions
-from benchmarks.worlds.goals import BEFORE, rows
-from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, write
-from benchmarks.worlds.pictures import draw_worlds
-from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
-from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
+from benchmarks.worlds.measured.goals import BEFORE, rows
+from benchmarks.worlds.measured.outcomes import WorldOutcome, answer, read, share_read, write
+from benchmarks.worlds.measured.pictures import draw_worlds
+from benchmarks.worlds.measured.questions import FORMS, question, questions
+from benchmarks.worlds.measured.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
+from benchmarks.worlds.measured.tables import could_be_told, held, quantile_bins, worst_gap
 from registration import RigidTransform
-from simulation import CONDITIONS, FAMILIES, draw_case
 
 FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=125)
 
@@ -191,7 +191,7 @@ def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
 
 def test_worlds_are_drawn_as_pictures(monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("benchmarks.pictures.FOLDER", tmp_path)
-    monkeypatch.setattr("benchmarks.worlds.pictures.FOLDER", tmp_path)
+    monkeypatch.setattr("benchmarks.worlds.measured.pictures.FOLDER", tmp_path)
     draw_worlds(["museum"])
     drawn = (tmp_path / "worlds" / "museum.png").read_bytes()
     assert drawn.startswith(b"\x89PNG")

@@ -12,8 +12,7 @@ from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_p
 from map_quality.analyze.standing import is_free
 from map_quality.views import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from registration import Segments
-from simulation import corridor, l_room, rectangle_room
-from simulation.worlds import outline
+from simulation import corridor, l_room, outline, rectangle_room
 
 L = [(0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (5.0, 3.0), (5.0, 6.0), (0.0, 6.0)]
 

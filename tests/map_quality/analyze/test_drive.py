@@ -14,8 +14,7 @@ from map_quality import Analysis, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.drive import CLEARANCE, STEP, seen_on_the_way, ways_from
 from registration import RigidTransform, Segments
 from registration.layout import Floats
-from simulation import corridor, rectangle_room
-from simulation.worlds import outline
+from simulation import corridor, outline, rectangle_room
 
 # 40 m long and 2 m wide, with a niche near its right end.
 NICHE = 32.0

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 
 from association import MapIndex, Scan
+from benchmarks.worlds import free_place
 from registration import RigidTransform, Segments
 from registration.layout import Floats
-from simulation import Scanner, free_place, scan
+from simulation import Scanner, scan
 from vectorization import LaserScan, vectorize
 
 THICK = 0.2  # m, of the walls

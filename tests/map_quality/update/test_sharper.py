@@ -9,10 +9,10 @@ import pytest
 
 import map_quality
 from association import AssociationResult, Deadline, MapIndex
+from benchmarks.worlds.map_errors import walls_off
 from map_quality import MapUpdate, VisitScan
 from map_quality.update.scans import search
 from registration import Segments
-from simulation.map_errors import walls_off
 
 from .hall import PILLAR, RACK, box, segments, visit
 
