@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload siege mutants fuzz page pictures wheel image-check sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers load mutants fuzz page pictures wheel image-check sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -66,8 +66,8 @@ faults: $(VENV)/.ready  ## kill, fill, flip, drain and load for hours: the long 
 bench: $(VENV)/.ready  ## print the table of quality and speed
 	$(BIN)/python -m benchmarks
 
-overload: $(VENV)/.ready  ## print what ten times too much load does, and what large maps do meanwhile (5 min)
-	$(BIN)/python -m benchmarks.overload
+load: $(VENV)/.ready  ## print what ten times too much load does, and what large maps do meanwhile (5 min)
+	$(BIN)/python -m benchmarks load
 
 mutants: $(VENV)/.ready  ## change the code in 600 places, one at a time, and report which changes the tests notice (hours; continues a stopped run)
 	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)
@@ -87,9 +87,6 @@ client-types: $(VENV)-clients/.ready  ## make the types of clients/python anew f
 
 clients: $(VENV)-clients/.ready  ## make clients by generators for Python, TypeScript and C++, and ask the README's question with each
 	$(BIN)/python -m clients.trial $(VENV)-clients/bin
-
-siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest client (25 min)
-	$(BIN)/python -m benchmarks.siege
 
 fuzz: $(VENV)/.ready  ## send 100,000 strange requests
 	FUZZ_CASES=100000 $(BIN)/python -m pytest -s tests/service/http/test_fuzz.py
@@ -117,7 +114,7 @@ pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need
 	$(BIN)/python -m examples.several_maps
 	$(BIN)/python -m examples.changed_building
 	$(BIN)/python -m examples.changed_page
-	$(BIN)/python -m benchmarks.verdicts
+	$(BIN)/python -m examples.verdicts
 	$(BIN)/python -m examples.demo && cp out/demo.png docs/demo.png
 
 wheel: $(VENV)/.ready  ## build the wheel of the last commit into dist/, twice: both have to be the same to the byte

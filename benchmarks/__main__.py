@@ -9,13 +9,12 @@ from pathlib import Path
 from .figures import record
 from .grids import grids
 from .growth import PAIRS, SIZES, growth
+from .load import load
 from .localization import localization
 from .peers import peers, versions
 from .queries import DATA, data_found
 from .ranges import ranges
 from .request import request
-from .ros2 import ros2
-from .smoothness import smoothness
 from .starts import starts
 from .table import Row, machine, print_rows
 from .views import views
@@ -52,8 +51,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "request": request,
     "worlds": worlds,
     "views": views,
-    "smoothness": smoothness,
-    "ros2": ros2,
+    "load": load,
     "starts": starts,
 }
 

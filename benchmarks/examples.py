@@ -22,7 +22,7 @@ from association.verdict.features import Features, describe, with_null
 from association.verdict.null import find_null
 from association.verdict.verdict import findings_of
 from association.verdict.vetoes import applied
-from batch import Engine, Lost, Processes
+from batch import Lost, Processes
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.segments import Beams
 from vectorization import vectorize
@@ -304,10 +304,8 @@ def examples_of(block: Block) -> list[Example]:
     return [example for example in (case.example() for case in cases(block)) if example is not None]
 
 
-def collected(
-    folder: Path | None, form: str, stride: int, *, kept_for_report: bool = False, engine: Engine | None = None
-) -> list[Example]:
-    """Search all cases of a form, or read what an earlier run stored in a folder.
+def collected(folder: Path | None, form: str, stride: int, *, kept_for_report: bool = False) -> list[Example]:
+    """Search all cases of a form with a process a core, or read what an earlier run stored in a folder.
 
     Parameters
     ----------
@@ -319,8 +317,6 @@ def collected(
         One case in so many is searched.
     kept_for_report : bool
         True for the drawn worlds that nothing may be fitted on.
-    engine : Engine, optional
-        By default as many processes as there are cores. The answers and their order do not depend on it.
 
     Raises
     ------
@@ -333,7 +329,7 @@ def collected(
         return stored
     blocks = [Block(form, stride, Part(k, BLOCKS), kept_for_report) for k in range(BLOCKS)]
     found: dict[Block, list[Example]] = {}
-    for block, examples in (engine or Processes(os.cpu_count() or 1)).run(examples_of, blocks):
+    for block, examples in Processes(os.cpu_count() or 1).run(examples_of, blocks):
         if isinstance(examples, Lost):
             raise RuntimeError(f"lost: {block}")
         found[block] = examples

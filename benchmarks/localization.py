@@ -3,7 +3,7 @@
 Every query counts, those without a single segment too. Times are the processor's for the searching thread, so that
 other work on the machine does not count; next to them the time that passed.
 
-``python -m benchmarks.localization [--only floor-plans,intel] [--stride 10] [--wrong] [--engine [--ray]]``
+``python -m benchmarks.localization [--only floor-plans,intel] [--stride 10] [--wrong]``
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from association import Status
-from batch import Engine
 
 from .collection import LEVELS
-from .engines import add_engine, engine_of
 from .outcomes import Outcome, offset, other_logs, run, strangers
 from .queries import LOGS, floor_plans, logs
 from .reliability import print_reliability, reliability_row
@@ -153,8 +151,8 @@ def print_wrong(title: str, outcomes: Iterable[Outcome]) -> None:
     print_table(title, head, cells)
 
 
-def localization(only: set[str], stride: int, *, listing: bool, engine: Engine | None = None) -> list[Row]:
-    """Run what is wanted, print its tables and return the rows that were judged; on an engine times mean less."""
+def localization(only: set[str], stride: int, *, listing: bool) -> list[Row]:
+    """Run what is wanted, print its tables and return the rows that were judged."""
     groups: dict[str, list[Outcome]] = {}
     away: list[Outcome] = []
     rows: list[Row] = []
@@ -166,7 +164,7 @@ def localization(only: set[str], stride: int, *, listing: bool, engine: Engine |
     if not only or "floor-plans" in only:
         plans = floor_plans(stride)
         real = plans.name == "floor plans"
-        found, away = run(plans, steps=True, engine=engine), strangers(plans, engine)
+        found, away = run(plans, steps=True), strangers(plans)
         groups |= {level: [o for o in found if o.query.level == level] for level in LEVELS}
         told(
             f"{plans.name.capitalize()}, {len(found)} scans",
@@ -178,12 +176,12 @@ def localization(only: set[str], stride: int, *, listing: bool, engine: Engine |
             ],
         )
     chosen = [log for log in logs(stride) if not only or log.name in only]
-    of_logs = {log.name: run(log, engine=engine) for log in chosen}
+    of_logs = {log.name: run(log) for log in chosen}
     if of_logs:
         groups |= of_logs
         told("Logs", log_rows(of_logs))
     if len(chosen) == len(LOGS):
-        elsewhere = other_logs(chosen, engine)
+        elsewhere = other_logs(chosen)
         told("Logs in the map of another", [stranger_row("another log: not usable", elsewhere)])
         away = away + elsewhere
     print_statuses(groups)
@@ -204,11 +202,8 @@ def main() -> None:
     parser.add_argument("--only", default="", help=f"of floor-plans, {', '.join(LOGS)}; with commas")
     parser.add_argument("--stride", type=int, default=1, help="take every so many queries")
     parser.add_argument("--wrong", action="store_true", help="list usable answers that are wrong")
-    parser.add_argument("--engine", action="store_true", help="on several cores or machines")
-    add_engine(parser)
     args = parser.parse_args()
-    engine = engine_of(args) if args.engine or args.ray else None
-    localization({name for name in args.only.split(",") if name}, args.stride, listing=args.wrong, engine=engine)
+    localization({name for name in args.only.split(",") if name}, args.stride, listing=args.wrong)
 
 
 if __name__ == "__main__":

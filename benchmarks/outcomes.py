@@ -1,6 +1,6 @@
 """Searching scans of known poses: what came of each, and how long it took.
 
-One core, unless an engine is given; compilation is over before the clock starts.
+One core; compilation is over before the clock starts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from association import AssociationOptions, AssociationResult, Deadline, associate
 from association.context import SearchContext
 from association.search.search import search as find_candidates
-from batch import Engine, Lost
 from registration import RigidTransform, wrap_angle
 
 from .collection import Collection, MapKey, Query, building
@@ -24,7 +23,6 @@ from .collection import Collection, MapKey, Query, building
 OPTIONS = AssociationOptions(max_alternatives=20)
 SEED = 20190901
 WARM_UP = 6  # searches that do not count
-PIECE = 60  # queries that a worker of an engine does at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,67 +91,19 @@ def run_one(collection: Collection, query: Query, key: MapKey | None = None, *, 
     return Outcome(query, key or query.map, result, right, among, 1e3 * cpu, 1e3 * wall, search)
 
 
-def run(
-    collection: Collection,
-    *,
-    steps: bool = False,
-    key: Callable[[Query], MapKey] | None = None,
-    engine: Engine | None = None,
-) -> list[Outcome]:
-    """Search all scans of a collection, in this process or on an engine.
+def run(collection: Collection, *, steps: bool = False, key: Callable[[Query], MapKey] | None = None) -> list[Outcome]:
+    """Search all scans of a collection, after some that do not count.
 
     `key` names the map to search for each where it is not its own.
     """
-    keys = [key(query) if key else query.map for query in collection.queries]
-    whole = Piece(collection, tuple(keys), steps)
-    if engine is None:
-        return searched(whole)
-    pieces = whole.pieces()
-    done: dict[int, list[Outcome] | Lost] = dict.fromkeys(range(len(pieces)), Lost())
-    for (number, _), outcomes in engine.run(_searched_numbered, list(enumerate(pieces))):
-        done[number] = outcomes
-        progress(collection.name, number + 1, len(pieces))
-    found = []
-    for outcomes in done.values():
-        if isinstance(outcomes, Lost):
-            raise RuntimeError(f"{collection.name}: a part of it ended every worker that had it")
-        found += outcomes
-    return found
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Some queries of a collection, the map that each is searched in, and whether the search step is timed apart."""
-
-    collection: Collection
-    keys: tuple[MapKey, ...]
-    steps: bool
-
-    def pieces(self) -> list[Piece]:
-        """Cut it into what one worker does at a time, each with no more maps than it needs."""
-        found = []
-        for begin in range(0, len(self.keys), PIECE):
-            keys, queries = self.keys[begin : begin + PIECE], self.collection.queries[begin : begin + PIECE]
-            maps = {key: self.collection.maps[key] for key in keys}
-            whole = self.collection
-            some = Collection(whole.name, maps, queries, whole.distance, whole.angle)
-            found.append(Piece(some, keys, self.steps))
-        return found
-
-
-def searched(piece: Piece) -> list[Outcome]:
-    """Search the scans of a piece, after some that do not count."""
-    outcomes, queries = [], piece.collection.queries
-    for query, key in zip(queries[:WARM_UP], piece.keys[:WARM_UP], strict=True):
-        run_one(piece.collection, query, key, steps=piece.steps)
-    for k, (query, key) in enumerate(zip(queries, piece.keys, strict=True)):
-        outcomes.append(run_one(piece.collection, query, key, steps=piece.steps))
-        progress(piece.collection.name, k + 1, len(queries))
+    outcomes, queries = [], collection.queries
+    keys = [key(query) if key else query.map for query in queries]
+    for query, place in zip(queries[:WARM_UP], keys[:WARM_UP], strict=True):
+        run_one(collection, query, place, steps=steps)
+    for k, (query, place) in enumerate(zip(queries, keys, strict=True)):
+        outcomes.append(run_one(collection, query, place, steps=steps))
+        progress(collection.name, k + 1, len(queries))
     return outcomes
-
-
-def _searched_numbered(item: tuple[int, Piece]) -> list[Outcome]:
-    return searched(item[1])
 
 
 def other_map(collection: Collection) -> list[MapKey]:
@@ -166,24 +116,21 @@ def other_map(collection: Collection) -> list[MapKey]:
     return [others[q.map][rng.integers(len(others[q.map]))] for q in collection.queries]
 
 
-def strangers(collection: Collection, engine: Engine | None = None) -> list[Outcome]:
+def strangers(collection: Collection) -> list[Outcome]:
     """Search every scan in the map of another building."""
     chosen = dict(zip(map(id, collection.queries), other_map(collection), strict=True))
-    return run(collection, key=lambda query: chosen[id(query)], engine=engine)
+    return run(collection, key=lambda query: chosen[id(query)])
 
 
-def other_logs(collections: Sequence[Collection], engine: Engine | None = None) -> list[Outcome]:
+def other_logs(collections: Sequence[Collection]) -> list[Outcome]:
     """Search every fourth scan of each log in the map of the next one."""
     outcomes = []
     for k, log in enumerate(collections):
         other = collections[(k + 1) % len(collections)]
         away = Collection(f"{log.name} in {other.name}", other.maps, log.queries[::4], log.distance, log.angle)
-        outcomes += _run_in(away, next(iter(other.maps)), engine)
+        place = next(iter(other.maps))
+        outcomes += run(away, key=lambda _query, place=place: place)  # type: ignore[misc]
     return outcomes
-
-
-def _run_in(collection: Collection, key: MapKey, engine: Engine | None) -> list[Outcome]:
-    return run(collection, key=lambda _query: key, engine=engine)
 
 
 def progress(name: str, done: int, total: int) -> None:

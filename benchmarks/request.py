@@ -35,8 +35,8 @@ from service.settings import Settings
 from service.telemetry.metrics import Metrics
 from service.work.association import Associator
 
+from .load import family
 from .open_loop import request_of, without_pause
-from .overload import family
 from .table import Row, at_most, print_rows, print_table
 
 ROUNDS = 15

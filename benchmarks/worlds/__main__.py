@@ -7,9 +7,11 @@ number of processes, nor on whether Ray starts them.
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
-from ..engines import add_engine, engine_of
+from batch import OnRay, Processes
+
 from ..table import machine
 from .buildings import FAMILIES
 from .conditions import CONDITIONS
@@ -26,7 +28,8 @@ def main() -> None:
     parser.add_argument("--conditions", default=",".join(CONDITIONS), help="with commas; by default all")
     parser.add_argument("--quick", type=float, default=1.0, metavar="N", help="draw about one in N of everything")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first case of each kind")
-    add_engine(parser)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="by default one a core")
+    parser.add_argument("--ray", action="store_true", help="on Ray: on this machine, or on what RAY_ADDRESS names")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write each answer as a line of JSON")
     parser.add_argument("--read", type=Path, metavar="FILE", help="print the tables of such a file, draw nothing")
     parser.add_argument("--pictures", action="store_true", help="draw each world with one scan as a picture, no more")
@@ -40,7 +43,7 @@ def main() -> None:
         draw_worlds(choice.worlds)
         return
     print(f"{machine()}; processor time of one thread each")
-    outcomes = list(read(args.read)) if args.read else run(choice, engine_of(args))
+    outcomes = list(read(args.read)) if args.read else run(choice, OnRay() if args.ray else Processes(args.processes))
     if args.out:
         write(args.out, outcomes)
     report(outcomes)

@@ -1,6 +1,6 @@
 """The pictures of ``docs/guides/read-the-answer.md``: small scenes, searched when drawn, titled with their verdicts.
 
-``python -m benchmarks.verdicts`` writes them to ``docs``.
+``python -m examples.verdicts`` writes them to ``docs``.
 """
 
 from __future__ import annotations

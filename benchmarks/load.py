@@ -1,4 +1,4 @@
-"""The service under ten times too much load: ``python -m benchmarks.overload``.
+"""The service under ten times too much load: ``python -m benchmarks load``.
 
 Goodput at ten times the capacity over goodput at capacity, in alternating pairs; the slowest of the accepted; how a
 flood with one key leaves another its share; how probes are answered meanwhile, and while maps of 16 MB are stored,
@@ -8,7 +8,6 @@ clients have the others.
 
 from __future__ import annotations
 
-import argparse
 import http.client
 import math
 import os
@@ -261,22 +260,18 @@ def loaded_service() -> Iterator[Service]:
     os.sched_setaffinity(0, all_cores)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.overload", description=__doc__)
-    parser.add_argument("--pairs", type=int, default=PAIRS)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each half of a pair")
-    parser.add_argument("--only", choices=("overload", "share", "large"))
-    args = parser.parse_args()
+def load(quick: int) -> list[Row]:
+    """Print the tables, and return their rows."""
+    found: list[Row] = []
+
+    def told(title: str, rows: list[Row]) -> None:
+        print_rows(title, rows)
+        found.extend(rows)
+
     with loaded_service() as service:
-        if args.only in (None, "overload"):
-            print_rows("Ten times too much", overload(service, args.pairs, args.seconds))
-        if args.only in (None, "share"):
-            print_rows("One key's flood", share(service, 2 * args.seconds))
-    if args.only in (None, "large"):
-        with loaded_service() as service:
-            print_rows("Large maps", large(service, 3))
+        told("Ten times too much", overload(service, max(2, PAIRS // quick), SECONDS))
+        told("One key's flood", share(service, 2 * SECONDS))
+    with loaded_service() as service:
+        told("Large maps", large(service, 3))
     print(f"\nload {os.getloadavg()[0]:.1f} at the end")
-
-
-if __name__ == "__main__":
-    main()
+    return found
