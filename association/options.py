@@ -42,6 +42,7 @@ class SoftPrior:
     covariance: Floats
 
     def __post_init__(self) -> None:
+        _check_pose(self.pose)
         c = np.asarray(self.covariance, dtype=np.float64)
         found = _fault_of_covariance(c)
         if found is not None:
@@ -49,6 +50,11 @@ class SoftPrior:
                 f"expected a symmetric positive definite 3 x 3 matrix with deviations from 1e-6 to 1e6, found {found}",
                 argument="prior.covariance",
             )
+
+
+def _check_pose(pose: RigidTransform) -> None:
+    if not isinstance(pose, RigidTransform):
+        raise InvalidSearchError(f"expected a RigidTransform, found {pose!r:.60}", argument="prior.pose")
 
 
 def _fault_of_covariance(c: NDArray[np.float64]) -> str | None:
@@ -76,6 +82,7 @@ class HardPrior:
     angle: float
 
     def __post_init__(self) -> None:
+        _check_pose(self.pose)
         for name, value, high in (("radius", self.radius, 1e6), ("angle", self.angle, 4.0)):
             if not 0.0 < value <= high:
                 raise InvalidSearchError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -58,14 +57,13 @@ def options_of(
     """Return what to take of a log; raises `WrongUseError` where the mount is no pose."""
     from registration import RigidTransform
 
-    if mount is not None and not all(map(math.isfinite, mount)):
-        raise WrongUseError(
-            f"--mount: found {' '.join(map(str, mount))}, expected finite numbers: x and y in metres, theta in radians"
-        )
     with needing_formats("reading a log"):
         from formats import LogOptions
 
-        return LogOptions(topic, None, tf_namespace, None if mount is None else RigidTransform(*mount))
+        try:
+            return LogOptions(topic, None, tf_namespace, None if mount is None else RigidTransform(*mount))
+        except ValueError as error:
+            raise WrongUseError(f"--mount: {error}") from error
 
 
 def scans_of(log: Log) -> Iterator[LoggedScan]:

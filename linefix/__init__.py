@@ -26,4 +26,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *importlib.import_module("linefix.public").__all__})
+    return list(importlib.import_module("linefix.public").__all__)

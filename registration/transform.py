@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+MOST_TURNED = 4.0 * math.tau  # rad
+
 
 def wrap_angle(angle: float) -> float:
     """Return the same angle in (-pi, pi].
@@ -32,7 +34,8 @@ class RigidTransform:
     x, y : float
         Metres.
     theta : float
-        Radians, counter-clockwise, in (-pi, pi].
+        Radians, counter-clockwise, in (-pi, pi]. Up to four turns are wrapped; a `ValueError` says that more are likely
+        degrees.
     """
 
     x: float
@@ -42,6 +45,9 @@ class RigidTransform:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.theta)):
             raise ValueError(f"expected finite x, y and theta, found ({self.x:g}, {self.y:g}, {self.theta:g})")
+        if abs(self.theta) > MOST_TURNED:
+            radians = math.radians(self.theta)
+            raise ValueError(f"expected theta in radians, found {self.theta:g}; if these are degrees, give {radians:g}")
         if not -math.pi < self.theta <= math.pi:
             object.__setattr__(self, "theta", wrap_angle(self.theta))
 

@@ -214,7 +214,7 @@ def _count(word: str) -> int:
 
 def _pose(words: list[str]) -> RigidTransform:
     x, y, theta = (float(w) for w in words)
-    return RigidTransform(x, y, theta)
+    return RigidTransform(x, y, math.remainder(theta, math.tau))  # odometry counts turns
 
 
 READERS: dict[str, Callable[[list[str], str, Settings, Notes], LoggedScan]] = {

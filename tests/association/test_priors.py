@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,12 @@ def test_a_window_has_a_size(radius: float, angle: float, argument: str) -> None
     with pytest.raises(InvalidSearchError) as refused:
         HardPrior(pose(), radius, angle)
     assert refused.value.argument == argument
+
+
+@pytest.mark.parametrize("prior", [partial(HardPrior, radius=1.0, angle=0.1), partial(SoftPrior, covariance=np.eye(3))])
+def test_the_pose_of_a_prior_is_a_transform(prior: Any) -> None:
+    with pytest.raises(InvalidSearchError, match=r"expected a RigidTransform, found \(1, 2, 0\)"):
+        prior((1, 2, 0))
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,8 @@ def test_a_mount_that_is_given_goes_first(linefix: Linefix, truth: list[RigidTra
     assert_at(line, pose.compose(RigidTransform(-1.0, 0.5, 0.3).inverse()))
     assert line["child_frame_id"] == "base_link"
     assert "from --mount" in ended.err
-    assert "--mount" in refused(linefix(*ASKED, "--mount", "0", "nan", "0"), 2)
+    for mount in (("0", "nan", "0"), ("0", "0", "90")):
+        assert "--mount: expected" in refused(linefix(*ASKED, "--mount", *mount), 2)
 
 
 def test_without_a_mount_they_are_those_of_the_laser(
