@@ -9,7 +9,7 @@ from .index.joint import MapPart
 from .index.map_index import MapIndex
 from .index.map_points import NO_POINTS, MapPoints
 from .messages import AS_WELL, message_of
-from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
+from .options import INCLUDED, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -41,11 +41,11 @@ from .warnings import NOT_IN_ORDER
 
 __all__ = [
     "AS_WELL",
+    "INCLUDED",
     "MAX_VIEWS",
     "NOTHING_KNOWN",
     "NOT_IN_ORDER",
     "NO_POINTS",
-    "PARTS",
     "Alternative",
     "AnswerExplanation",
     "AssociationDiagnostics",

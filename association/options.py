@@ -19,7 +19,7 @@ Rotation = Literal["wahba", "mitsuta"]
 Sampling = Literal["ordered", "random"]
 Part = Literal["correspondences", "alternatives", "missing_map"]
 
-PARTS: tuple[Part, ...] = get_args(Part)
+INCLUDED: tuple[Part, ...] = get_args(Part)
 
 MAX_ALTERNATIVES = 50
 
@@ -140,7 +140,7 @@ class AssociationOptions:
         Radians; gate on the angle between them. None: from the sigmas.
     min_overlap : float
         Share of a scan segment's length that must lie on the map, 0 to 1.
-    parts : tuple of str
+    include : tuple of str
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
         them a usable answer has no alternatives; any other has, because `message_of` returns their number.
     on_map : float
@@ -166,7 +166,7 @@ class AssociationOptions:
     offset_tolerance: float | None = None
     angle_tolerance: float | None = None
     min_overlap: float = 0.5
-    parts: tuple[Part, ...] = PARTS
+    include: tuple[Part, ...] = INCLUDED
     on_map: float = 0.9
     usable_from: float = 0.95
     estimator: Estimator = "joint"
@@ -183,9 +183,9 @@ class AssociationOptions:
             ("on_map", self.on_map, 0.5, 1.0),
             ("usable_from", self.usable_from, 0.5, 0.9999),
         ]
-        if unknown := set(self.parts).difference(PARTS):
+        if unknown := set(self.include).difference(INCLUDED):
             raise InvalidSearchError(
-                f"expected some of {', '.join(PARTS)}, found {sorted(unknown)}", argument="options.parts"
+                f"expected some of {', '.join(INCLUDED)}, found {sorted(unknown)}", argument="options.include"
             )
         for name, value, low, high in ranges:
             if value is not None and not low <= value <= high:

@@ -57,14 +57,14 @@ def report(context: SearchContext, explanations: Explanations, verdict: Verdict)
     )
     if answer is None:
         return found
-    degenerate, parts = verdict.status is Status.DEGENERATE, context.options.parts
+    degenerate, include = verdict.status is Status.DEGENERATE, context.options.include
     matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
     return replace(
         found,
         pose=verdict.pose,
         covariance=None if degenerate or context.options.estimator == "one_step" else answer.covariance,
         unobservable=answer.estimate.direction if degenerate else None,
-        correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
+        correspondences=_correspondences(context, answer, verdict) if "correspondences" in include else (),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
         missing_map=tuple(i for i in missing if i not in on_map),
         diagnostics=_diagnostics(context, explanations, answer, verdict),
@@ -139,7 +139,7 @@ def _critical_wall(context: SearchContext, answer: Answer) -> CriticalWall | Non
 
 def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
     """List the map segments of walls that rays to the consensus set pass through, and that hold none of it."""
-    if "missing_map" not in context.options.parts or context.too_late_to_look:
+    if "missing_map" not in context.options.include or context.too_late_to_look:
         return ()
     index, matched = context.index, answer.best.matched
     rays = context.rays_to_lines
@@ -157,7 +157,7 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
 def _alternatives(
     context: SearchContext, explanations: Explanations, others: Sequence[ConsensusSet], verdict: Verdict
 ) -> tuple[Alternative, ...]:
-    if verdict.usable and "alternatives" not in context.options.parts:
+    if verdict.usable and "alternatives" not in context.options.include:
         return ()
     shown = others[: context.options.max_alternatives]
     probabilities = probabilities_of_others(verdict, shown)

@@ -171,10 +171,10 @@ def associate_on_maps(
     searched = index if options.oriented and maps.oriented else index.undirected_by(until)
     oriented = replace(options, oriented=options.oriented and maps.oriented)
     # The map of the answer, and its registration there, follow from its correspondences.
-    wanted = replace(oriented, parts=tuple(dict.fromkeys((*options.parts, "correspondences"))))
+    wanted = replace(oriented, include=tuple(dict.fromkeys((*options.include, "correspondences"))))
     found = run_stages(SearchContext.of(searched, scan, prior, wanted, until))
     result = in_own_frames(found, maps.ids)
-    return result if "correspondences" in options.parts else replace(result, correspondences=())
+    return result if "correspondences" in options.include else replace(result, correspondences=())
 
 
 def _joint_prior(maps: MapSet, index: JointIndex, known: KnownOfMaps) -> Prior | MapsPrior | None:

@@ -95,7 +95,7 @@ def _options(block: int, chosen: SearchChoice, usable: UsableOptions) -> FleetOp
     from batch import FleetOptions
     from linefix.compiling import compile_kernels
 
-    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not chosen.undirected, **asdict(usable))
+    search = AssociationOptions(max_alternatives=0, include=(), oriented=not chosen.undirected, **asdict(usable))
     return FleetOptions(search, chosen.deadline_ms, block, compile_kernels)
 
 

@@ -65,7 +65,7 @@ class Linefix:
             ends = np.full(len(segments), 2.0), (segments.midpoints, 0.25 * segments.lengths**2)
             scan = Scan(MeasuredSegments.from_segments(segments, query.sigma, *ends), viewpoint=None)
         prior = HardPrior(query.guess, 1.0, math.radians(20.0)) if self.guided else None
-        found = associate(prepared, scan, prior, AssociationOptions(parts=()))
+        found = associate(prepared, scan, prior, AssociationOptions(include=()))
         pose = None if found.pose is None else (found.pose.x, found.pose.y, found.pose.theta)
         return Answer(pose, found.usable)
 

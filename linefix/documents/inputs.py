@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import (
-    PARTS,
+    INCLUDED,
     AssociationOptions,
     HardPrior,
     MapIndex,
@@ -152,7 +152,7 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
         offset_tolerance=options.offset_tolerance,
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
-        parts=tuple(part for part in PARTS if part in options.include),
+        include=tuple(part for part in INCLUDED if part in options.include),
         on_map=options.on_map,
         usable_from=options.usable_from,
         estimator=options.estimator,

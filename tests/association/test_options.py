@@ -11,7 +11,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from association import PARTS, AssociationOptions, AssociationResult, InvalidSearchError, ReasonCode, Status
+from association import INCLUDED, AssociationOptions, AssociationResult, InvalidSearchError, ReasonCode, Status
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
 from .scenes import (
@@ -51,7 +51,7 @@ REFUSED = pytest.raises(InvalidSearchError)
         ("min_overlap", [0.0, 1.0], [-0.1, 1.1, math.nan]),
         ("on_map", [0.5, 1.0], [0.49, 1.01, math.nan]),
         ("usable_from", [0.5, 0.9999], [0.49, 1.0, math.nan]),
-        ("parts", [(), ("alternatives",)], [("segments",)]),
+        ("include", [(), ("alternatives",)], [("segments",)]),
     ],
 )
 def test_options_have_a_range(name: str, good: list[Any], bad: list[Any]) -> None:
@@ -298,9 +298,9 @@ def test_parts_that_are_left_out_are_empty_and_change_nothing_else(parts: tuple[
     walls = np.vstack([ROOM, ROOM[:6] + np.tile([12.0, 0.0], 2), [[4.0, 3.3, 5.0, 3.4]]])
     sent = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0], viewpoint=(0.0, 0.0))
     index = index_of(walls)
-    whole, part = (answer_of(index, sent, on_map=1.0, usable_from=0.5, parts=which) for which in (PARTS, parts))
+    whole, part = (answer_of(index, sent, on_map=1.0, usable_from=0.5, include=which) for which in (INCLUDED, parts))
     assert whole.usable
-    for one in PARTS:
+    for one in INCLUDED:
         assert getattr(whole, one), one
         assert bool(getattr(part, one)) == (one in parts), one
     for name in ("status", "usable", "probability", "pose", "unmatched_scan", "diagnostics", "reasons", "search"):
@@ -309,7 +309,7 @@ def test_parts_that_are_left_out_are_empty_and_change_nothing_else(parts: tuple[
 
 def test_an_answer_that_is_not_usable_has_its_other_poses() -> None:
     """They are counted in the message, whatever the parts are."""
-    result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())
+    result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), include=())
     assert not result.usable
     assert len(result.alternatives) == 2
 

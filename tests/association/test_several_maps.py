@@ -282,7 +282,7 @@ def test_a_scan_wider_than_the_maps_is_on_none_of_them() -> None:
 
 
 def test_parts_of_an_answer_are_left_out_as_of_one_map() -> None:
-    found = associate_on_maps(building(), seen_on(0), options=Options(parts=("alternatives",)))
+    found = associate_on_maps(building(), seen_on(0), options=Options(include=("alternatives",)))
     assert (found.map_id, found.correspondences, found.missing_map) == ("floor-0", (), ())
 
 

@@ -302,6 +302,6 @@ def test_several_sensors_at_the_last_place_are_one_view(with_beams: bool) -> Non
 
 @pytest.mark.usefixtures("_judged")
 def test_options_hold_for_both_searches() -> None:
-    found = linefix.locate(INDEX, WHOLE, options=AssociationOptions(parts=(), max_alternatives=0))
+    found = linefix.locate(INDEX, WHOLE, options=AssociationOptions(include=(), max_alternatives=0))
     assert (found.usable, found.correspondences, found.missing_map) == (True, (), ())
     assert len(found.unmatched_scan) >= len(WHOLE.measured) - len(FIRST.measured)

@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-from association import PARTS, AssociationOptions
+from association import INCLUDED, AssociationOptions
 from linefix.documents.inputs import association_options_of
 from linefix.documents.parts import SearchOptions
 
 
 @pytest.mark.parametrize(
     ("sent", "parts"),
-    [({}, PARTS), ({"include": []}, ()), ({"include": ["segments", "alternatives"]}, ("alternatives",))],
+    [({}, INCLUDED), ({"include": []}, ()), ({"include": ["segments", "alternatives"]}, ("alternatives",))],
 )
 def test_only_parts_that_are_included_are_worked_out(sent: dict[str, Any], parts: tuple[str, ...]) -> None:
     asked = SearchOptions.model_validate(sent, strict=False)
-    assert association_options_of(asked, oriented=True).parts == parts
+    assert association_options_of(asked, oriented=True).include == parts
 
 
 def test_the_defaults_are_those_of_the_library() -> None:
