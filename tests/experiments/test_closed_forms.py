@@ -13,7 +13,7 @@ from experiments.printed import FOLLOWED, Reading, ambiguity, exact_case, rotati
 from experiments.scenes import UNIT, poses, world
 from registration import Correspondences, OneStepSums, RigidTransform, Segments
 from simulation import Scanner, scan
-from tests import reference
+from tests.registration import reference
 
 
 def test_the_papers_example_of_means():

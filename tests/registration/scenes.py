@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import Correspondences, MeasuredSegments, RegistrationResult, RigidTransform, Segments
-from registration.layout import SYMMETRIC3, Floats, Records
+from registration.layout import Floats
 
 ROOM: list[list[float]] = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0], [3, 3, 4, 5], [7, 2, 5, 1]]
 POSE = RigidTransform(3.0, 2.0, 0.4)
@@ -112,11 +112,6 @@ def drawn(seed: int, n: int = 7) -> tuple[np.random.Generator, Correspondences, 
     weights = rng.uniform(0.1, 2.0, n)
     measured = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, weights)
     return rng, pairs, weights, measured
-
-
-def symmetric(matrix: Floats) -> Records:
-    """Return the upper triangle of a matrix as a kernel takes it."""
-    return np.array([tuple(matrix[np.triu_indices(3)])], SYMMETRIC3)
 
 
 def room(pose: RigidTransform = POSE, sigma: float = 0.02) -> tuple[Segments, MeasuredSegments]:

@@ -19,8 +19,8 @@ from registration import (
     register,
 )
 from registration.options import Estimator, Rotation, Weighting
-from tests import reference
 
+from . import reference
 from .scenes import (
     POSE,
     ROOM,
@@ -122,14 +122,11 @@ def test_joint_answer_is_the_least_cost(seed: int) -> None:
     result = register(map_segments, scan, diagonal(6))
     pairs = correspondences(map_segments, scan)
     rows = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, result.weights)
-    theta, translation = reference.joint_solve(0.4, *rows)
-    np.testing.assert_allclose(
-        difference(pose_of(result), RigidTransform(translation[0], translation[1], theta)), 0.0, atol=1e-9
-    )
-    assert result.diagnostics.chi2 == pytest.approx(reference.joint_cost(theta, translation, *rows), rel=1e-9)
-    lever = np.linalg.inv(reference.joint_information(theta, *rows))
+    best, information = reference.joint_solve(np.array([POSE.x, POSE.y, POSE.theta]), *rows)
+    np.testing.assert_allclose(difference(pose_of(result), RigidTransform(*best.tolist())), 0.0, atol=1e-9)
+    assert result.diagnostics.chi2 == pytest.approx(reference.joint_cost(best[2], best[:2], *rows), rel=1e-9)
     assert result.covariance is not None
-    np.testing.assert_allclose(result.covariance, lever, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(result.covariance, np.linalg.inv(information), rtol=1e-6, atol=1e-15)
 
 
 @pytest.mark.parametrize("rotation", ROTATIONS)

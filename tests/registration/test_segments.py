@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from registration import (
+    Beams,
+    Correspondences,
     InvalidArgumentError,
     InvalidSegmentsError,
     MeasuredSegments,
     RegistrationError,
+    RegistrationOptions,
     RigidTransform,
     Segments,
+    register,
     wrap_angle,
 )
+from registration.layout import Floats
+
+from . import reference
+from .scenes import assert_close, correspondences, diagonal, drawn, noisy_pairs
 
 POSES = st.builds(RigidTransform, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
 
@@ -179,3 +188,100 @@ def test_a_covariance_is_carried_as_small_changes_are(pose: RigidTransform, by: 
     root = np.random.default_rng(seed).normal(size=(3, 3))
     expected = jacobian @ root @ root.T @ jacobian.T
     np.testing.assert_allclose(pose.carry(root @ root.T, by), expected, rtol=1e-2, atol=1e-2 * np.abs(expected).max())
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+COLUMNS = (
+    "map_directions", "map_midpoints", "map_offsets", "map_lengths", "directions", "midpoints", "lengths",
+    "centroids", "spreads", "variances",
+)  # fmt: skip
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_gather(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 9)
+    scan = replace(scan, sigma=rng.choice([0.0, 1e-200, 1e-12, 0.3], 9))
+    pairs = np.stack([rng.integers(0, 9, 12), rng.integers(0, 9, 12)], axis=1)
+    found = Correspondences.of(map_segments, scan, pairs)
+    expected = zip(*reference.pair_rows(map_segments, scan, pairs), strict=True)
+    for name, column in zip(COLUMNS, expected, strict=True):
+        np.testing.assert_allclose(getattr(found, name), column, rtol=1e-15, atol=1e-15, err_msg=name)
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_moved_origins(seed: int) -> None:
+    rng, pairs, _, _ = drawn(seed)
+    on_map, of_scan = rng.uniform(-5.0, 5.0, (2, 2))
+    moved = pairs.about(on_map, of_scan)
+    assert_close(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1))
+    assert_close(moved.map_midpoints, pairs.map_midpoints - on_map)
+    assert_close(moved.offsets, pairs.offsets - reference_normals(pairs) @ of_scan)
+    assert_close(moved.centroids, pairs.centroids - of_scan)
+
+
+def reference_normals(pairs: Correspondences) -> Floats:
+    normals: Floats = pairs.directions @ reference.TURN.T
+    return normals
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_residuals(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 7, noise=0.05)
+    pairs = correspondences(map_segments, scan)
+    at, weights = RigidTransform(*rng.uniform(-3.0, 3.0, 3)), rng.uniform(0.1, 2.0, 7)
+    counts = np.append(rng.random(6) < 0.5, True)
+    weights[~counts] = 0.0
+    found = register(map_segments, scan, diagonal(7), 0.0, RegistrationOptions(weights=weights), at)
+    expected = np.sum(pairs.map_normals * at.apply(pairs.midpoints), axis=1) - pairs.map_offsets
+    assert_close(found.offsets, expected)
+    rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
+    turns = [math.remainder(reference.transformation_line(*row)[2] - at.theta, math.tau) for row in rows]
+    assert_close(found.angles, turns)
+    assert_close(pairs.angles(at.theta), turns)
+    some = pairs.take(counts)
+    measured = (some.map_normals, some.map_offsets, some.centroids, some.directions, some.spreads, weights[counts])
+    cost = reference.joint_cost(at.theta, np.array([at.x, at.y]), *measured)
+    assert found.diagnostics.chi2 == pytest.approx(cost, rel=1e-9)
+    assert found.diagnostics.rms_offset == pytest.approx(math.sqrt(np.mean(found.offsets[counts] ** 2)))
+    assert found.diagnostics.rms_angle == pytest.approx(math.sqrt(np.mean(found.angles[counts] ** 2)))
+
+
+ANGLES, RANGES = np.array([-0.5, 0.25, 1.0]), np.array([2.0, math.inf, 3.0])
+ORIGINS = np.array([[0.0, 1.0], [2.0, 3.0], [4.0, -5.0]])
+
+
+def test_left_and_right_are_exchanged() -> None:
+    """The angles rise as before; a second time makes them as they were."""
+    beams = Beams(ANGLES, RANGES, 10.0, ORIGINS)
+    mirrored = beams.mirrored()
+    np.testing.assert_array_equal(mirrored.angles, [-1.0, -0.25, 0.5])
+    np.testing.assert_array_equal(mirrored.ranges, [3.0, math.inf, 2.0])
+    np.testing.assert_array_equal(mirrored.origins, [[4.0, 5.0], [2.0, -3.0], [0.0, -1.0]])
+    again = mirrored.mirrored()
+    for got, expected in ((again.angles, ANGLES), (again.ranges, RANGES), (again.origins, ORIGINS)):
+        np.testing.assert_array_equal(got, expected)
+    assert (mirrored.range_max, Beams(ANGLES, RANGES, 10.0).mirrored().origins) == (10.0, None)
+
+
+def test_lengths_are_multiplied() -> None:
+    scaled = Beams(ANGLES, RANGES, 10.0, ORIGINS).scaled(2.0)
+    np.testing.assert_array_equal(scaled.angles, ANGLES)
+    np.testing.assert_array_equal(scaled.ranges, [4.0, math.inf, 6.0])
+    np.testing.assert_array_equal(scaled.origins, 2.0 * ORIGINS)
+    assert scaled.range_max == 20.0
+
+
+def test_each_beam_is_moved_with_its_origin_or_that_of_all() -> None:
+    by = RigidTransform(1.0, 2.0, 0.5 * math.pi)
+    for origins in (ORIGINS, np.tile([3.0, 1.0], (3, 1))):
+        moved = Beams(ANGLES, RANGES, 10.0, None if origins is not ORIGINS else ORIGINS).moved(by, (3.0, 1.0))
+        np.testing.assert_allclose(moved.angles, ANGLES + 0.5 * math.pi)
+        np.testing.assert_array_equal(moved.ranges, RANGES)
+        assert moved.origins is not None
+        expected = np.stack([1.0 - origins[:, 1], 2.0 + origins[:, 0]], axis=1)
+        np.testing.assert_allclose(moved.origins, expected, atol=1e-12)

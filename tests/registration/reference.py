@@ -1,4 +1,4 @@
-"""Slow and obviously right references of the kernels: one pair at a time, straight from the definitions."""
+"""Slow and obviously right references: one pair at a time, straight from the definitions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from registration import MeasuredSegments, Segments
 from registration.layout import Floats
@@ -18,7 +19,7 @@ TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 def rotation(theta: float) -> Floats:
-    return np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+    return np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
 
 
 def pair_rows(
@@ -54,84 +55,37 @@ def joint_sums(
     return np.concatenate([q[np.triu_indices(5)], [resultant.real, resultant.imag, len(weights)]])
 
 
-def joint_cost(
-    theta: float,
-    t: Floats,
-    normals: Floats,
-    offsets: Floats,
-    centroids: Floats,
-    directions: Floats,
-    spreads: Floats,
-    weights: Floats,
-) -> float:
-    """Sum of squared distances of the centroids and of the points that the spreads stand for."""
-    r = rotation(theta)
-    total = 0.0
-    for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
-        # Two points with that centroid and second moment.
-        for end in (m + math.sqrt(s) * d, m - math.sqrt(s) * d):
-            total += 0.5 * w * (n @ (r @ end + t) - p) ** 2
-    return total
+def joint_residuals(unknown: Floats, *pairs: Floats) -> Floats:
+    """Weighted distances of two points of each pair that have its centroid and spread, at (x, y, theta)."""
+    r, at = rotation(unknown[2]), unknown[:2]
+    rows = [(n, p, math.sqrt(0.5 * w), m, math.sqrt(s) * d) for n, p, m, d, s, w in zip(*pairs, strict=True)]
+    return np.array([w * (n @ (r @ (m + side * half) + at) - p) for n, p, w, m, half in rows for side in (1.0, -1.0)])
 
 
-def best_translation(theta: float, *pairs: Floats) -> Floats:
-    """Least squares of the distances at an angle."""
-    normals, offsets, centroids, _, _, weights = pairs
-    root = np.sqrt(weights)
-    gaps = offsets - np.array([n @ rotation(theta) @ m for n, m in zip(normals, centroids, strict=True)])
-    translation: Floats = np.linalg.lstsq(root[:, None] * normals, root * gaps, rcond=1e-9)[0]
-    return translation
+def joint_cost(theta: float, t: Floats, *pairs: Floats) -> float:
+    """Sum of squared distances of the points."""
+    return float(np.sum(joint_residuals(np.array([*t, theta]), *pairs) ** 2))
 
 
 def least_cost(theta: float, *pairs: Floats) -> float:
-    """Cost at an angle with the best translation there."""
-    return joint_cost(theta, best_translation(theta, *pairs), *pairs)
+    """Cost at an angle with the best translation there, of which distances are linear functions."""
+    rows = np.repeat(np.sqrt(0.5 * pairs[-1])[:, None] * pairs[0], 2, axis=0)
+    gaps = joint_residuals(np.array([0.0, 0.0, theta]), *pairs)
+    best = np.linalg.lstsq(rows, -gaps, rcond=1e-9)[0]
+    return float(np.sum((rows @ best + gaps) ** 2))
 
 
-def joint_solve(start: float, *pairs: Floats) -> tuple[float, Floats]:
-    """Minimise the cost: at each angle near `start` the best translation by least squares; the best angle by search."""
-
-    def cost(theta: float) -> float:
-        return least_cost(theta, *pairs)
-
-    grid = start + np.linspace(-0.5, 0.5, 501)
-    centre = min(grid, key=cost)
-    low, high = centre - 0.002, centre + 0.002
-    golden = (math.sqrt(5.0) - 1.0) / 2.0
-    for _ in range(60):
-        left, right = high - golden * (high - low), low + golden * (high - low)
-        low, high = (low, right) if cost(left) < cost(right) else (left, high)
-    theta = 0.5 * (low + high)
-    # A golden section stops at the root of the rounding; one Gauss-Newton step from there is exact.
-    jacobian, residuals = _jacobian(theta, best_translation(theta, *pairs), *pairs)
-    step = np.linalg.lstsq(jacobian, -residuals, rcond=1e-9)[0]
-    theta += step[2]
-    return theta, best_translation(theta, *pairs)
-
-
-def _jacobian(
-    theta: float,
-    t: Floats,
-    normals: Floats,
-    offsets: Floats,
-    centroids: Floats,
-    directions: Floats,
-    spreads: Floats,
-    weights: Floats,
-) -> tuple[Floats, Floats]:
-    rows, residuals = [], []
-    r = rotation(theta)
-    for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
-        for end in (m + math.sqrt(s) * d, m - math.sqrt(s) * d):
-            rows.append(math.sqrt(0.5 * w) * np.array([n[0], n[1], n @ r @ TURN @ end]))
-            residuals.append(math.sqrt(0.5 * w) * (n @ (r @ end + t) - p))
-    return np.array(rows), np.array(residuals)
+def joint_solve(start: Floats, *pairs: Floats) -> tuple[Floats, Floats]:
+    """Minimise the cost from (x, y, theta) on; return the minimum and the information there."""
+    found = least_squares(joint_residuals, start, jac="cs", args=pairs, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    jacobian = np.asarray(found.jac)
+    return found.x, jacobian.T @ jacobian
 
 
 def joint_information(theta: float, *pairs: Floats) -> Floats:
-    """J'J of the residuals of the two points of each pair."""
-    jacobian, _ = _jacobian(theta, np.zeros(2), *pairs)
-    return jacobian.T @ jacobian
+    """Information of (x, y, theta) at an angle, by complex steps."""
+    columns = [joint_residuals(np.array([0.0, 0.0, theta]) + 1e-200j * e, *pairs).imag / 1e-200 for e in np.eye(3)]
+    return np.array(columns) @ np.array(columns).T
 
 
 def exact_sums(terms: Floats) -> Floats:

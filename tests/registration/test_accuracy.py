@@ -1,8 +1,9 @@
-"""The covariance holds for a map of unknown error, too."""
+"""Accuracy and covariance of the joint estimator."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -11,15 +12,62 @@ from registration import (
     InvalidArgumentError,
     MeasuredSegments,
     RegistrationOptions,
+    RegistrationResult,
     RigidTransform,
     Segments,
     register,
     register_estimating,
     wrap_angle,
 )
+from registration.layout import Floats
+from registration.options import Weighting
 from registration.wall_error import USUAL_WALL_ERROR
 
-from .scenes import POSE, ROOM, diagonal, seen_from
+from .scenes import POSE, ROOM, diagonal, difference, fitted, pose_of, random_segments, scanned_points, seen_from
+
+SIGMA = 0.02
+COUNT = 25
+
+
+def trials(
+    n: int, *, segments: int = 8, origin: tuple[float, float] = (0.0, 0.0), options: RegistrationOptions | None = None
+) -> Iterator[tuple[Floats, Floats, RegistrationResult]]:
+    """Register n noisy scans of one scene; yield pose minus truth, the covariance and the result."""
+    rng = np.random.default_rng(20191)
+    map_segments = random_segments(rng, segments)
+    pose = POSE.compose(RigidTransform(origin[0], origin[1], 0.0))
+    options = options or RegistrationOptions()
+    for _ in range(n):
+        scan = fitted(scanned_points(rng, map_segments, pose, SIGMA, COUNT), SIGMA)
+        result = register(map_segments, scan, diagonal(segments), 0.0, options)
+        assert result.covariance is not None
+        yield difference(pose_of(result), pose), result.covariance, result
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0), (50.0, 30.0)], ids=["inside", "58 m away"])
+def test_covariance_and_chi2_are_honest_and_the_bound_is_reached(origin: tuple[float, float]) -> None:
+    offs, costs, nees, usable = [], [], [], 0
+    for off, covariance, result in trials(1000, origin=origin):
+        offs.append(off)
+        costs.append(result.diagnostics.chi2)
+        nees.append(off @ np.linalg.solve(covariance, off))
+        usable += result.usable
+    assert 2.7 <= np.mean(nees) <= 3.3
+    assert np.mean(costs) == pytest.approx(13.0, rel=0.05)
+    assert usable > 0.995 * 1000
+    # The Cramer-Rao bound is the inverse of the information of the raw points at the truth, which noise moves little.
+    bound = np.sqrt(np.diag(covariance))
+    rms = np.sqrt(np.mean(np.square(offs), axis=0))
+    assert (rms <= 1.05 * bound).all()
+
+
+@pytest.mark.parametrize("weighting", ["uniform", "shorter_length"])
+def test_covariance_is_honest_whatever_the_weighting(weighting: Weighting) -> None:
+    nees = []
+    for off, covariance, _ in trials(600, options=RegistrationOptions(weighting=weighting)):
+        nees.append(off @ np.linalg.solve(covariance, off))
+    assert 2.7 <= np.mean(nees) <= 3.3
+
 
 LIMIT = 7.815  # 95 % of chi-square of three
 

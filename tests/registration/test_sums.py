@@ -1,0 +1,322 @@
+"""Sums of both estimators are those of their slow references, whatever was added to them and taken out again."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from registration import Correspondences, JointSums, MeasuredSegments, OneStepSums, RigidTransform, Segments
+from registration.layout import Floats
+from registration.options import Rotation
+
+from . import reference
+from .scenes import (
+    POSE,
+    ROOM,
+    assert_close,
+    correspondences,
+    directed,
+    drawn,
+    fitted,
+    noisy_pairs,
+    random_segments,
+    scanned_points,
+    seen_from,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+FEW = settings(max_examples=20, deadline=None)
+KINDS = pytest.mark.parametrize("kind", [JointSums, OneStepSums])
+
+
+@KINDS
+@given(SEEDS)
+@FEW
+def test_sums_add_up(kind: Any, seed: int) -> None:
+    _, pairs, weights, _ = drawn(seed, 9)
+    a, b = (kind.of_set(pairs.take(part), weights[part]) for part in (slice(0, 4), slice(4, 9)))
+    both = kind.of_set(pairs, weights)
+    np.testing.assert_allclose((a + b).values, both.values, rtol=1e-15)
+    np.testing.assert_allclose((both - b).values, a.values, rtol=1e-15)
+    assert (a.count, a.add(pairs, 7, 2.5).count, both.count) == (4, 5, 9)
+
+
+@KINDS
+def test_many_changes_leave_the_sums_of_what_remains(kind: Any) -> None:
+    """One of the pairs is 100,000 km away."""
+    rng, pairs, weights, _ = drawn(11, 40)
+    far = pairs.about((1e8, -1e8), (1e8, 0.0))
+    fresh = kind.of_set(pairs, weights)
+    sums = fresh.add(far, 0, 1.0)
+    for i in rng.integers(0, 40, 1000).tolist():
+        sums = sums.add(pairs, i, weights[i]).remove(pairs, i, weights[i])
+    np.testing.assert_allclose(sums.remove(far, 0, 1.0).values, fresh.values, rtol=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_sums_are_exact_but_for_the_last_rounding(seed: int) -> None:
+    _, pairs, weights, _ = drawn(seed, 200)
+    weights = weights * 10.0 ** np.random.default_rng(seed).integers(-8, 12, 200)
+    alone = [JointSums.of_pair(pairs, k, weight).values for k, weight in enumerate(weights)]
+    sums = JointSums.of_set(pairs, weights)
+    np.testing.assert_allclose(sums.values, reference.exact_sums(np.array(alone)), rtol=1e-15)
+    np.testing.assert_array_equal((sums + sums).compensated, 2.0 * sums.compensated)
+    np.testing.assert_array_equal((sums - sums).compensated, 0.0)
+
+
+def test_sums_are_read_only() -> None:
+    sums = JointSums.of_set(correspondences(*noisy_pairs(np.random.default_rng(1), 3)), np.ones(3))
+    with pytest.raises(ValueError, match="read-only"):
+        sums.values[0] = 1.0
+
+
+# --- Joint estimator --------------------------------------------------------------------------------------------------
+
+
+@given(SEEDS)
+@FEW
+def test_joint_sums_with_their_cost_information_and_covariance(seed: int) -> None:
+    """Pairs of weight 0 do not count."""
+    rng, pairs, weights, measured = drawn(seed)
+    sums = JointSums.of_set(pairs, weights)
+    assert_close(sums.values, reference.joint_sums(*measured))
+    counts = rng.random(7) < 0.5
+    some = reference.joint_sums(*(values[counts] for values in measured))
+    assert_close(JointSums.of_set(pairs, np.where(counts, weights, 0.0)).values, some)
+    theta, x, y = rng.uniform(-3.0, 3.0, 3).tolist()
+    expected = reference.joint_cost(theta, np.array([x, y]), *measured)
+    assert sums.cost(theta, (x, y)) == pytest.approx(expected, rel=1e-9)
+    assert_close(sums.information(theta), reference.joint_information(theta, *measured))
+    np.testing.assert_allclose(sums.covariance(theta) @ sums.information(theta), np.eye(3), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_solution_is_the_minimum_of_the_valley_that_it_starts_in(seed: int) -> None:
+    _, pairs, weights, measured = drawn(seed)
+    sums, angles = JointSums.of_set(pairs, weights), np.linspace(-math.pi, math.pi, 721)
+    costs = np.array([reference.least_cost(theta, *measured) for theta in angles[:-1]])
+    for k in range(0, 720, 5):
+        place = k
+        while min(costs[place - 1], costs[(place + 1) % 720]) < costs[place]:
+            place = min(((place - 1) % 720, (place + 1) % 720), key=lambda i: costs[i])
+        theta, at, observable = sums.solve(angles[k])
+        assert observable
+        assert abs(math.remainder(theta - angles[place], math.tau)) < 0.02, angles[k]
+        cost = sums.cost(theta, at)
+        for step in (-1e-3, 1e-3):
+            assert cost < sums.cost(theta + step, at)
+            assert cost < sums.cost(theta, (at[0] + step, at[1]))
+            assert cost < sums.cost(theta, (at[0], at[1] + step))
+
+
+def test_the_angle_of_a_solution_is_wrapped_and_no_cost_is_negative() -> None:
+    costs = []
+    for seed in range(20):
+        pose = RigidTransform(1.0, 2.0, -3.1)
+        pairs = correspondences(*noisy_pairs(np.random.default_rng(seed), 7, noise=0.0, pose=pose))
+        sums = JointSums.of_set(pairs, np.ones(7))
+        theta, at, _ = sums.solve(3.1)
+        assert theta == pytest.approx(-3.1, abs=1e-9)
+        costs += [sums.cost(theta, at), sums.cost(theta, (1.0, 2.0))]
+    assert min(costs) == 0.0
+    assert max(costs) < 1e-9
+
+
+def test_parallel_lines_have_the_shortest_translation() -> None:
+    """One wall is seen in place but for 2 m across, along which it may slide."""
+    wall = directed([30.0], 4.0)
+    seen = MeasuredSegments.from_segments(wall.shifted(-2.0 * wall.normals[0]))
+    theta, at, observable = JointSums.of_set(correspondences(wall, seen), [1.0]).solve(0.0)
+    assert not observable
+    np.testing.assert_allclose([theta, *at], [0.0, *(2.0 * wall.normals[0])], atol=1e-12)
+
+
+def test_the_cost_is_that_of_all_points_behind_the_segments() -> None:
+    rng = np.random.default_rng(4)
+    map_segments = random_segments(rng, 8)
+    points = scanned_points(rng, map_segments, POSE, 0.01, 30)
+    pairs = correspondences(map_segments, fitted(points, 0.01))
+    sums = JointSums.of_set(pairs, np.full(8, 30 / 0.01**2))
+
+    moved = POSE.apply(points)
+    distances = np.einsum("nj,npj->np", map_segments.normals, moved) - map_segments.offsets[:, None]
+    # What the fit left, the scatter of the points about their own segments, is no matter of the pose.
+    own = np.einsum("nj,npj->np", np.stack([-pairs.directions[:, 1], pairs.directions[:, 0]], axis=1), points)
+    scatter = np.sum((own - own.mean(axis=1, keepdims=True)) ** 2)
+    expected = (np.sum(distances**2) - scatter) / 0.01**2
+    assert sums.cost(POSE.theta, (POSE.x, POSE.y)) == pytest.approx(expected, rel=1e-3)
+
+
+# --- The paper's estimator --------------------------------------------------------------------------------------------
+
+
+@given(SEEDS)
+@FEW
+def test_one_step_sums(seed: int) -> None:
+    """About any reference, and moved from one to another; pairs of weight 0 do not count."""
+    rng, pairs, weights, _ = drawn(seed)
+    x, y, turn = rng.uniform([-5.0, -5.0, -0.6], [5.0, 5.0, 1.4]).tolist()
+    about = RigidTransform(x, y, turn)
+
+    def expected(chosen: Correspondences, with_weights: Floats, at: RigidTransform) -> Floats:
+        columns = chosen.map_directions, chosen.map_midpoints, chosen.directions, chosen.midpoints
+        return reference.one_step_sums(*columns, with_weights, (at.x, at.y, at.theta))
+
+    counts = rng.random(7) < 0.5
+    sums = OneStepSums.of_set(pairs, np.where(counts, weights, 0.0), about)
+    assert_close(sums.values, expected(pairs.take(counts), weights[counts], about))
+    before = OneStepSums.of_set(pairs, weights, about)
+    dx, dy, turn = rng.uniform(-0.5, 0.5, 3)
+    there = RigidTransform(about.x + dx, about.y + dy, about.theta + turn)
+    found = expected(pairs, weights, there)
+    assert_close(before.about(there).values, found)
+    assert_close(before.costs(there, "mitsuta"), [found[6], found[8]])
+    assert_close(before.costs(there, "wahba"), [found[6], 2.0 * found[9]])
+    half = OneStepSums.of_set(pairs.take(slice(0, 3)), weights[:3], about)
+    rest = OneStepSums.of_set(pairs.take(slice(3, 7)), weights[3:], there)
+    np.testing.assert_allclose((half + rest).values, before.values, rtol=1e-9, atol=1e-9)
+
+
+def test_an_angle_taken_out_across_the_wrap_is_gone() -> None:
+    """With Alg. 1's principal values the sums would keep a multiple of 2 pi."""
+    pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
+    sums = OneStepSums.of_set(pairs, np.ones(3), RigidTransform(0.0, 0.0, math.pi)).remove(pairs, 1, 1.0)
+    assert math.degrees(sums.solve("mitsuta")[0].theta) == pytest.approx(176.5, abs=1e-9)
+
+
+def test_a_reference_may_be_moved_across_the_wrap() -> None:
+    pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
+    here, there = RigidTransform(0.0, 0.0, 3.0), RigidTransform(0.0, 0.0, -3.0)
+    sums, fresh = (OneStepSums.of_set(pairs, np.ones(3), about) for about in (here, there))
+    np.testing.assert_allclose(sums.about(there).values, fresh.values, atol=1e-12)
+    assert sums.rotation_cost(there, "wahba") == pytest.approx(fresh.rotation_cost(there, "wahba"))
+    assert sums.rotation_cost(there, "mitsuta") == pytest.approx(fresh.rotation_cost(there, "mitsuta"))
+
+
+def test_pairs_are_chosen_by_index() -> None:
+    map_segments, scan = noisy_pairs(np.random.default_rng(1), 5)
+    chosen = Correspondences.of(map_segments, scan, [[3, 3], [1, 1]])
+    both = correspondences(map_segments, scan)
+    expected = OneStepSums.of_pair(both, 1, 1.0) + OneStepSums.of_pair(both, 3, 1.0)
+    np.testing.assert_allclose(OneStepSums.of_set(chosen, np.ones(2)).values, expected.values, rtol=1e-15)
+
+
+def test_sums_of_nothing() -> None:
+    pairs = Correspondences.of(directed([0]), MeasuredSegments.from_segments(directed([0])), [])
+    sums = OneStepSums.of_set(pairs, [])
+    assert (sums.count, sums.reliability) == (0, 0.0)
+    assert sums.solve("mitsuta") == (RigidTransform(0.0, 0.0, 0.0), False)
+
+
+def mean_angle(
+    degrees: list[float], rotation: Rotation, reference_degrees: float | None = None, weights: list[float] | None = None
+) -> float:
+    pairs = correspondences(directed(degrees), MeasuredSegments.from_segments(directed(np.zeros(len(degrees)))))
+    used = np.ones(len(degrees)) if weights is None else weights
+    about = OneStepSums.of_set(pairs, used).solve("wahba")[0].theta
+    if reference_degrees is not None:
+        about = math.radians(reference_degrees)
+    sums = OneStepSums.of_set(pairs, used, RigidTransform(0.0, 0.0, about))
+    return math.degrees(sums.solve(rotation)[0].theta)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "rotation", "expected"),
+    [
+        ([0, 0, 90], "mitsuta", 30.0),
+        ([0, 0, 90], "wahba", math.degrees(math.atan(0.5))),
+        ([10, 10, 10], "mitsuta", 10.0),
+        ([10, 10, 10], "wahba", 10.0),
+        ([170, -170, 175], "mitsuta", 178.0 + 1.0 / 3.0),
+        ([-170, 170], "mitsuta", 180.0),
+        ([-90], "wahba", -90.0),
+    ],
+)
+def test_mean_angles_in_closed_form(degrees: list[float], rotation: Rotation, expected: float) -> None:
+    assert mean_angle(degrees, rotation) == pytest.approx(expected, abs=1e-9)
+
+
+def test_mean_angles_take_weights() -> None:
+    assert mean_angle([0, 60], "mitsuta", weights=[3.0, 1.0]) == pytest.approx(15.0)
+    assert mean_angle([0, 90], "wahba", weights=[3.0, 1.0]) == pytest.approx(math.degrees(math.atan2(1.0, 3.0)))
+
+
+@pytest.mark.parametrize("about", [-40.0, 0.0, 30.0, 80.0])
+def test_the_reference_angle_does_not_change_the_mean(about: float) -> None:
+    assert mean_angle([0, 0, 90], "mitsuta", about) == pytest.approx(30.0, abs=1e-9)
+    assert mean_angle([0, 0, 90], "wahba", about) == pytest.approx(26.565051177, abs=1e-9)
+
+
+def test_the_sign_of_p_brings_the_scan_to_the_map() -> None:
+    # One wall a metre up and one two metres right: as printed Eq. (1) would answer (-2, -1).
+    scan = Segments.from_array([[0, 0, 1, 0], [0, 1, 0, 0]])
+    map_segments = Segments.from_array([[2, 1, 3, 1], [2, 2, 2, 1]])
+    pairs = correspondences(map_segments, MeasuredSegments.from_segments(scan))
+    pose, observable = OneStepSums.of_set(pairs, np.ones(2)).solve("wahba")
+    assert observable
+    assert (pose.x, pose.y, pose.theta) == pytest.approx((2.0, 1.0, 0.0), abs=1e-12)
+
+
+def test_oblique_walls_show_the_signs_of_eq_8() -> None:
+    map_segments = Segments.from_array(ROOM)
+    pairs = correspondences(map_segments, MeasuredSegments.from_segments(seen_from(POSE, map_segments)))
+    sums = OneStepSums.of_set(pairs, np.ones(6))
+    for rotation in ("wahba", "mitsuta"):
+        pose, _ = sums.solve(rotation)
+        assert (pose.x, pose.y, pose.theta) == pytest.approx((POSE.x, POSE.y, POSE.theta), abs=1e-12)
+        assert sums.translation_cost(pose) == pytest.approx(0.0, abs=1e-12)
+        assert sums.rotation_cost(pose, rotation) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_ambiguity_at_any_transform_is_that_of_the_definition(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 6, 0.1)
+    weights = rng.uniform(0.2, 3.0, 6)
+    pairs = correspondences(map_segments, scan)
+    sums = OneStepSums.of_set(pairs, weights, RigidTransform(1.0, -2.0, 0.5))
+    rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
+    lines = [reference.transformation_line(*row) for row in rows]
+    optimum: dict[Rotation, RigidTransform] = {rotation: sums.solve(rotation)[0] for rotation in ("wahba", "mitsuta")}
+    for at in (RigidTransform(0.0, 0.0, 0.0), POSE, RigidTransform(-7.0, 3.0, 0.9), *optimum.values()):
+        expected = reference.translation_ambiguity(np.array([at.x, at.y]), lines, weights)
+        assert sums.translation_cost(at) == pytest.approx(expected, rel=1e-9)
+        squares = sum(w * (alpha - at.theta) ** 2 for (*_, alpha), w in zip(lines, weights, strict=True))
+        assert sums.rotation_cost(at, "mitsuta") == pytest.approx(squares, rel=1e-9)
+        error = reference.wahba_error(at.theta, pairs.map_directions, pairs.directions, weights)
+        assert sums.rotation_cost(at, "wahba") == pytest.approx(error, rel=1e-9)
+    for rotation, pose in optimum.items():
+        for step in (-1e-3, 1e-3):
+            aside = RigidTransform(pose.x + step, pose.y - step, pose.theta + step)
+            assert sums.translation_cost(aside) > sums.translation_cost(pose)
+            assert sums.rotation_cost(aside, rotation) > sums.rotation_cost(pose, rotation)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "expected"),
+    [([0, 90], 1.0), ([0, 180], 0.0), ([0, 30], 0.5), ([0, 0, 90], 2.0 * math.sqrt(2.0) / 3.0)],
+)
+def test_reliability_in_closed_form(degrees: list[float], expected: float) -> None:
+    pairs = correspondences(directed(degrees), MeasuredSegments.from_segments(directed(degrees)))
+    sums = OneStepSums.of_set(pairs, np.ones(len(degrees)))
+    assert sums.reliability == pytest.approx(expected, abs=1e-7)
+    assert sums.reliability == pytest.approx(
+        reference.reliability(pairs.map_directions, np.ones(len(degrees))), abs=1e-7
+    )
+    assert sums.determinant == pytest.approx((0.5 * expected * len(degrees)) ** 2, abs=1e-12)
+
+
+def test_reliability_never_exceeds_1_by_rounding() -> None:
+    found = []
+    for first in np.linspace(0.0, 90.0, 200):
+        cross = directed([first, first + 90.0])
+        pairs = correspondences(cross, MeasuredSegments.from_segments(cross))
+        found.append(OneStepSums.of_set(pairs, [0.1, 0.1]).reliability)
+    assert max(found) == 1.0
