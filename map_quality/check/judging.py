@@ -172,12 +172,13 @@ def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
         or scale.usable < usable
     ):
         return
-    factor, unit = unit_mistake(scale.factor)
-    yield Finding(
-        "scale",
-        f"{scale.agreeing} of {count} scans fit better at another scale: divide the map by {factor:.4g}, or "
-        f"multiply the scans by this factor.{unit}",
-    )
+    if scale.of_scans:
+        factor, unit = unit_mistake(1.0 / scale.factor, "scans")
+        remedy = f"divide the lengths of the scans by {factor:.4g}"
+    else:
+        factor, unit = unit_mistake(scale.factor, "map")
+        remedy = f"divide the map by {factor:.4g}, or multiply the scans by this factor"
+    yield Finding("scale", f"{scale.agreeing} of {count} scans fit better at another scale: {remedy}.{unit}")
 
 
 def _moved(samples: Sequence[Sample]) -> Iterator[Finding]:

@@ -73,12 +73,15 @@ class Scale:
         Number of scans of which each alone has this factor.
     usable : int
         Number of scans that are usable when map and scans are to scale.
+    of_scans : bool
+        True if the scans, not the map, are of an unusual size.
     """
 
     factor: float
     deviation: float
     agreeing: int
     usable: int
+    of_scans: bool = False
 
     @property
     def is_one(self) -> bool:
@@ -187,7 +190,7 @@ def find_scale(
             return None
         first = rung.fit(rung.search(lax=True))
     place = None if first.is_one or deadline.passed else sent.by(first.factor)
-    return None if place is None else place.fit(place.search())
+    return None if place is None else replace(place.fit(place.search()), of_scans=not sent.is_usual)
 
 
 def _best_rung(sent: _Scaled) -> _Scaled | None:
@@ -206,10 +209,13 @@ def _best_rung(sent: _Scaled) -> _Scaled | None:
     return None if best is None else sent.by(best)
 
 
-def unit_mistake(factor: float) -> tuple[float, str]:
-    """Return the factor between two units that is near to one, and which was taken for which; or the same and ""."""
+def unit_mistake(factor: float, of: str) -> tuple[float, str]:
+    """Return the factor between two units that is near to one, and which was taken for which; or the same and "".
+
+    Lengths of the map or the scans, `of`, are greater by this factor.
+    """
     for known, (unit, other) in TAKEN_FOR.items():
         for exact, told in ((known, f"{unit} taken for {other}"), (1.0 / known, f"{other} taken for {unit}")):
             if abs(factor / exact - 1.0) < SAME_UNIT:
-                return exact, f" The map seems to be in {told}."
+                return exact, f" The {of} seem{'' if of.endswith('s') else 's'} to be in {told}."
     return factor, ""

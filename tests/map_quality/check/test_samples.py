@@ -129,7 +129,9 @@ def test_scans_of_another_unit() -> None:
     samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
     report = conclude(index, scans, samples, Deadline(), oriented=True)
     assert codes(report) == ["scale"]
-    assert "divide the map by 0.001, or multiply the scans by this factor" in report.findings[0].message
+    assert report.findings[0].message.endswith(
+        "divide the lengths of the scans by 1000. The scans seem to be in millimetres taken for metres."
+    )
 
 
 @pytest.mark.parametrize(
