@@ -11,6 +11,7 @@ import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.issuing import ADMIN, KEYS, OPEN, PAGE, key_lines
 from tests.running import RunningService, running
 
 TESTS = Path(__file__).parent
@@ -47,24 +48,38 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """One service for all tests that leave it as it was."""
-    with running(tmp_path_factory.mktemp("service")) as started:
+    """One service for all tests that leave it as it was; it goes on for as long as a slow machine needs."""
+    with running(tmp_path_factory.mktemp("service"), max_deadline_ms=600_000) as started:
         yield started
+        assert "a defect" not in started.log()
 
 
 @pytest.fixture(scope="session")
-def patient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """A service that goes on for as long as a slow machine needs to start a process and read a file in it."""
-    with running(tmp_path_factory.mktemp("patient"), max_deadline_ms=600_000) as started:
-        yield started
+def patient(service: RunningService) -> RunningService:
+    return service
 
 
 @pytest.fixture(scope="session")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """One that requests a key, `sesame` or `open`."""
-    with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as started:
+    """One that requests a key: ``ADMIN``, or one of `KEYS`; a page of `PAGE` may ask."""
+    folder = tmp_path_factory.mktemp("guarded")
+    (folder / "keys").mkdir()
+    lines = "".join(key_lines(key, roles, maps) for key, (roles, maps) in KEYS.items())
+    (folder / "keys" / "robots.toml").write_text(lines)
+    with running(folder, keys=f"{ADMIN},{OPEN}", keys_file=folder / "keys", cors_origins=PAGE) as started:
         yield started
-        assert "sesame" not in started.log()
+        log, counts = started.log(), started.client.get("/metrics").text
+        assert "a defect" not in log
+        assert [key for key in (ADMIN, OPEN, *KEYS) if key in log or key in counts] == []
+
+
+@pytest.fixture(scope="session")
+def narrow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    """One that takes and gives small bodies only, by names of its own, and that lets a page of `PAGE` ask."""
+    settings = {"max_body_bytes": 200_000, "max_answers_bytes": 200_000, "searches": 1}
+    hosts = "linefix,robots.example"
+    with running(tmp_path_factory.mktemp("narrow"), hosts=hosts, cors_origins=PAGE, **settings) as started:
+        yield started
 
 
 @pytest.fixture

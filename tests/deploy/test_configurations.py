@@ -22,8 +22,8 @@ from examples.running import free_port
 from linefix.documents import examples
 from service.database_location import database_url
 from service.settings import Settings
+from tests.issuing import key_lines
 from tests.running import JSON, RunningService, until
-from tests.service.issuing import key_lines
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"

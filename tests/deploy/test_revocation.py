@@ -13,7 +13,7 @@ import yaml
 from service.admission.errors import UnknownKeyError
 from service.admission.key_file import Role
 from service.admission.keys import Keyring
-from tests.service.issuing import key_lines
+from tests.issuing import key_lines
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 ONE, OTHER = key_lines("sesame", ["read"]), key_lines("other", ["read"])

@@ -47,19 +47,6 @@ def test_a_body_of_few_bytes_cannot_hold_too_many_values() -> None:
         parse(b"[" * 10, FEW)
 
 
-@pytest.mark.parametrize("body", [b"", b"{", b"[1,]", b"\x00", b'"\xff"', b'{"a": "\\ud800"}', b"[1e400]", b"[" * 2000])
-def test_what_is_not_json(body: bytes) -> None:
-    with pytest.raises(NotJsonError) as caught:
-        parse(body, LIMITS)
-    assert "null" not in str(caught.value)
-
-
-@pytest.mark.parametrize("number", [b"NaN", b"Infinity", b"-Infinity", b"-inf"])
-def test_nan_is_told_what_to_send_instead(number: bytes) -> None:
-    with pytest.raises(NotJsonError, match="an unknown range is null"):
-        parse(b"[1.0, " + number + b"]", LIMITS)
-
-
 ROW = [0.0, 0.0, 1.0, 0.0]
 COUNTED = [
     ("map_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "map": {"segments": [ROW] * n}}),

@@ -11,7 +11,7 @@ from cli.entry import run
 from service.admission.errors import UnknownKeyError
 from service.admission.key_file import EVERY_ROLE, KeyFileError, Role, read_keys
 from service.admission.keys import Keyring
-from tests.service.issuing import key_lines
+from tests.issuing import key_lines
 
 DIGEST = hashlib.sha256(b"sesame").hexdigest()
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from pydantic import SecretStr
 
-from service.admission.errors import MissingKeyError, UnknownKeyError
 from service.admission.keys import Keyring, address_of
-from tests.service.issuing import key_lines
+from tests.issuing import key_lines
 
 RING = Keyring([SecretStr("sesame"), SecretStr("open")])
 
@@ -34,32 +32,6 @@ def test_a_key_of_the_settings_may_do_everything_though_a_file_has_it_too(tmp_pa
     granted = Keyring([SecretStr("sesame")], tmp_path / "keys").grant(sent(b"Bearer sesame"))
     assert granted == RING.grant(sent(b"Bearer sesame"))
     assert Keyring([SecretStr("open")], tmp_path / "keys").grant(sent(b"Bearer sesame")).maps == "hq-"
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        (),
-        (b"",),
-        (b"sesame",),
-        (b"Bearer",),
-        (b"Bearer ",),
-        (b"Basic sesame",),
-        # Which of two would count is for each server to guess: neither.
-        (b"Bearer sesame", b"Bearer sesame"),
-        (b"Bearer nothing", b"Bearer sesame"),
-        (b"Bearer sesame", b"Basic x"),
-    ],
-)
-def test_no_key(values: tuple[bytes, ...]) -> None:
-    with pytest.raises(MissingKeyError):
-        RING.grant(sent(*values))
-
-
-@pytest.mark.parametrize("value", [b"Bearer sesam", b"Bearer sesame2", b"Bearer SESAME", b"Bearer sesame open"])
-def test_a_key_that_is_none(value: bytes) -> None:
-    with pytest.raises(UnknownKeyError):
-        RING.grant(sent(value))
 
 
 def test_without_keys_whoever_comes_is_known_by_the_address() -> None:

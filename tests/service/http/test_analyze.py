@@ -108,35 +108,3 @@ def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
     assert answer["complete"] is False
     assert summary["left_out"] > 1000
     assert summary["places"] == len(answer["places"])
-
-
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
-        ({"laser": {"fov": 360}}, "/laser/fov"),
-        ({"laser": {"beams": 2}}, "/laser/beams"),
-        ({"laser": {"fow": 1}}, "/laser/fow"),
-        ({"spacing": 0}, "/spacing"),
-        ({"point": [100, 0]}, "/point"),
-        ({"point": [1]}, "/point"),
-        ({"places": 3}, "/places"),
-        ({"drive": 31}, "/drive"),
-        ({"landmark": [[0, 0, 1]]}, "/landmark/0"),
-        ({"landmark": [[0, 0, 1, 0], [1, 1, 1, 1]]}, "/landmark/1"),
-        ({"landmark": [[0, 0, 1, 0]] * 101}, "/landmark"),
-    ],
-)
-def test_what_cannot_be_analyzed(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
-    put(client, examples.WALLS)
-    answer = client.post(URL, json=body)
-    assert answer.status_code == 422, answer.text
-    assert answer.json()["errors"][0]["pointer"] == pointer
-
-
-def test_it_is_a_search_like_any_other(client: httpx.Client) -> None:
-    put(client, examples.WALLS)
-    late = client.post(URL, json={"deadline_ms": 0})
-    assert (late.status_code, late.json()["code"]) == (504, "deadline_exceeded")
-    unknown = client.post("/v1/maps/nowhere:analyze", json={})
-    assert (unknown.status_code, unknown.json()["code"]) == (404, "unknown_map")
-    assert 'route="/v1/maps/{map_id}:analyze",status="504"' in client.get("/metrics").text

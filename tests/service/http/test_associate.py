@@ -130,15 +130,6 @@ def test_the_prior_of_the_map_and_the_least_probability_decide_what_is_usable(cl
         assert together["results"][0]["result"]["usable"] is usable
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("on_map", 0.49), ("usable_from", 1.0), ("on_map", None), ("causes", True)]
-)
-def test_what_is_no_probability_is_named(client: httpx.Client, name: str, value: object) -> None:
-    response = client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {name: value}})
-    assert response.status_code == 422
-    assert [one["pointer"] for one in response.json()["errors"]] == [f"/options/{name}"]
-
-
 def test_an_empty_scan_is_no_match(client: httpx.Client) -> None:
     for scan in ({"segments": []}, {"points": []}, {"laser": {**laser(), "ranges": [None] * 10}}):
         answer = associated(client, scan=scan)
@@ -164,11 +155,6 @@ def test_the_paper_s_estimator_has_no_covariance(client: httpx.Client) -> None:
     assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_deadline_that_has_passed_is_504(client: httpx.Client) -> None:
-    response = client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {"deadline_ms": 0}})
-    assert (response.status_code, response.json()["code"]) == (504, "deadline_exceeded")
-
-
 def test_a_bad_scan_in_a_batch_is_one_error_item(client: httpx.Client) -> None:
     bad_prior = {"x": 0, "y": 0, "theta": 0, "radius": "far", "angle": 1}
     body = {
@@ -187,16 +173,6 @@ def test_a_bad_scan_in_a_batch_is_one_error_item(client: httpx.Client) -> None:
     assert pointers == ["/scans/1/segments/1", "/priors/2/radius", "/scans/3"]
 
 
-def test_a_batch_over_its_deadline_has_504_items(client: httpx.Client) -> None:
-    body = {**examples.BATCH, "options": {"deadline_ms": 0}}
-    assert client.post("/v1/associate:batch", json=body).status_code == 504
-
-
-def test_a_batch_of_a_map_that_is_none_fails_whole(client: httpx.Client) -> None:
-    response = client.post("/v1/associate:batch", json={**examples.BATCH, "map": {"map_id": "no-such"}})
-    assert (response.status_code, response.json()["code"]) == (404, "unknown_map")
-
-
 def test_vectorize_finds_the_corner(client: httpx.Client) -> None:
     answer = client.post("/v1/vectorize", json=examples.VECTORIZE).json()
     assert len(answer["segments"]) == 2
@@ -213,21 +189,3 @@ def test_what_vectorize_gives_can_be_sent_back(client: httpx.Client) -> None:
     answer = associated(client, scan={**scan, "sigma": found["sigmas"]})
     assert answer["status"] == "ok"
     assert answer["pose"]["x"] == pytest.approx(0.0, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
-        ({}, ""),
-        ({"laser": laser(), "points": [[0, 1]]}, ""),
-        ({"laser": laser(angle_increment=0.0)}, "/laser/angle_increment"),
-        ({"laser": laser(range_min=5.0, range_max=4.0)}, "/laser/range_max"),
-        ({"laser": laser(ranges=[1.0, "2"])}, "/laser/ranges/1"),
-        ({"points": [[0.0, 0.0], [1e8, 0.0]]}, "/points/1"),
-        ({"points": [], "options": {"min_points": 2}}, "/options/min_points"),
-    ],
-)
-def test_scans_that_are_none(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
-    response = client.post("/v1/vectorize", json=body)
-    assert response.status_code == 422
-    assert response.json()["errors"][0]["pointer"] == pointer

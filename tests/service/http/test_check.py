@@ -114,46 +114,6 @@ def test_poses_in_another_frame(client: httpx.Client) -> None:
     ]
 
 
-STILL = {"angle_min": 0, "angle_increment": 0.1, "ranges": [1]}
-
-
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
-        ({}, "/scans"),
-        ({"scans": []}, "/scans"),
-        ({"scans": [{"segments": examples.SEEN}, {"segments": [[0, 0, 1]]}]}, "/scans/1/segments/0"),
-        ({"scans": [{"segments": examples.SEEN}, {"segments": [[0, 0, 0, 0]]}]}, "/scans/1/segments/0"),
-        ({"scans": [{"laser": {**STILL, "angle_increment": 0}}]}, "/scans/0/laser/angle_increment"),
-        ({"scans": [{"segments": examples.SEEN}], "poses": []}, ""),
-        ({"scans": [{"segments": examples.SEEN}], "poses": [{"x": 0, "y": 0, "theta": 90}]}, "/poses/0/theta"),
-        ({"scans": [{"segments": examples.SEEN}], "priors": []}, "/priors"),
-        ({"scans": [{"segments": []}] * 65}, "/scans"),
-    ],
-)  # fmt: skip
-def test_samples_that_are_none(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
-    put(client, examples.WALLS)
-    answer = client.post(URL, json=body)
-    assert answer.status_code == 422, answer.text
-    assert answer.json()["errors"][0]["pointer"] == pointer
-
-
-def test_it_is_a_search_like_any_other(client: httpx.Client) -> None:
-    put(client, examples.WALLS)
-    for call in (
-        client.get(URL, params={"deadline_ms": 0}),
-        client.post(URL, json={"scans": [{"segments": examples.SEEN}], "deadline_ms": 0}),
-    ):
-        assert (call.status_code, call.json()["code"]) == (504, "deadline_exceeded")
-    assert client.get(URL, params={"deadline_ms": "soon"}).status_code == 422
-    for call in (client.get("/v1/maps/nowhere:check"), client.post("/v1/maps/nowhere:check", json=examples.CHECK)):
-        assert (call.status_code, call.json()["code"]) == (404, "unknown_map")
-    assert client.get("/v1/maps/a b:check").status_code == 422
-    assert client.put("/v1/maps/m:check", json=examples.MAP).status_code == 422
-    text = client.get("/metrics").text
-    assert 'route="/v1/maps/{map_id}:check",status="200"' in text
-
-
 def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
     put(client, faces())
     # Long enough to begin, however slow the machine is, and far too short for all.

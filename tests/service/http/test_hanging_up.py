@@ -54,15 +54,6 @@ def test_the_result_is_returned_and_the_watch_ends() -> None:
     run(main)
 
 
-def test_a_short_answer_is_not_watched() -> None:
-    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
-        gone.set_result(None)  # no watch, or it would be noticed
-        result.set_result("done")
-        assert await unless_hung_up(receive, waited(result, []), Deadline()) == "done"
-
-    run(main)
-
-
 def test_the_work_for_a_client_that_hung_up_ends() -> None:
     async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
         deadline, ends = Deadline(), list[str]()
@@ -101,14 +92,5 @@ def test_a_server_that_ends_is_no_hang_up() -> None:
             await task
         assert deadline.cancelled
         assert ends == ["ended"]
-
-    run(main)
-
-
-def test_an_error_of_the_work_is_raised() -> None:
-    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
-        result.set_exception(ZeroDivisionError())
-        with pytest.raises(ZeroDivisionError):
-            await unless_hung_up(receive, waited(result, []), Deadline())
 
     run(main)

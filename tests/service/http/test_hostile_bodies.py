@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 
-import httpx
 import orjson
 import pytest
 
@@ -120,22 +119,3 @@ def test_nor_in_the_parser(service: RunningService, kind: str) -> None:
         answer = service.client.post("/v1/associate", content=body)
         assert answer.status_code in (413, 422)
         assert peak() - before < 250.0
-
-
-def test_a_batch_ends_when_its_answers_are_too_much(start_service: Callable[..., RunningService]) -> None:
-    """They were kept as objects until the last one, 410 MB of them, and weighed after that."""
-    running = start_service(searches=1, max_body_bytes=200_000, max_answers_bytes=200_000)
-    options = {"include": ["correspondences", "segments", "alternatives"]}
-
-    def ask(scans: int) -> httpx.Response:
-        body = {**examples.BATCH, "scans": [{"segments": examples.SEEN}] * scans, "priors": None, "options": options}
-        return running.client.post("/v1/associate:batch", json=body)
-
-    some = ask(60)
-    assert (some.status_code, len(some.json()["results"])) == (200, 60)
-    room = 200_000 * 60 // len(some.content)  # for so many
-    many = ask(2 * room)
-    assert (many.status_code, many.json()["code"]) == (429, "rate_limited")
-    told = running.client.get("/metrics").text
-    found = sum(float(row.rsplit(" ", 1)[1]) for row in told.splitlines() if row.startswith("linefix_verdicts_total"))
-    assert found - 60 < 1.25 * room

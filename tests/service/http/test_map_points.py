@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from linefix.documents import examples
 from tests.linefix.test_map_points import POSTS, ROOM, ROOMS, SCANNER, ranges
 
 from ..importing.forms import TYPE, form
@@ -61,32 +60,6 @@ def test_points_of_several_maps(client: httpx.Client, stored: dict[str, Any]) ->
         assert (answer["usable"], answer["map"]["map_id"]) == (True, "posts")
     both_bare = client.post("/v1/associate", json={"maps": [one, {**one, "map_id": "twin"}], "scan": SCAN}).json()
     assert not both_bare["usable"]
-
-
-@pytest.mark.parametrize(
-    ("fields", "pointer"),
-    [
-        ({"points": [[0.0, 0.0], [1.0]]}, "/points/1"),
-        ({"points": [[0.0, None]]}, "/points/0"),
-        ({"points": "many"}, "/points"),
-        ({"points": None}, "/points"),
-        ({"points": [[0.0, 0.0]], "points_sigma": 0.0}, "/points_sigma"),
-        ({"points": [[0.0, 0.0]], "points_sigma": 11.0}, "/points_sigma"),
-        ({"point": [[0.0, 0.0]]}, "/point"),
-    ],
-)
-def test_points_that_are_none(client: httpx.Client, fields: dict[str, Any], pointer: str) -> None:
-    put = client.put("/v1/maps/none", json={**BARE, **fields})
-    assert (put.status_code, put.json()["errors"][0]["pointer"]) == (422, pointer)
-    asked = client.post("/v1/associate", json={"map": {**BARE, **fields}, "scan": {"segments": examples.SEEN}})
-    assert (asked.status_code, asked.json()["errors"][0]["pointer"]) == (422, f"/map{pointer}")
-
-
-def test_a_limit_of_points(client: httpx.Client) -> None:
-    most = client.get("/v1/limits").json()["max_map_segments"]
-    put = client.put("/v1/maps/none", json={**BARE, "points": [[0, 0]] * (most + 1)})
-    assert (put.status_code, put.json()["code"]) == (413, "too_large")
-    assert f"at most {most} map points" in put.json()["detail"]
 
 
 def test_an_update_keeps_the_points(client: httpx.Client, stored: dict[str, Any]) -> None:

@@ -135,13 +135,6 @@ def test_a_listing_has_pages(start_service: Callable[..., Any]) -> None:
     assert client.get("/v1/maps", params={"limit": 0}).json()["code"] == "invalid_request"
 
 
-@pytest.mark.parametrize("name", ["a b", "x" * 129, "ä", "a:b"])
-def test_ids_have_a_form(client: httpx.Client, name: str) -> None:
-    response = client.put(f"/v1/maps/{name}", json=examples.MAP)
-    assert response.status_code == 422
-    assert response.json()["errors"][0]["pointer"] == "/path/map_id"
-
-
 def test_a_changed_map_is_searched_in_its_new_form(client: httpx.Client) -> None:
     body = {"map": {"map_id": "changing"}, "scan": {"segments": examples.SEEN}}
     client.put("/v1/maps/changing", json=examples.MAP)

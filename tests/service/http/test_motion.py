@@ -66,31 +66,6 @@ def test_a_motion_that_is_not_known_is_warned_of_and_allowed_for(client: httpx.C
     assert deviations(answer) == pytest.approx([0.025, 0.025, 0.05], rel=0.1)
 
 
-def test_the_covariance_holds_where_the_robot_turned(client: httpx.Client) -> None:
-    ranges = []
-    for k, angle in enumerate(ANGLES.tolist()):
-        ranges += read_from(HERE.compose(RigidTransform(0.0, 0.0, 1.0 * k * STEP)), np.array([angle]))
-    answer = found(client, {"laser": laser(time_increment=STEP) | {"ranges": ranges}})
-    wrong = abs(math.remainder(answer["pose"]["theta"] - HERE.theta, math.tau))
-    assert 0.03 < wrong < 2.0 * deviations(answer)[2]
-
-
-def test_indices_are_those_of_one_scan(client: httpx.Client) -> None:
-    answer = found(client, UNKNOWN[0])
-    assert all("view" not in pair for pair in answer["correspondences"])
-    assert all(isinstance(index, int) for index in answer["unmatched_scan"])
-    assert len(answer["segments"][0]) == 4
-
-
-def test_a_sensor_moves_with_the_robot_it_is_mounted_on(client: httpx.Client) -> None:
-    """Ahead of the axis the sensor moves more than the robot, whose pose is answered."""
-    mount = RigidTransform(1.5, 0.0, 0.0)
-    seen = laser(HERE.compose(mount), time_increment=STEP)
-    ahead = found(client, {"views": [{"laser": seen, "pose": pose_json(mount)}]})
-    assert ahead["usable"]
-    assert deviations(ahead) == pytest.approx([0.025, 0.025, 0.05], rel=0.1)
-
-
 def test_a_step_of_a_drive_keeps_its_own_covariance(client: httpx.Client) -> None:
     step = RigidTransform(-40.0, 0.0, 0.0)  # too far for a lever
     views = [

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
-import threading
 from collections.abc import Iterator
 from typing import Any, get_args
 
@@ -14,9 +12,7 @@ import pytest
 from association import ReasonCode, Status, WarningCode
 from linefix.documents import examples
 from map_quality import FindingCode
-from service.http.openapi import Contract
 from service.http.problems import KINDS
-from service.thread_pool import Threads
 
 
 @pytest.fixture(scope="module")
@@ -29,27 +25,6 @@ def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, A
     for path, item in document["paths"].items():
         for method, operation in item.items():
             yield method.upper(), path, operation
-
-
-def test_it_is_made_once_and_beside_the_event_loop() -> None:
-    """Each request encoded it again, and the first one blocked the event loop for a third of a second."""
-    made: list[str] = []
-    threads = Threads(1, "aside")
-
-    def describe() -> dict[str, Any]:
-        made.append(threading.current_thread().name)
-        return {"openapi": "3.1.0"}
-
-    async def ask() -> list[bytes]:
-        contract = Contract(describe, threads)
-        return [*await asyncio.gather(contract.body(), contract.body()), await contract.body()]
-
-    one, *others = asyncio.run(ask())
-    threads.close()
-    assert one == b'{"openapi":"3.1.0"}'
-    assert all(other is one for other in others)
-    assert len(made) == 1
-    assert made[0].startswith("aside")
 
 
 def test_operations_have_short_names(document: dict[str, Any]) -> None:

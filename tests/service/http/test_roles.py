@@ -1,10 +1,10 @@
-"""Every role at every endpoint with and without a prefix, over HTTP, by keys of a file."""
+"""Keys: the role of every endpoint, with and without a prefix of maps, and attempts with keys of few rights."""
 
 from __future__ import annotations
 
+import gzip
+import json
 import os
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -13,12 +13,10 @@ import pytest
 from linefix.documents import examples
 from service.admission.entrance import GUARDED
 from service.admission.key_file import Role
-from tests.running import RunningService, running, until
-from tests.service.issuing import key_lines
+from tests.issuing import ADMIN, PREFIX, bearer, key_lines, key_of
+from tests.running import RunningService, until
 
-ADMIN = "the-key-of-who-may-do-everything"
 MINE, FOREIGN = "hq-1", "lab-1"
-PREFIX = "hq-"
 SCAN = {"segments": examples.SEEN}
 # The role of each route. A route that is not here fails the test: whether its method says its role must be intended.
 # Body None: there is none. "{map_id}" in a body becomes the map's id.
@@ -47,24 +45,13 @@ NAMES_A_MAP = {call for call, (_, body) in CALLS.items() if "{map_id}" in call[1
 TOLD = [(method, path, role) for method, path in CALLS for role in Role]
 
 
-class Guarded:
-    """A service with keys of every kind, and who may do what."""
-
-    def __init__(self, service: RunningService) -> None:
-        self.service = service
-
-    def call(self, method: str, path: str, bearer: str, map_id: str = MINE) -> httpx.Response:
-        body = _with_id(CALLS.get((method, path), (None, None))[1], map_id)
-        headers = {"authorization": f"Bearer {bearer}"}
-        return self.service.client.request(method, path.replace("{map_id}", map_id), json=body, headers=headers)
-
-    def put_maps(self) -> None:
-        for map_id in (MINE, FOREIGN):
-            assert self.call("PUT", "/v1/maps/{map_id}", ADMIN, map_id).is_success
+SECRET = 77.123456
+SECRETS = {"segments": [[SECRET, 0, 81, 0], [81, 0, 81, 5], [81, 5, SECRET, 5]], "frame_id": "secret"}
 
 
-def key_of(role: Role, maps: str) -> str:
-    return f"key-that-may-{role}-{maps or 'all'}"
+def call_with(service: RunningService, method: str, path: str, key: str, map_id: str = MINE) -> httpx.Response:
+    body = _with_id(CALLS.get((method, path), (None, None))[1], map_id)
+    return service.client.request(method, path.replace("{map_id}", map_id), json=body, headers=bearer(key))
 
 
 def _with_id(value: Any, map_id: str) -> Any:
@@ -73,117 +60,240 @@ def _with_id(value: Any, map_id: str) -> Any:
     return map_id if value == "{map_id}" else value
 
 
-@pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
-    folder = tmp_path_factory.mktemp("roles")
-    (folder / "keys.toml").write_text(
-        "".join(key_lines(key_of(role, p), [role], p) for role in Role for p in ("", PREFIX))
-    )
-    with running(folder, keys=ADMIN, keys_file=folder / "keys.toml") as service:
-        made = Guarded(service)
-        made.put_maps()
-        yield made
-        log = service.log()
-        assert "a defect" not in log
-        for role in Role:
-            for bearer in (ADMIN, key_of(role, ""), key_of(role, PREFIX)):
-                assert bearer not in log
-                assert bearer not in service.client.get("/metrics").text
+@pytest.fixture(autouse=True)
+def _maps(guarded: RunningService) -> None:
+    """Have a map that each key sees, and one that those of the prefix do not."""
+    for map_id in (MINE, FOREIGN):
+        assert call_with(guarded, "PUT", "/v1/maps/{map_id}", ADMIN, map_id).is_success
 
 
-def test_every_route_has_a_role_named(guarded: Guarded) -> None:
+@pytest.fixture
+def _a_secret(guarded: RunningService) -> Any:
+    """Have a map that the lesser keys do not see, which has to be as it was at the end."""
+    client, owner = guarded.client, bearer(ADMIN)
+    client.put(f"/v1/maps/{FOREIGN}", json=SECRETS, headers=owner).raise_for_status()
+    asked = {"map": {"map_id": FOREIGN}, "scan": SCAN}
+    assert client.post("/v1/associate", json=asked, headers=owner).status_code == 200  # its index is there
+    before = client.get(f"/v1/maps/{FOREIGN}", headers=owner)
+    yield
+    after = client.get(f"/v1/maps/{FOREIGN}", headers=owner)
+    assert (after.content, after.headers["etag"]) == (before.content, before.headers["etag"])
+
+
+def test_every_route_has_a_role_named(guarded: RunningService) -> None:
     """The method of a request decides on its role."""
-    paths = guarded.service.client.get("/openapi.json").json()["paths"]
+    paths = guarded.client.get("/openapi.json").json()["paths"]
     there = {(method.upper(), path) for path, item in paths.items() for method in item if path.startswith(GUARDED)}
     assert set(CALLS) == there
 
 
 @pytest.mark.parametrize(("method", "path", "role"), TOLD, ids=[" ".join(map(str, told)) for told in TOLD])
-def test_a_role_is_good_for_what_asks_for_it(guarded: Guarded, method: str, path: str, role: Role) -> None:
+def test_a_role_is_good_for_what_asks_for_it(guarded: RunningService, method: str, path: str, role: Role) -> None:
     wanted, _ = CALLS[method, path]
     for maps in ("", PREFIX):
-        for bearer in [key_of(role, maps)]:
-            guarded.put_maps()
-            answer = guarded.call(method, path, bearer)
-            if wanted not in (None, role):
-                assert (answer.status_code, answer.json()["code"]) == (403, "forbidden")
-                continue
-            assert answer.is_success or ((method, path) in FORMS and answer.status_code == 415), answer.text
-            if (method, path) not in NAMES_A_MAP:
-                continue
-            foreign = guarded.call(method, path, bearer, FOREIGN)
-            if maps:
-                assert (foreign.status_code, foreign.json()["code"]) == (404, "unknown_map")
-                none = guarded.call(method, path, bearer, "lab-none")
-                assert none.json() | {"request_id": ""} == foreign.json() | {"request_id": ""}
-            else:
-                assert foreign.is_success, foreign.text
+        key = key_of(role, maps)
+        answer = call_with(guarded, method, path, key)
+        if wanted not in (None, role):
+            assert (answer.status_code, answer.json()["code"]) == (403, "forbidden")
+            continue
+        assert answer.is_success or ((method, path) in FORMS and answer.status_code == 415), answer.text
+        if method == "DELETE":
+            _put_again(guarded)
+        if (method, path) not in NAMES_A_MAP:
+            continue
+        foreign = call_with(guarded, method, path, key, FOREIGN)
+        if maps:
+            assert (foreign.status_code, foreign.json()["code"]) == (404, "unknown_map")
+            none = call_with(guarded, method, path, key, "lab-none")
+            assert none.json() | {"request_id": ""} == foreign.json() | {"request_id": ""}
+        else:
+            assert foreign.is_success, foreign.text
 
 
-def test_a_list_has_no_foreign_maps(guarded: Guarded) -> None:
-    guarded.put_maps()
-    for bearer in [key_of(Role.READ, PREFIX)]:
-        for query, found in (("", [MINE]), ("?limit=1", [MINE]), (f"?cursor={MINE}", []), ("?cursor=a", [MINE])):
-            answer = guarded.call("GET", f"/v1/maps{query}", bearer).json()
-            assert ([item["map_id"] for item in answer["maps"]], answer["next"]) == (found, None)
+def _put_again(guarded: RunningService) -> None:
+    assert call_with(guarded, "PUT", "/v1/maps/{map_id}", ADMIN).is_success
 
 
-def test_what_is_no_route_is_for_whole_keys(guarded: Guarded) -> None:
-    for method, path in (("GET", "/v1/nothing"), ("POST", "/v1/maps"), ("PATCH", "/v1/maps/{map_id}")):
-        assert guarded.call(method, path, ADMIN).status_code in (404, 405)
-        for bearer in [key_of(Role.WRITE, "")]:
-            assert guarded.call(method, path, bearer).json()["code"] == "forbidden"
+def test_probes_and_pages_ask_for_no_key(guarded: RunningService) -> None:
+    for path in ("/livez", "/readyz", "/metrics", "/version", "/docs", "/openapi.json", "/"):
+        assert guarded.client.get(path).status_code == 200, path
 
 
 @pytest.mark.parametrize(
-    "path",
+    "call",
     [
-        "/v1/maps/%6cab-1",
-        "/v1/maps/lab%2D1",
-        "/v1/maps/hq-%2F..%2Flab-1",
-        "/v1/maps/hq-1/../lab-1",
-        "/v1//maps/lab-1",
-        "/v1/maps/lab-1/",
-        "/v1/maps/lab-1%0A",
-        "/v1/maps/lab-1:check",
-        "/v1/maps/hq-1:check/lab-1",
-        "/v1/maps/lab-1?map_id=hq-1",
+        "GET /v1/limits",
+        "POST /v1/associate",
+        "PUT /v1/maps/m",
+        "POST /v1/nothing",
+        "GET /%76%31/limits",
+        "HEAD /v1/maps",
     ],
 )
-def test_a_foreign_map_is_not_had_in_other_letters(guarded: Guarded, path: str) -> None:
-    guarded.put_maps()
-    for bearer in [key_of(Role.READ, PREFIX)]:
-        request = f"GET {path} HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {bearer}\r\nConnection: close\r\n\r\n"
-        with guarded.service.connection() as connection:
-            connection.sendall(request.encode())
-            answer = b"".join(iter(lambda: connection.recv(65_536), b""))
-        assert int(answer[9:12]) in (400, 403, 404, 422)
+def test_everything_under_v1_asks_for_one(guarded: RunningService, call: str) -> None:
+    """Also where the same path is in other letters."""
+    method, path = call.split()
+    body = None if method in ("GET", "HEAD") else b"x" * 100_000
+    none = guarded.client.request(method, path, content=body)
+    assert none.status_code == 401
+    assert none.headers["www-authenticate"] == 'Bearer realm="linefix"'
+    wrong = guarded.client.request(method, path, content=body, headers=bearer(ADMIN[:-1]))
+    assert (wrong.status_code, "www-authenticate" in wrong.headers) == (403, False)
+    if method != "HEAD":
+        assert (none.json()["code"], wrong.json()["code"]) == ("unauthorized", "forbidden")
+
+
+def test_a_list_has_no_foreign_maps(guarded: RunningService) -> None:
+    mine = key_of(Role.READ, PREFIX)
+    for query, found in (("", [MINE]), ("?limit=1", [MINE]), (f"?cursor={MINE}", []), ("?cursor=a", [MINE])):
+        answer = call_with(guarded, "GET", f"/v1/maps{query}", mine).json()
+        assert ([item["map_id"] for item in answer["maps"]], answer["next"]) == (found, None)
+    for query in ("cursor=lab-0", "limit=1000", "cursor=a&cursor=lab-0", "prefix=lab-", "cursor=%27%20OR%201=1"):
+        answer = guarded.client.get(f"/v1/maps?{query}", headers=bearer(mine))
+        assert answer.status_code in (200, 422)
+        assert "lab-" not in answer.text
+
+
+def test_a_key_searches_on_the_maps_of_its_prefix_alone(guarded: RunningService) -> None:
+    call_with(guarded, "PUT", "/v1/maps/{map_id}", ADMIN, "hq-2")
+    for prefix in ("h", PREFIX):
+        assert {one["map_id"] for one in several(guarded, {"prefix": prefix}).json()["maps"]} == {"hq-1", "hq-2"}
+    call_with(guarded, "DELETE", "/v1/maps/{map_id}", ADMIN, "hq-2")
+    for maps in ({"prefix": "lab-"}, [{"map_id": MINE}, {"map_id": FOREIGN}]):
+        assert several(guarded, maps).status_code == 404
+
+
+def several(guarded: RunningService, maps: Any) -> httpx.Response:
+    body = {"maps": maps, "scan": SCAN}
+    return guarded.client.post("/v1/associate", json=body, headers=bearer(key_of(Role.ASSOCIATE, PREFIX)))
+
+
+def test_what_is_no_route_is_for_whole_keys(guarded: RunningService) -> None:
+    for method, path in (("GET", "/v1/nothing"), ("POST", "/v1/maps"), ("PATCH", "/v1/maps/{map_id}")):
+        assert call_with(guarded, method, path, ADMIN).status_code in (404, 405)
+        assert call_with(guarded, method, path, key_of(Role.WRITE)).json()["code"] == "forbidden"
+
+
+def told(service: RunningService, *lines: str | bytes) -> bytes:
+    """Send lines of a head as they are; return all that comes back."""
+    head = b"\r\n".join(line if isinstance(line, bytes) else line.encode() for line in lines)
+    with service.connection() as connection:
+        connection.sendall(head + b"\r\nHost: x\r\nConnection: close\r\n\r\n")
+        return b"".join(iter(lambda: connection.recv(65_536), b""))
+
+
+READER, ASKER, WRITER = (key_of(role, PREFIX) for role in (Role.READ, Role.ASSOCIATE, Role.WRITE))
+SHOWN = f"Authorization: Bearer {READER}"
+FOREIGN_PATHS = [
+    *("/v1/maps/%6cab-1", "/v1/maps/lab%2D1", "/v1/maps/hq-%2F..%2Flab-1", "/v1/maps/hq-1/../lab-1", "/v1//maps/lab-1"),
+    *("/v1/maps/lab-1/", "/v1/maps/lab-1%0A", "/v1/maps/lab-1:check", "/v1/maps/hq-1:check/lab-1"),
+    "/v1/maps/lab-1?map_id=hq-1",
+]
+
+
+@pytest.mark.usefixtures("_a_secret")
+def test_a_foreign_map_is_not_had_in_other_letters(guarded: RunningService) -> None:
+    for path in FOREIGN_PATHS:
+        answer = told(guarded, f"GET {path} HTTP/1.1", SHOWN)
+        assert int(answer[9:12]) in (400, 403, 404, 422), path
         assert b"segments" not in answer
+    for name in ("X-Original-URL", "X-Rewrite-URL", "X-Forwarded-Path", "X-HTTP-Method-Override"):
+        for value in ("/v1/maps/lab-1", "DELETE"):
+            answers = [told(guarded, f"GET {path} HTTP/1.1", SHOWN, f"{name}: {value}")
+                       for path in ("/v1/maps/lab-1", "/v1/maps/hq-1")]  # fmt: skip
+            assert [answer[9:12] for answer in answers] == [b"404", b"200"]
 
 
-def test_keys_come_and_go_without_a_restart(tmp_path: Path) -> None:
-    keys = tmp_path / "keys"
-    keys.mkdir()
-    (keys / "robots.toml").write_text(key_lines("first", ["associate"]))
-    with running(tmp_path, keys_file=keys) as service:
+# Which of two names counts may depend on who reads: bodies of each size are read by another.
+FOREIGN_BODIES = [
+    '{"map": {"map_id": "lab-1"}, "S": SEEN}',
+    '{"map": {"map_id": "hq-1"}, "map": {"map_id": "lab-1"}, "S": SEEN}',
+    '{"map": {"map_id": "hq-1", "map_id": "lab-1"}, "S": SEEN}',
+    '{"map": {"map_id": "\\u006cab-1"}, "S": SEEN}',
+    '{"m\\u0061p": {"map_id": "lab-1"}, "S": SEEN}',
+    '{"map": {"map_id": "lab-1", "segments": [[0, 0, 1, 0]]}, "S": SEEN}',
+    '{"map": {"map_id": "hq-1/../lab-1"}, "S": SEEN}',
+    '{"map": {"map_id": ["lab-1"]}, "S": SEEN}',
+]
 
-        def status(bearer: str) -> int:
-            headers = {"authorization": f"Bearer {bearer}"}
-            return httpx.get(service.url + "/v1/limits", headers=headers).status_code
 
-        def write(name: str, text: str) -> None:
-            (tmp_path / "new").write_text(text)
-            os.replace(tmp_path / "new", keys / name)
+@pytest.mark.usefixtures("_a_secret")
+@pytest.mark.parametrize("packed", ["as-it-is", "gzip", "large"])
+def test_a_body_that_names_a_foreign_map(guarded: RunningService, packed: str) -> None:
+    headers = bearer(ASKER) | ({"content-encoding": "gzip"} if packed == "gzip" else {})
+    seen = json.dumps(SCAN)
+    for body in FOREIGN_BODIES:
+        for path, scans, sent in (("/v1/associate", "scan", seen), ("/v1/associate:batch", "scans", f"[{seen}]")):
+            content = body.replace('"S"', f'"{scans}"').replace("SEEN", sent).encode()
+            content = content + b" " * 2_000_000 if packed == "large" else content
+            content = gzip.compress(content) if packed == "gzip" else content
+            answer = guarded.client.post(path, content=content, headers=headers)
+            assert answer.status_code in (404, 422), answer.text
+            assert str(SECRET) not in answer.text
 
-        assert (status("first"), status("second")) == (200, 403)
-        write("robots.toml", key_lines("second", ["associate"]))
-        until(lambda: (status("first"), status("second")) == (403, 200))
-        write("more.toml", key_lines("first", ["read"]))
-        until(lambda: (status("first"), status("second")) == (200, 200))
-        write("more.toml", "this is no TOML, and a secret")
-        until(lambda: "the keys stay as they were" in service.log())
-        assert (status("first"), status("second")) == (200, 200)
-        assert "a secret" not in service.log()
-        (keys / "more.toml").unlink()
-        until(lambda: status("first") == 403)
-        assert status("second") == 200
+
+DEMANDS = [{}, *({"if-none-match": one} for one in ('"1"', "*")), *({"if-match": one} for one in ('"1"', "*", "x"))]
+
+
+@pytest.mark.usefixtures("_a_secret")
+@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE"])
+def test_demands_tell_nothing_of_a_foreign_map(guarded: RunningService, method: str) -> None:
+    def answer(key: str, map_id: str, demand: dict[str, str]) -> tuple[object, ...]:
+        body = examples.MAP if method == "PUT" else None
+        said = guarded.client.request(method, f"/v1/maps/{map_id}", json=body, headers=bearer(key) | demand)
+        fields = {name: value for name, value in said.headers.items() if name not in ("date", "x-request-id")}
+        return said.status_code, fields, said.text.replace(said.headers["x-request-id"], "")
+
+    for key in (READER, WRITER):
+        for demand in DEMANDS:
+            assert answer(key, "lab-1", demand) == answer(key, "lab-2", demand)
+            assert answer(key, "lab-1", demand)[0] in (403, 404)
+
+
+def test_each_request_of_a_connection_shows_its_own_key(guarded: RunningService) -> None:
+    one = f"GET /v1/maps/hq-1 HTTP/1.1\r\n{SHOWN}\r\nHost: x\r\n\r\n"
+    answer = told(guarded, one + "GET /v1/maps/hq-1 HTTP/1.1")
+    assert (answer.count(b"HTTP/1.1 200"), answer.count(b"HTTP/1.1 401")) == (1, 1)
+    answer = told(guarded, one + "GET /v1/maps/lab-1 HTTP/1.1", SHOWN)
+    assert (answer.count(b"HTTP/1.1 200"), answer.count(b"HTTP/1.1 404")) == (1, 1)
+
+
+NO_KEYS = [
+    *("", READER, f"Basic {READER}", f"Bearer {READER}, Bearer {WRITER}", "Bearer", f"Bearer {READER[:-1]}"),
+    *(f"Bearer {READER.upper()}", f"Bearer {READER.replace('k', '%6b')}", f"Bearer {READER} x"),
+    *("Bearer " + "x" * 30_000, "Bearer Schl\u00fcssel-\u202e"),
+]
+
+
+def test_a_key_is_shown_in_one_way(guarded: RunningService) -> None:
+    """Which of two would count is for each server to guess: neither."""
+    shown = [[f"Authorization: {value}"] for value in NO_KEYS]
+    shown += [[SHOWN, f"Authorization: Bearer {WRITER}"], [SHOWN, SHOWN], [f"Authorization : Bearer {READER}"]]
+    shown += [[f"Proxy-Authorization: Bearer {READER}"], [f"Cookie: authorization=Bearer {READER}"]]
+    for lines in shown:
+        assert int(told(guarded, "GET /v1/maps HTTP/1.1", *lines)[9:12]) in (400, 401, 403), lines
+    for right in (f"authorization: bearer \t{READER} ", f"AUTHORIZATION: BEARER   {READER}"):
+        assert told(guarded, "GET /v1/maps HTTP/1.1", right)[9:12] == b"200"
+
+
+def test_keys_come_and_go_without_a_restart(guarded: RunningService) -> None:
+    keys = guarded.data_dir / "keys"
+
+    def status(key: str) -> int:
+        return httpx.get(guarded.url + "/v1/limits", headers=bearer(key)).status_code
+
+    def write(text: str) -> None:
+        (guarded.data_dir / "new").write_text(text)
+        os.replace(guarded.data_dir / "new", keys / "more.toml")
+
+    write(key_lines("first", ["associate"]))
+    until(lambda: (status("first"), status("second")) == (200, 403))
+    write(key_lines("second", ["associate"]))
+    until(lambda: (status("first"), status("second")) == (403, 200))
+    write("this is no TOML, and a secret")
+    until(lambda: "the keys stay as they were" in guarded.log())
+    assert (status("first"), status("second")) == (403, 200)
+    assert "a secret" not in guarded.log()
+    (keys / "more.toml").unlink()
+    until(lambda: status("second") == 403)
+    assert status(READER) == 200

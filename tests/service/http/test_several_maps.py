@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import pytest
 
 from linefix.documents import examples
-from tests.running import RunningService, running
-from tests.service.issuing import key_lines
 
 HALL = [[0.0, 0.0, 9.0, 0.0], [9.0, 0.0, 9.0, 4.5], [9.0, 4.5, 0.0, 4.5], [0.0, 4.5, 0.0, 0.0]]
 ASKED: dict[str, Any] = {
@@ -80,82 +76,3 @@ def test_a_batch_is_searched_on_several_maps(client: httpx.Client) -> None:
     assert [one["map_id"] for one in first["result"]["maps"]] == ["room", "hall"]
     assert second["status_code"] == 422
     assert third["problem"]["errors"][0]["pointer"] == "/priors/2/map_id"
-
-
-def without(name: str) -> dict[str, Any]:
-    return {key: value for key, value in ASKED.items() if key != name}
-
-
-def with_maps(change: Any) -> dict[str, Any]:
-    body = copy.deepcopy(ASKED)
-    change(body["maps"])
-    return body
-
-
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
-        (without("maps"), ""),
-        ({**ASKED, "map": {"segments": HALL}}, ""),
-        ({**ASKED, "maps": []}, "/maps"),
-        ({**ASKED, "maps": ASKED["maps"][:1]}, "/maps"),
-        ({**ASKED, "maps": ASKED["maps"] * 129}, "/maps"),
-        ({**ASKED, "maps": ASKED["maps"] * 2}, "/maps/2/map_id"),
-        (with_maps(lambda maps: maps[1].pop("map_id")), "/maps/1/map_id"),
-        (with_maps(lambda maps: maps[1].update(segments=[])), "/maps/1/segments"),
-        (with_maps(lambda maps: maps[1].update(segments=[[0, 0, 0, 0]])), "/maps/1/segments"),
-        ({**ASKED, "maps": {"prefix": ""}}, "/maps/prefix"),
-        ({**ASKED, "maps": {"prefix": "a/b"}}, "/maps/prefix"),
-        ({**ASKED, "map_weights": {"roof": 0.5}}, "/map_weights"),
-        ({**ASKED, "map_weights": {"room": 1.5}}, "/map_weights"),
-        ({**ASKED, "map_weights": {"room": 0.6, "hall": 0.6}}, "/map_weights"),
-        ({**ASKED, "prior": PRIOR}, "/prior/map_id"),
-        ({**ASKED, "prior": {**PRIOR, "map_id": "roof"}}, "/prior/map_id"),
-        ({**without("maps"), "map": {"segments": HALL}, "map_weights": {"room": 0.5}}, "/map_weights"),
-        ({**without("maps"), "map": {"segments": HALL}, "prior": {**PRIOR, "map_id": "room"}}, "/prior/map_id"),
-    ],
-)
-def test_misuse_is_told_with_its_place(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
-    response = client.post("/v1/associate", json=body)
-    assert response.status_code == 422, response.text
-    problem = response.json()
-    assert problem["code"] == "invalid_request"
-    assert problem["errors"][0]["pointer"].startswith(pointer)
-    assert "roof" not in response.text, "ids that were sent"
-    if not pointer:
-        assert problem["errors"][0]["pointer"] == ""
-        assert "map and maps" in problem["detail"]
-
-
-def test_unknown_maps_are_told(client: httpx.Client) -> None:
-    for maps in ([{"map_id": "room-of-nobody"}, ASKED["maps"][1]], {"prefix": "nobody-"}):
-        response = asked(client, maps=maps)
-        assert (response.status_code, response.json()["code"]) == (404, "unknown_map")
-
-
-ADMIN, ASKER = "the-key-of-the-owner", "the-key-of-the-asker"
-
-
-@pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    folder = tmp_path_factory.mktemp("several")
-    (folder / "keys.toml").write_text(key_lines(ASKER, ["associate"], "hq-"))
-    with running(folder, keys=ADMIN, keys_file=folder / "keys.toml") as service:
-        for name, segments in (("hq-1", HALL), ("hq-2", examples.WALLS), ("lab-1", examples.WALLS)):
-            stored = service.client.put(
-                f"/v1/maps/{name}", json={"segments": segments}, headers={"authorization": f"Bearer {ADMIN}"}
-            )
-            assert stored.status_code == 201
-        yield service
-
-
-def test_a_key_finds_the_maps_of_its_prefix_alone(guarded: RunningService) -> None:
-    headers = {"authorization": f"Bearer {ASKER}"}
-
-    def post(maps: Any) -> httpx.Response:
-        return guarded.client.post("/v1/associate", json={**ASKED, "maps": maps}, headers=headers)
-
-    for prefix in ("h", "hq-"):
-        assert [one["map_id"] for one in post({"prefix": prefix}).json()["maps"]] == ["hq-2", "hq-1"]
-    for maps in ({"prefix": "lab-"}, [{"map_id": "hq-1"}, {"map_id": "lab-1"}]):
-        assert post(maps).status_code == 404

@@ -98,21 +98,6 @@ def test_two_scanners_on_opposite_corners(client: httpx.Client, flipped: bool) -
     assert {pair["view"] for pair in answer["correspondences"]} == {0, 1}
 
 
-def test_a_drive_whose_steps_are_not_exact(client: httpx.Client) -> None:
-    covariance = np.diag([4e-4, 4e-4, 4e-4]).tolist()
-    places = (RigidTransform(0.0, 0.0, 0.0), RigidTransform(-1.0, 0.1, 0.1), RigidTransform(-1.8, 0.4, 0.3))
-    told = (places[0], RigidTransform(-0.98, 0.12, 0.11), RigidTransform(-1.76, 0.41, 0.29))
-    views: list[dict[str, Any]] = [
-        {"segments": seen_from(HERE.compose(at)), "pose": pose_json(said)}
-        for at, said in zip(places, told, strict=True)
-    ]
-    for k in (1, 2):
-        views[k] |= {"covariance": covariance, "relative_to": k - 1}
-    answer = asked(client, {"views": views})
-    assert_here(answer)
-    assert len(answer["correspondences"]) == 18
-
-
 def test_a_scan_taken_while_turning(client: httpx.Client) -> None:
     angles, step = np.linspace(-math.pi, math.pi, 720, endpoint=False), 0.1 / 720
     ranges = []
@@ -133,42 +118,6 @@ VIEW = {"segments": examples.SEEN, "pose": EXACT}
 def test_a_step_may_be_exact_in_some_directions_or_all(client: httpx.Client) -> None:
     for covariance in ([[0, 0, 0], [0, 0, 0], [0, 0, 0]], [[0.01, 0, 0], [0, 0, 0], [0, 0, 0]]):
         assert_here(asked(client, {"views": [VIEW, {**VIEW, "covariance": covariance}]}))
-
-
-LASER = {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0, 1.0]}
-
-
-@pytest.mark.parametrize(
-    ("views", "pointer"),
-    [
-        ([], "/scan/views"),
-        ([VIEW, {"segments": examples.SEEN}], "/scan/views/1/pose"),
-        ([VIEW, {**VIEW, "segments": [[0.0, 0.0, 0.0, 0.0]]}], "/scan/views/1/segments/0"),
-        ([VIEW, {**VIEW, "segments": [[0.0, 0.0, 0.0]]}], "/scan/views/1/segments/0"),
-        ([VIEW, {**VIEW, "point_counts": [3.0], "sigma": -1.0}], "/scan/views/1/sigma"),
-        ([VIEW, {**VIEW, "covariance": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]}], "/scan/views/1/covariance"),
-        ([VIEW, {**VIEW, "covariance": [[200.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]}], "/scan/views/1/covariance"),
-        ([VIEW, {**VIEW, "relative_to": 2}], "/scan/views/1/relative_to"),
-        ([VIEW, {**VIEW, "relative_to": 1}], "/scan/views/1/relative_to"),
-        ([VIEW, {"laser": {**LASER, "angle_increment": 2.0}, "pose": EXACT}], "/scan/views/1/laser/angle_increment"),
-        ([VIEW, {"laser": LASER, "pose": EXACT, "twist": {"vx": 1.0, "omega": 0.0}}], "/scan/views/1"),
-        ([VIEW, {"laser": LASER, "segments": [], "pose": EXACT}], "/scan/views/1"),
-        ([VIEW, {**VIEW, "pose": {"x": 0.0, "y": 0.0, "theta": 90.0}}], "/scan/views/1/pose/theta"),
-    ],
-    ids=range(13),
-)
-def test_what_is_wrong_is_named_by_view(client: httpx.Client, views: list[Any], pointer: str) -> None:
-    problem = asked(client, {"views": views}, 422)
-    assert pointer in [error["pointer"] for error in problem["errors"]], problem
-
-
-def test_limits_of_views(client: httpx.Client) -> None:
-    limits = client.get("/v1/limits").json()
-    told = {name: limits[name] for name in ("max_views", "max_beams_together", "max_segments_together")}
-    assert told == {"max_views": 64, "max_beams_together": 100_000, "max_segments_together": 10_000}
-    assert asked(client, {"views": [VIEW] * 65}, 413)["detail"].startswith("expected at most 64 views, found more")
-    laser = {"angle_min": 0.0, "angle_increment": 1e-4, "ranges": [1.0] * 17_000}
-    assert asked(client, {"views": [{"laser": laser, "pose": EXACT}] * 6}, 413)["code"] == "too_large"
 
 
 def test_views_in_a_batch(client: httpx.Client) -> None:

@@ -14,6 +14,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from linefix.documents import examples
+from tests.issuing import ADMIN
 from tests.running import RunningService
 
 from .plan import shown, verdict
@@ -165,7 +166,7 @@ def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
     verdict(page, "problem")
     expect(page.locator("#message")).to_contain_text("Key")
     page.locator("#access summary").click()
-    page.locator("#key").fill("sesame")
+    page.locator("#key").fill(ADMIN)
     page.get_by_role("button", name="Search").click()
     verdict(page, "usable")
 
