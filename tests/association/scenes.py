@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from association import (
+    AssociationDiagnostics,
     AssociationOptions,
     AssociationResult,
     Beams,
@@ -233,6 +234,11 @@ def pose_in(result: AssociationResult) -> RigidTransform:
     """Return the pose of an answer that has one."""
     assert result.pose is not None
     return result.pose
+
+
+def diagnostics_in(result: AssociationResult) -> AssociationDiagnostics:
+    assert result.diagnostics is not None
+    return result.diagnostics
 
 
 def covariance_in(result: AssociationResult) -> Floats:

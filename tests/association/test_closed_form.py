@@ -17,6 +17,7 @@ from .scenes import (
     answer_of,
     carried,
     covariance_in,
+    diagnostics_in,
     equal_rooms,
     index_of,
     pose,
@@ -70,11 +71,10 @@ def test_a_room_of_four_walls_and_a_scan_from_a_known_pose() -> None:
             assert (pair.offset, pair.angle) == pytest.approx((0.0, 0.0), abs=1e-9)
             assert pair.overlap == pytest.approx(1.0, abs=1e-9)
             assert pair.alternatives == ()
-        assert result.diagnostics is not None
-        assert result.diagnostics.inlier_fraction == pytest.approx(1.0)
-        assert result.diagnostics.registration.pairs == 4
-        assert result.diagnostics.registration.dof == 5
-        assert result.diagnostics.registration.chi2 == pytest.approx(0.0, abs=1e-9)
+        assert diagnostics_in(result).inlier_fraction == pytest.approx(1.0)
+        assert diagnostics_in(result).registration.pairs == 4
+        assert diagnostics_in(result).registration.dof == 5
+        assert diagnostics_in(result).registration.chi2 == pytest.approx(0.0, abs=1e-9)
 
 
 def test_residuals_are_those_of_the_formulas() -> None:
@@ -149,8 +149,7 @@ def test_the_pose_is_the_least_squares_estimate() -> None:
         x = x - np.linalg.lstsq(jacobian, residuals(x))[0]
     result = answer_of_four(ends)
     assert same_pose(pose_in(result), RigidTransform(*x.tolist()), 1e-6, 1e-6)
-    assert result.diagnostics is not None
-    assert result.diagnostics.registration.chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
+    assert diagnostics_in(result).registration.chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
 
 
 def test_an_exact_scan_gives_the_exact_pose_and_every_pair() -> None:
@@ -240,16 +239,15 @@ def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> 
     result = answer_of(index_of(ROOM, sigma), scan)
     pairs = [[one.scan, one.map] for one in result.correspondences]
     again = register(Segments.from_array(ROOM), scan.measured, pairs, sigma, RegistrationOptions())
-    assert result.diagnostics is not None
-    assert result.diagnostics.corrections is None
+    assert diagnostics_in(result).corrections is None
     assert again.pose is not None
     assert same_pose(again.pose, pose_in(result), 1e-6, 1e-6)
-    assert again.diagnostics.dof == result.diagnostics.registration.dof
+    assert again.diagnostics.dof == diagnostics_in(result).registration.dof
     if sigma > 0.0:
         return
     assert again.covariance is not None
     np.testing.assert_allclose(again.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
-    assert again.diagnostics.chi2 == pytest.approx(result.diagnostics.registration.chi2, rel=1e-6)
+    assert again.diagnostics.chi2 == pytest.approx(diagnostics_in(result).registration.chi2, rel=1e-6)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03, None])
@@ -260,6 +258,7 @@ def test_an_equal_room_has_the_same_numbers(sigma: float | None) -> None:
     (other,), diagnostics = result.alternatives, result.diagnostics
     assert diagnostics is not None
     assert (other.score, other.inlier_fraction) == pytest.approx((diagnostics.score, diagnostics.inlier_fraction))
+    assert other.probability == pytest.approx(result.probability, rel=1e-3)
     assert other.reliability == pytest.approx(diagnostics.registration.reliability)
     for name in ("rotation", "translation"):
         expected = getattr(diagnostics.registration.ambiguity, name)

@@ -95,16 +95,6 @@ def test_select(values: list[float], place: float) -> None:
 
 
 @settings(deadline=None, max_examples=40)
-@given(seed=seeds, isotropic=st.booleans(), a=st.integers(0, 30), length=st.integers(0, 40))
-def test_the_cost_of_a_stretch_comes_from_running_sums(seed: int, isotropic: bool, a: int, length: int) -> None:
-    points, rays = drawn(seed, isotropic=isotropic)
-    b = min(40, a + length)
-    sums, _ = stretches(records(points, rays), scanner_of())
-    expected = reference.stretch_cost(points[a:b], rays[a:b], VARIANCE, FLOOR)
-    assert pieces.line_cost(sums[a], sums[b], scanner_of()[0]) == pytest.approx(expected, rel=1e-6, abs=1e-6)
-
-
-@settings(deadline=None, max_examples=40)
 @given(seed=seeds, increment=st.sampled_from([0.0, 0.01]), max_gap=st.sampled_from([0.05, math.inf]))
 def test_gaps_are_where_the_twin_finds_them(seed: int, increment: float, max_gap: float) -> None:
     points, rays = drawn(seed)
@@ -133,18 +123,6 @@ def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed:
     moved = pieces.move_breaks(left, sums, gaps, scanner)
     assert bounds(left) == expected
     assert moved == (before != expected)
-
-
-def test_a_corner_is_split_at_the_corner() -> None:
-    points = np.vstack(
-        [np.stack([np.arange(10.0), np.zeros(10)], 1), np.stack([np.full(8, 9.5), np.arange(1.0, 9)], 1)]
-    )
-    measured, scanner = records(points, np.zeros_like(points)), scanner_of(0.0, default_gap=2.0)
-    sums, gaps = stretches(measured, scanner)
-    parts = np.array([(0, 7), (7, 18)], PIECE)
-    for _ in range(3):
-        pieces.move_breaks(parts, sums, gaps, scanner)
-    assert bounds(parts) == [(0, 10), (10, 18)]
 
 
 def noisy_wall(seed: int, n: int = 60, sigma: float = 0.02) -> tuple[Floats, Floats]:
@@ -202,13 +180,6 @@ def test_the_noise_estimates_are_the_twins(seed: int) -> None:
     assert noise_of_ranges(measured, 0.01, measured) == pytest.approx(max(expected or UNKNOWN_SIGMA, LEAST_SIGMA))
     expected = reference.window_noise(points, WINDOW, MEDIAN_CHI)
     assert noise_of_points(points) == pytest.approx(max(expected, LEAST_SIGMA))
-
-
-@pytest.mark.parametrize("sigma", [0.005, 0.02, 0.05])
-def test_the_noise_of_a_wall_is_found(sigma: float) -> None:
-    ranges, rays = noisy_wall(4, 4000, sigma)
-    step, points = math.acos(rays[0] @ rays[1]), records(ranges[:, None] * rays, rays)
-    assert noise_of_ranges(points, step, points) == pytest.approx(sigma, rel=0.08)
 
 
 def test_too_few_points_say_nothing_of_noise() -> None:

@@ -11,7 +11,7 @@ from association.layout import OBSERVATION
 from association.tables import Model
 from registration.layout import Floats
 
-from .drawn import SEEDS
+from .reference import SEEDS
 
 VARIANCE = 0.02**2
 

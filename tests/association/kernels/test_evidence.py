@@ -18,7 +18,7 @@ from association.verdict.kernels.things import compare_things
 from association.verdict.tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 from registration.layout import POSE
 
-from .drawn import SEEDS
+from .reference import SEEDS
 
 
 @given(seed=SEEDS)

@@ -1,4 +1,4 @@
-"""Points of a map stop beams, as legs of tables do; they are never part of a hypothesis."""
+"""Evidence of beams: walls and free space that no segment shows, and points of a map as legs of tables."""
 
 from __future__ import annotations
 
@@ -7,15 +7,29 @@ import math
 import numpy as np
 import pytest
 
-from association import NO_POINTS, InvalidMapError, MapIndex, MapPart, MapPoints, associate, associate_on_maps, map_set
+from association import (
+    NO_POINTS,
+    AssociationResult,
+    InvalidMapError,
+    MapIndex,
+    MapPart,
+    MapPoints,
+    Scan,
+    Status,
+    associate,
+    associate_on_maps,
+    map_set,
+)
 from registration import RigidTransform, Segments
 
 from .scenes import (
+    CORRIDOR,
     INSIDE,
     ROOM,
     Floats,
     answer_of,
     box,
+    diagnostics_in,
     equal_rooms,
     index_of,
     pose,
@@ -27,6 +41,61 @@ from .scenes import (
     seen,
     without_beams,
 )
+
+# --- What is seen through, and what is not there ----------------------------------------------------------------------
+
+
+def best_of_two_rooms(walls: Floats, scan: Scan, at: RigidTransform) -> AssociationResult:
+    result = answer_of(index_of(walls), scan)
+    assert same_pose(pose_in(result), at)
+    assert (diagnostics_in(result).margin or 0.0) > 0.5
+    return result
+
+
+def test_a_wall_that_should_hide_another_counts_against_a_pose() -> None:
+    """Two equal rooms, one with a screen across that the scan sees through: it is the other one."""
+    rooms = np.vstack([equal_rooms(2), [[16.5, 0.5, 16.5, 3.5]]])
+    at = pose(3.0, 2.0, 0.3)
+    ends = seen(ROOM, at, noise=0.005, seed=3)[0]
+    assert answer_of(index_of(rooms), scan_of(ends)).status is Status.AMBIGUOUS
+    best_of_two_rooms(rooms, scan_of(ends, viewpoint=(0.0, 0.0)), at)
+    other = answer_of(index_of(rooms[len(ROOM) :]), scan_of(ends, viewpoint=(0.0, 0.0)))
+    assert other.missing_map == (len(ROOM),)
+
+
+def test_beams_show_what_no_segment_does() -> None:
+    """One of two equal rooms has an annex."""
+    niche = [[0, 0, 9, 0], [9, 0, 9, 1.5], [9, 1.5, 10.5, 1.5], [10.5, 1.5, 10.5, 2.5], [10.5, 2.5, 9, 2.5],
+             [9, 2.5, 9, 4]]  # fmt: skip
+    walls = np.vstack([ROOM, np.array([*niche, *ROOM[2:]]) + np.tile([20.0, 0.0], 2)])
+    at = pose(3.0, 2.0, 0.3)
+    ends = seen(ROOM[2:], at)[0]
+    assert answer_of(index_of(walls), scan_of(ends, viewpoint=(0.0, 0.0))).status is Status.AMBIGUOUS
+    best_of_two_rooms(walls, scan_of(ends, viewpoint=(0.0, 0.0), beams=ranges(ROOM, at, sigma=1e-4).beams), at)
+
+
+def test_a_wall_that_was_seen_is_not_missing() -> None:
+    """Rays to the wall that is met edge-on graze the end of its neighbour."""
+    walls = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+    scan = [[-2, 1, -2, -5], [-2, -5, 0, -5], [0, -5, 0, -3], [0, -3, 3, -3], [3, -3, 3, 1]]
+    result = answer_of(index_of(walls), scan_of(scan, viewpoint=(0.0, 0.0)))
+    assert not set(result.missing_map) & {c.map for c in result.correspondences}
+
+
+def test_beams_show_where_along_a_corridor() -> None:
+    """The segments are those of the two long walls; single beams meet the one end that is closed."""
+    walls, at = np.vstack([CORRIDOR, [[0.0, 2.0, 0.0, 0.0]]]), pose(7.0, 0.8, 0.1)
+    index, ends = index_of(walls), seen(CORRIDOR, at, cut=0.5, seed=2)[0]
+    blind = answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0)))
+    beams = ranges(walls, at, sigma=1e-4).beams
+    with_beams = answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0), beams=beams))
+    assert blind.status is Status.DEGENERATE
+    assert not with_beams.usable or same_pose(pose_in(with_beams), at)
+    assert abs(pose_in(blind).x - at.x) > 0.5
+    assert same_pose(pose_in(with_beams), at, 0.1, 0.1)
+
+
+# --- Points of a map --------------------------------------------------------------------------------------------------
 
 WALLS = Segments.from_array(ROOM)
 POST = (2.0, 2.5)
@@ -56,8 +125,7 @@ def test_points_tell_equal_rooms_apart() -> None:
     other = next(one for one in found.alternatives if same_pose(one.pose, INSIDE))
     assert probability_in(found) > 2.0 * (other.probability or 0.0)
     blind = answer_of(pointed, without_beams(scan))
-    assert blind.diagnostics is not None
-    assert blind.diagnostics.margin == pytest.approx(0.0, abs=1e-6)
+    assert diagnostics_in(blind).margin == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_beam_that_passes_a_point_is_no_evidence() -> None:
@@ -65,10 +133,8 @@ def test_a_beam_that_passes_a_point_is_no_evidence() -> None:
     at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
     scan = ranges(equal_rooms(2), at, 1)
     bare, pointed = (answer_of(one, scan) for one in (index_of(equal_rooms(2)), with_points(equal_rooms(2), LEGS)))
-    assert pointed.diagnostics is not None
-    assert bare.diagnostics is not None
     assert (pointed.status, pointed.usable) == (bare.status, bare.usable)
-    assert pointed.diagnostics.margin == pytest.approx(bare.diagnostics.margin, abs=1.0)
+    assert diagnostics_in(pointed).margin == pytest.approx(diagnostics_in(bare).margin, abs=1.0)
 
 
 def test_points_are_never_a_base_or_a_pair() -> None:

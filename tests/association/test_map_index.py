@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import time
 import tracemalloc
 from typing import Any
 
@@ -20,19 +18,24 @@ from association.index.tuning import (
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
-    NEIGHBOURHOOD,
     SWEEP_CELL,
 )
 from association.tables import Walls
 from association.tuning import REACH, SECTORS
 from registration import Segments
-from registration.layout import Floats
+from registration.layout import Floats, Records
 
-from ..reference.geometry import cell_of, direction, listed, normal, point
-from ..reference.walls import distance_to_cell
-from ..scenes import ROOM, index_of, maze
+from .scenes import ROOM, index_of, maze
 
 MAZE_INDEX = index_of(maze(1))
+
+
+def cell_of(shape: Records, at: Floats) -> int | None:
+    """Return the number of the cell that a point lies in, None outside the grid."""
+    grid = shape[0]
+    column, row = np.floor((at - np.array([grid["x0"], grid["y0"]])) / grid["cell"]).astype(int).tolist()
+    inside = 0 <= column < grid["columns"] and 0 <= row < grid["rows"]
+    return int(row * grid["columns"] + column) if inside else None
 
 
 def lengths(walls: Walls) -> Floats:
@@ -95,10 +98,12 @@ def test_walls_name_their_neighbours_across_doorways() -> None:
 def test_grid_lists_every_wall_within_reach() -> None:
     rows = MAZE_INDEX.walls.rows
     for at in np.random.default_rng(0).uniform(-14.0, 14.0, (400, 2)):
-        along, across = direction(rows) @ at, normal(rows) @ at - rows["offset"]
+        along = rows["dx"] * at[0] + rows["dy"] * at[1]
+        across = rows["dx"] * at[1] - rows["dy"] * at[0] - rows["offset"]
         beyond = np.maximum(0.0, np.maximum(rows["begin"] - along, along - rows["end"]))
         near = np.nonzero(np.hypot(across, beyond) <= REACH)[0]
-        assert set(near.tolist()) <= set(listed(MAZE_INDEX.grid, at))
+        grid, cell = MAZE_INDEX.grid, cell_of(MAZE_INDEX.grid.shape, at)
+        assert set(near.tolist()) <= (set() if cell is None else set(grid.items[slice(*grid.starts[cell : cell + 2])]))
 
 
 def test_raster_has_the_directions_of_what_is_near() -> None:
@@ -164,49 +169,6 @@ def test_built_without_directions_it_is_its_own_undirected() -> None:
     assert np.array_equal(index.segments.endpoints, np.vstack([segments.endpoints, turned]))
 
 
-def test_the_sweep_lists_the_sector_of_every_chain() -> None:
-    chains, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
-    off = (MAZE_INDEX.sweep.chains["angle"][chains] + math.pi - sectors * math.tau / SECTORS) % math.tau
-    assert set(chains) == set(range(len(MAZE_INDEX.chains.rows)))
-    assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
-
-
-def test_the_sweep_lists_chains_where_they_are() -> None:
-    sweep = MAZE_INDEX.sweep
-    starts, shape, ends = (
-        sweep.sectors.starts,
-        sweep.sectors.shape,
-        ends_of(MAZE_INDEX.chains._replace(rows=sweep.chains)),
-    )
-    chains = sweep.sectors.items // SECTORS
-    cells = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    for cell, chain in zip(cells[::3].tolist(), chains[::3].tolist(), strict=True):
-        assert distance_to_cell(ends[chain], cell, shape) < 0.1
-    for cell, present in enumerate(sweep.present.tolist()):
-        there = set((sweep.sectors.items[starts[cell] : starts[cell + 1]] % SECTORS).tolist())
-        assert {s for s in range(SECTORS) if present >> s & 1} == there
-
-
-def test_chains_that_are_near_one_another_are_numbered_together() -> None:
-    """What is swept one after the other is then read from one place."""
-    corners = np.random.default_rng(0).uniform(0.0, 300.0, (400, 2))
-    index = index_of(np.hstack([corners, corners + np.array([3.0, 0.0])]))
-    assert sorted(index.sweep.chains.tolist()) == sorted(index.chains.rows.tolist())
-    np.testing.assert_array_equal(index.sweep.lengths, index.sweep.chains["end"] - index.sweep.chains["begin"])
-    middles = ends_of(index.chains._replace(rows=index.sweep.chains)).reshape(-1, 2, 2).mean(axis=1)
-    squares = [tuple(square) for square in np.round(middles / NEIGHBOURHOOD).tolist()]
-    assert len([*itertools.groupby(squares)]) == len(set(squares)) > 20
-
-
-def test_area_and_crowd_are_those_of_the_grid() -> None:
-    index = index_of([[0, 0, 4, 0], [0, 5, 2, 5], [8, 0, 8, 3], [3, 3, 2, 3]])
-    columns, rows = index.grid.shape["columns"][0], index.grid.shape["rows"][0]
-    assert index.area == pytest.approx(CELL**2 * columns * rows)
-    assert (8.0 + 2.0 * REACH) * (5.0 + 2.0 * REACH) < index.area < 13.0 * 10.0
-    counts = np.diff(index.grid.starts)
-    assert index.crowd == pytest.approx((counts**2).sum() / counts.sum())
-
-
 def test_its_memory_is_known() -> None:
     """The size that a cache counts is right within a tenth."""
     ends = np.random.default_rng(0).uniform(0.0, 300.0, (20_000, 2))
@@ -233,14 +195,8 @@ def test_memory_is_capped_whatever_the_extent() -> None:
         shape = grid.shape[0]
         assert shape["cell"] > size
         assert shape["columns"] * shape["rows"] < 1.01 * most
-        assert all(cell_of(grid.shape, end) is not None for end in (point(index.pieces.ends, "x1", "y1")))
-
-
-def test_a_heap_of_equal_pieces_is_indexed_in_bounded_time() -> None:
-    """Where thousands begin in one place a look at all others would go with the square of their number."""
-    begun = time.thread_time()  # what others take of the processor does not count
-    index_of(np.tile(ROOM, (5000, 1)))
-    assert time.thread_time() - begun < 10.0  # by the square: more than a minute
+        ends = np.stack([index.pieces.ends["x1"], index.pieces.ends["y1"]], axis=1)
+        assert all(cell_of(grid.shape, end) is not None for end in ends)
 
 
 @pytest.mark.parametrize(
@@ -257,10 +213,3 @@ def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
     with pytest.raises(InvalidMapError) as refused:
         index_of(endpoints, sigma)
     assert refused.value.argument == argument
-
-
-def test_what_every_search_asks_of_a_map_is_there_before_the_first() -> None:
-    """Else that one takes as long again, in a small map."""
-    index = index_of(ROOM)
-    assert vars(index).keys() >= {"crowd", "area", "diagonal", "tables"}
-    assert "undirected" not in vars(index), "which is as large, and seldom asked for"

@@ -15,13 +15,12 @@ from association.index.tuning import CHAIN_GAP, MOST_LOOKS
 from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
 from association.tuning import SECTORS
 from registration import Segments
-from registration.layout import Floats, Records
+from registration.layout import Floats
 
-from ...kernels.drawn import SEEDS
-from ...reference import walls as twin
-from ...scenes import maze
+from ..scenes import maze
+from . import reference as twin
+from .reference import SEEDS
 
-NO_SECTORS = np.zeros(100, np.int32)
 SHAPE = record(GRID_SHAPE, x0=-7.3, y0=-9.1, cell=1.7, columns=27, rows=29)  # holds the maze and 6 m around it
 
 
@@ -106,10 +105,6 @@ def test_one_piece_is_compared_with_so_many() -> None:
     assert labels_of(ends[: MOST_LOOKS // 2], 0.3, 0.03, 0.035)[:2] == [0, 0]
 
 
-def test_no_pieces() -> None:
-    assert collinear_groups(np.zeros(0, ENDS), np.zeros(0, POINT), join_gates(0.3, 0.03), None).tolist() == []
-
-
 def turned_maze(seed: int) -> Floats:
     """Return the maze turned by an angle, so that walls lie across cells, with one along each axis."""
     angle = np.random.default_rng(seed).uniform(-math.pi, math.pi)
@@ -118,37 +113,23 @@ def turned_maze(seed: int) -> Floats:
     return np.vstack([inner.reshape(-1, 4), [[0.0, 3.0, 20.0, 3.0], [5.0, 30.0, 5.0, 2.0]]])
 
 
-def lists_of(ends: Floats, radius: float, shape: Records) -> list[list[int]]:
-    starts, items, _ = walls.grid_cells(as_records(ENDS, ends), NO_SECTORS[: len(ends)], radius, shape, True)
-    assert starts[0] == 0
-    assert starts[-1] == len(items)
-    return [items[a:b].tolist() for a, b in itertools.pairwise(starts)]
-
-
 @given(SEEDS)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_grid_cells(seed: int) -> None:
-    ends = turned_maze(seed)
-    for radius in (0.02, 0.4, 2.0):
-        assert lists_of(ends, radius, SHAPE) == twin.grid_cells(ends, radius, SHAPE)
+    """A wall is listed where it is near, and not farther than the diagonal of what its reach adds to a cell.
 
-
-def test_every_wall_is_listed_where_it_is_near() -> None:
-    """And nowhere that it is farther from than the diagonal of what its reach adds to a cell."""
-    ends, radius = turned_maze(0), 0.7
-    for cell, listed in enumerate(lists_of(ends, radius, SHAPE)):
-        for i in range(len(ends)):
-            distance = twin.distance_to_cell(ends[i], cell, SHAPE)
-            assert i in listed or distance > radius - 1e-9
-            assert i not in listed or distance < math.sqrt(2.0) * radius + 0.05
-
-
-@given(SEEDS)
-@settings(max_examples=30, deadline=None)
-def test_directions_near_each_cell(seed: int) -> None:
-    """With lists or without."""
-    ends = turned_maze(seed)
+    The directions of a cell are those of the walls that it lists, whether it lists them or not.
+    """
+    ends, radius = turned_maze(seed), (0.02, 0.4, 2.0)[seed % 3]
     sectors = np.random.default_rng(seed).integers(0, SECTORS, len(ends)).astype(np.int32)
-    expected = twin.direction_raster(ends, 0.43, SHAPE, sectors)
-    for listing in (True, False):
-        assert walls.grid_cells(as_records(ENDS, ends), sectors, 0.43, SHAPE, listing)[2].tolist() == expected
+    starts, items, bits = walls.grid_cells(as_records(ENDS, ends), sectors, radius, SHAPE, True)
+    assert walls.grid_cells(as_records(ENDS, ends), sectors, radius, SHAPE, False)[2].tolist() == bits.tolist()
+    assert (starts[0], starts[-1]) == (0, len(items))
+    distances = np.array([twin.distances_to_cells(end, SHAPE) for end in ends])
+    for cell, (begin, end) in enumerate(itertools.pairwise(starts)):
+        listed = items[begin:end].tolist()
+        assert listed == sorted(set(listed))
+        assert bits[cell] == sum({1 << int(sectors[i]) for i in listed})
+        for i in range(len(ends)):
+            assert i in listed or distances[i, cell] > radius - 1e-9
+            assert i not in listed or distances[i, cell] < math.sqrt(2.0) * radius + 0.05

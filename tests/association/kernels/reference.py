@@ -1,20 +1,73 @@
-"""Twins of the kernels that make lines of a scan's segments and describe them."""
+"""Slow, obviously right references of the kernels that Python calls, and what is drawn for both."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 from association.layout import LINE_PARTS, SCAN_LINE
 from association.scan.tuning import LEAST_SPREAD, LEAST_VARIANCE, LINE_GAP
 from association.tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, LOOSE_WALLS, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
-from registration import MeasuredSegments, RigidTransform, Segments
+from registration import MeasuredSegments, Segments
 from registration.layout import LEAST_POINTS, Floats, Record, Records
 
-from .consensus import Pairs, log_determinant
-from .geometry import TURN
+SEEDS = st.integers(0, 2**31 - 1)
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])  # by 90 degrees
+
+
+def assert_records(got: Records, expected: Records, **tolerance: Any) -> None:
+    """Compare records field by field."""
+    assert got.dtype == expected.dtype
+    for name in expected.dtype.names or ():
+        np.testing.assert_allclose(got[name], expected[name], err_msg=name, **tolerance)
+
+
+def point(record: Record, x: str = "x", y: str = "y") -> Floats:
+    """Return two fields of a record as a vector; of an array (n,) as (n, 2)."""
+    return np.array((record[x], record[y])).T
+
+
+# --- Walls of a map ---------------------------------------------------------------------------------------------------
+
+
+def collinear_groups(ends: Floats, max_gap: float, max_lateral: float, max_angle: float) -> list[int]:
+    """Compare every piece with the begin of every other; label by the lowest index that links lead to.
+
+    One that begins along another has to end next to its line, too.
+    """
+    count = len(ends)
+    label = list(range(count))
+    turns = np.arctan2(ends[:, 3] - ends[:, 1], ends[:, 2] - ends[:, 0])
+    for i in range(count):
+        d = np.array([math.cos(turns[i]), math.sin(turns[i])])
+        for j in range(count):
+            begin, end = ends[j, :2] - ends[i, 2:], ends[j, 2:] - ends[i, 2:]
+            length, along = math.dist(ends[i, :2], ends[i, 2:]), begin @ d
+            aside, beyond = (abs(gap @ [-d[1], d[0]]) for gap in (begin, end))
+            turn = abs(math.remainder(turns[j] - turns[i], math.tau))
+            continues = abs(along) <= max_gap
+            repeats = -length - max_gap <= along <= max_gap and beyond <= max_lateral
+            if i != j and (continues or repeats) and aside <= max_lateral and turn <= max_angle:
+                one, other = sorted((label[i], label[j]))
+                label = [one if value == other else value for value in label]
+    return label
+
+
+def distances_to_cells(end: Floats, shape: Records) -> Floats:
+    """Return the least distance of a segment from each cell of a grid, metres, by many points along it."""
+    grid = shape[0]
+    row, column = np.divmod(np.arange(grid["columns"] * grid["rows"]), grid["columns"])
+    low = point(grid, "x0", "y0") + grid["cell"] * np.stack([column, row], axis=1)[:, None]
+    points = end[:2] + np.linspace(0.0, 1.0, 501)[:, None] * (end[2:] - end[:2])
+    beyond = np.maximum(0.0, np.maximum(low - points, points - low - grid["cell"]))
+    return np.asarray(np.hypot(beyond[..., 0], beyond[..., 1]).min(axis=1))
+
+
+# --- Lines of a scan --------------------------------------------------------------------------------------------------
 
 
 def longest_first(lengths: Floats) -> list[int]:
@@ -120,11 +173,13 @@ def _moments(measured: MeasuredSegments, points: Floats) -> tuple[Floats, Floats
 
 
 def freedom_alone(line: Record, model: Record) -> float:
-    """Return what freedom one line takes, on a wall that lies as it does."""
-    wall = np.zeros(1, [("dx", float), ("dy", float), ("offset", float)])
-    wall["dx"], wall["dy"] = line["dx"], line["dy"]
-    alone = Pairs.of(np.array([line], SCAN_LINE), np.zeros(1, int), wall, float(model["wall_variance"]))
-    return log_determinant(alone.information(RigidTransform(0.0, 0.0, 0.0).theta), model)
+    """Return half of the log-determinant of ``1 + F S`` for the information F of one line on a wall as it lies."""
+    d, m = point(line, "dx", "dy"), point(line, "centroid_x", "centroid_y")
+    n = TURN @ d
+    rows = np.array([[*n, n @ TURN @ m], [0.0, 0.0, math.sqrt(line["spread"])]])
+    variances = 1.0 / line["weight"] + np.array([model["wall_variance"], 0.0])
+    s = np.diag([model["free_distance"], model["free_distance"], model["free_angle"]]) ** 2
+    return 0.5 * float(np.log(np.linalg.det(np.eye(3) + (rows.T / variances) @ rows @ s)))
 
 
 def describe_lines(lines: Records, variances: Record, model: Record) -> tuple[list[int], Records]:
