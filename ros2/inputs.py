@@ -128,9 +128,14 @@ class Inputs:
             self._log(f"no odometry: {self._reason(topic)}; without it, scans agree only at rest")
         elif odometry.jump:
             count = topic.publishers
+            remedy = (
+                f"stop all but one of the {count} publishers of {topic.name}"
+                if count > 1
+                else "its publisher was reset, or merges two sources"
+            )
             self._log(
-                f"odometry on {odometry.source} contradicts itself: {odometry.jump}, found {count} publishers of "
-                f"{topic.name}; stop one of them. Odometry near such steps is not used"
+                f"odometry on {odometry.source} contradicts itself: {odometry.jump}; {remedy}. Odometry near such "
+                "steps is not used"
             )
         elif self._apart >= 3 and self._latency is not None:
             now = time.monotonic_ns()
@@ -144,7 +149,7 @@ class Inputs:
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._options.domain
         if topic.publishers:
-            silent = f"no message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
+            silent = f"no valid message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
             return f"{silent}; check the driver and the network"
         if topic.incompatible:
             return (

@@ -160,7 +160,7 @@ def test_missing_odometry_is_logged_and_that_of_the_map_frame_is_refused(
         robot.until(robot.poses, lambda: robot.scans.publish(scan(1)), is_at_truth)
         for k in range(30):
             robot.odometry.publish(told(k * TENTH, 0.1 * k, "map"))
-        wait_until(lambda: any("no odometry: no message on /odom" in line for line in logged), lambda: logged)
+        wait_until(lambda: any("no odometry: no valid message on /odom" in line for line in logged), lambda: logged)
         refused = [line for line in logged if 'found odometry in "map", the frame of the map' in line]
         assert len(refused) == 1
         assert robot.transforms.take() == []
