@@ -3,6 +3,7 @@
 import { analyze } from "./api";
 import { asStored, changed, kept, onChange, state, type Shown } from "./state";
 import type { Analysis } from "./types";
+import { messageOf } from "./words";
 
 const value = (id: string) => document.querySelector<HTMLInputElement>(id)!.value;
 const button = document.querySelector<HTMLButtonElement>("#analyze")!;
@@ -39,7 +40,7 @@ button.addEventListener("click", async () => {
     state.show = landmark.length ? "landmark" : drive ? "driven" : "now";
     text.textContent = summaryOf(found, drive);
   } catch (error) {
-    text.textContent = error instanceof Error ? error.message : String(error);
+    text.textContent = messageOf(error);
   } finally {
     button.disabled = false;
     changed();

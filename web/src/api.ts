@@ -1,6 +1,7 @@
 // Requests to the service that this page comes from.
 
 import type * as contract from "./contract";
+import { sentenceOf } from "./words";
 import type { Asked, Imported, ImportedScans, MapDocument, Proposal, Scan } from "./types";
 
 export class Problem extends Error {
@@ -44,9 +45,8 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
 
 function problemOf(status: number, answer: unknown): Problem {
   const { detail, code } = answer as { detail?: string; code?: string };
-  const stated = detail ?? `The service rejected the request with status ${status}.`;
-  const hint = status === 401 || status === 403 ? " (see Key below)." : "";
-  return new Problem(stated + hint, status, code ?? "");
+  const stated = sentenceOf(code ?? "", detail ?? `The service rejected the request with status ${status}.`);
+  return new Problem(stated + (status === 403 ? " (see Key below)." : ""), status, code ?? "");
 }
 
 const JSON_TYPE = "application/json";
@@ -85,7 +85,7 @@ async function importing<T>(path: string, files: File[], fields: Record<string, 
     return await call<T>("POST", path, form);
   } catch (error) {
     // The service does not repeat names that were sent.
-    if (error instanceof Problem) error.message = error.message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole);
+    if (error instanceof Problem) error.message = error.message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole).replace(/^\/files: /, "");
     throw error;
   }
 }

@@ -47,12 +47,12 @@ export async function ask(): Promise<boolean> {
   }
   running?.abort();
   const mine = (running = new AbortController());
-  const of = state.mapId;
+  const { mapId: of, scan } = state;
   try {
     const found = await associate(made.asked, mine.signal);
     const answer: Answer = { ...found, unmatched_scan: found.unmatched_scan.map((one) => (typeof one === "number" ? one : one.scan)) };
     const sentTo = state.floors.length && answer.map?.map_id !== of ? [] : made.sentTo;
-    Object.assign(state, { answer, sent: made.asked, sentTo, others: countedOf(answer), other: -1 });
+    Object.assign(state, { answer, sent: made.asked, answered: scan, sentTo, others: countedOf(answer), other: -1 });
   } catch (error) {
     if (mine !== running || (error instanceof DOMException && error.name === "AbortError")) return false;
     forget();

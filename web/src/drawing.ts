@@ -1,18 +1,19 @@
 // Everything on the canvas, from the state alone.
 
 import { CODES, colourOf, drawChanges } from "./changes";
-import { place, placed, pointsOf } from "./geometry";
+import { beamsOf, place, placed, pointsOf } from "./geometry";
 import { drawGrid, drawPicture } from "./ground";
 import { drawHeat, kindOf } from "./heat";
 import { answerHere, state, wallOf } from "./state";
-import type { Answer, LogLine, Pose, Scan, Segment } from "./types";
+import type { Answer, Pose, Scan, Segment } from "./types";
+import { FADED, passes } from "./timeline";
 import { toPixels, view } from "./view";
 import { drawWalls } from "./walls";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const context = canvas.getContext("2d")!;
 /** Everything that has a colour of its own, in the style sheet and in the legend. */
-const NAMES = ["grid", "wall", "off", "added", "robot", "scan", "matched", "unmatched", "missing", "critical", "estimate", "other"];
+const NAMES = ["grid", "wall", "off", "added", "robot", "scan", "beam", "matched", "unmatched", "missing", "critical", "estimate", "other"];
 export const KINDS = ["usable", "ambiguous", "degenerate", "no_match"];
 export let colours: Record<string, string> = {};
 let frame = 0;
@@ -49,13 +50,10 @@ function draw(): void {
   context.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
   context.clearRect(0, 0, view.width, view.height);
   context.lineCap = "round";
-  drawPicture(context);
+  if (state.layers.map) drawPicture(context);
   drawHeat(context, colours);
   drawGrid(context, colours.grid);
-  drawWalls(context, colours.wall, redraw);
-  drawPoints();
-  for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.added, 3);
-  for (const k of state.off) line(state.walls[k], colours.off, 4, [3, 5]);
+  if (state.layers.map) drawMap();
   drawChanges(context, colours, line);
   const { answer, sent, pointed } = state;
   if (state.analysis && pointed?.similar_pose) drawSimilar(pointed.pose, pointed.similar_pose);
@@ -64,6 +62,13 @@ function draw(): void {
   if (scan && !state.virtual && !state.log.length) drawScan(scan, state.robot, "robot", 0.35);
   if (answer && sent) drawAnswer(sent.scan);
   if ((scan && !state.log.length) || state.virtual) drawRobot(state.robot, "robot", true);
+}
+
+function drawMap(): void {
+  drawWalls(context, colours.wall, redraw);
+  drawPoints();
+  for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.added, 3);
+  for (const k of state.off) line(state.walls[k], colours.off, 4, [3, 5]);
 }
 
 function drawPoints(): void {
@@ -87,6 +92,8 @@ function line([x1, y1, x2, y2]: Segment, colour: string, width: number, dashes: 
 }
 
 function drawScan(scan: Scan, pose: Pose, name: string, alpha: number): void {
+  if (state.layers.beams) for (const beam of beamsOf(scan)) line(placed(pose, beam), colours.beam, 1);
+  if (!state.layers.scan) return;
   context.globalAlpha = alpha;
   context.fillStyle = colours[name];
   for (const [x, y] of pointsOf(scan)) {
@@ -112,14 +119,18 @@ function drawAnswer(scan: Scan): void {
     drawRobot(other, "other", false);
   }
   if (other || !answer) return;
-  for (const k of answer.missing_map) line(state.walls[wallOf(k)], colours.missing, 4, [8, 6]);
+  const { layers, others } = state;
   const { pose } = answer;
-  if (!pose) return;
   const segments = sentSegments();
-  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[wallOf(k)], colours.critical, 12);
+  if (layers.correspondences) for (const k of answer.missing_map) line(state.walls[wallOf(k)], colours.missing, 4, [8, 6]);
+  if (!pose) return;
+  if (layers.correspondences) for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[wallOf(k)], colours.critical, 12);
   drawScan({ ...scan, segments: undefined }, pose, "scan", 0.75);
-  for (const pair of answer.correspondences) line(placed(pose, segments[pair.scan]), colours.matched, 5);
-  for (const k of answer.unmatched_scan) line(placed(pose, segments[k]), colours.unmatched, 4, [2, 6]);
+  if (layers.correspondences) {
+    for (const pair of answer.correspondences) line(placed(pose, segments[pair.scan]), colours.matched, 5);
+    for (const k of answer.unmatched_scan) line(placed(pose, segments[k]), colours.unmatched, 4, [2, 6]);
+  }
+  if (layers.alternatives) for (const one of others) if (onPlan(one)) drawRobot(one.pose, "other", false);
   drawUncertainty(answer, pose);
   drawRobot(pose, "estimate", false);
 }
@@ -187,17 +198,33 @@ function drawSimilar(from: Pose, to: Pose): void {
   drawRobot(to, "other", false);
 }
 
-const onPlan = (line: LogLine) => !line.map_id || line.map_id === state.mapId;
+const onPlan = (line: { map_id?: string | null }) => !line.map_id || line.map_id === state.mapId;
 
 function drawLog(): void {
   state.log.forEach((one, k) => {
     if (!one?.pose || !onPlan(one)) return;
     const [px, py] = toPixels(one.pose.x, one.pose.y);
     context.fillStyle = colours[kindOf(one)];
+    context.globalAlpha = passes(one) ? 1 : FADED;
     context.beginPath();
     context.arc(px, py, k === state.logAt ? 7 : 3, 0, 2 * Math.PI);
     context.fill();
+    context.globalAlpha = 1;
   });
   const here = state.log[state.logAt];
-  if (here?.pose && onPlan(here) && !state.answer) drawRobot(here.pose, kindOf(here), false);
+  if (!here?.pose) {
+    const pose = lastPose();
+    if (pose) drawRobot(pose, "robot", false);
+  } else if (onPlan(here) && !state.answer) drawRobot(here.pose, kindOf(here), false);
+}
+
+/** The last pose before a scan of a log that has none; null where the robot is drawn at a pose of its own. */
+export function lastPose(): Pose | null {
+  const { log, logAt, answer } = state;
+  if (log[logAt]?.pose || answer?.pose) return null;
+  for (let k = logAt - 1; k >= 0; k--) {
+    const one = log[k];
+    if (one?.pose && onPlan(one)) return one.pose;
+  }
+  return null;
 }

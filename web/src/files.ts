@@ -2,45 +2,61 @@
 
 import { importMap, importScans } from "./api";
 import { askSoon } from "./asking";
+import { openSeveral } from "./floors";
 import { showImport, showScanImport } from "./imported";
 import { openLog, openScans } from "./log";
 import { isProposal, openProposal } from "./proposal";
-import { isLatest, showAll, supersede } from "./scene";
+import { isLatest, openStored, showAll, supersede } from "./scene";
 import { changed, forget, forgetMap, setMap, state } from "./state";
-import type { MapDocument, Proposal, Scan } from "./types";
+import type { Asked, MapDocument, Proposal, Scan } from "./types";
+import { messageOf, write } from "./words";
 
 const about = document.querySelector<HTMLElement>("#about")!;
 const status = document.querySelector<HTMLElement>("#reading")!;
 const units = document.querySelector<HTMLSelectElement>("#units")!;
-const LOGS = /\.(bag|mcap|db3|log|clf|carmen)$/i;
+const LOGS = /\.(bag|mcap|db3|log|clf|carmen)$|^metadata\.yaml$/i;
 const MOST_SCANS = 200; // of a log that are searched here
 let drawing: File[] = []; // the last one, for another unit
+let last: Promise<unknown> = Promise.resolve(); // of the files that were opened
+let waiting = 0;
+let opening = 0;
+let problems: string[] = [];
 
-export async function open(files: File[]): Promise<void> {
-  const mine = supersede();
-  const foreign: File[] = [];
+/** Open files, after those that are being read. */
+export function open(files: File[]): void {
+  if (!waiting || !isLatest(opening)) {
+    opening = supersede();
+    problems = [];
+  }
+  const mine = opening;
+  waiting++;
+  last = last.then(() => read(files, mine)).finally(() => waiting--);
+}
+
+async function read(files: File[], mine: number): Promise<void> {
+  if (!isLatest(mine)) return; // something else was chosen meanwhile
+  const json = files.filter(({ name }) => /\.(json|jsonl|ndjson)$/i.test(name));
+  const logs = files.filter(({ name }) => LOGS.test(name));
+  const maps = files.filter((file) => !json.includes(file) && !logs.includes(file));
   const proposals: [string, Proposal][] = [];
-  let message = "";
+  const before = problems.length;
   try {
-    for (const file of files) {
-      if (/\.(json|jsonl|ndjson)$/i.test(file.name)) proposals.push(...take(file.name, await file.text()));
-      else foreign.push(file);
-    }
-    if (foreign.length) {
-      status.textContent = `Reading ${foreign[0].name} ...`;
-      await (foreign.some((file) => LOGS.test(file.name)) ? readLog(foreign, mine) : readMap(foreign, mine));
-    }
+    for (const file of json) proposals.push(...(await take(file.name, await file.text(), mine)));
+    if (maps.length) await readMap(maps, mine);
+    if (logs.length) await readLog(logs, mine);
     for (const [name, proposal] of proposals) await openProposal(name, proposal, mine); // its map may be among the files
   } catch (error) {
-    message = error instanceof Error ? error.message : String(error);
+    problems.push(messageOf(error));
   }
-  if (!isLatest(mine)) return; // other files were opened meanwhile
-  status.textContent = message;
-  if (!message) askSoon();
+  if (!isLatest(mine)) return;
+  write(status, problems.join(" "));
+  if (problems.length === before) askSoon();
 }
 
 async function readMap(files: File[], mine: number): Promise<void> {
   drawing = files;
+  status.textContent = `Reading ${files[0].name} ...`;
+  await requirePicture(files);
   const found = await importMap(files, units.value);
   if (!isLatest(mine)) return;
   takeMap(found.map);
@@ -54,13 +70,21 @@ async function readMap(files: File[], mine: number): Promise<void> {
   changed();
 }
 
+/** Raise an error where a grid's YAML file was chosen without its picture. */
+async function requirePicture(files: File[]): Promise<void> {
+  const grid = files.find(({ name }) => /\.ya?ml$/i.test(name));
+  const picture = grid && /^image: *["']?(?:[^"'\n]*[/\\])?([^"'\n#]*\w)/m.exec(await grid.text())?.[1];
+  if (picture && !files.some(({ name }) => name === picture)) throw new Error(`${grid.name} needs ${picture}: choose both.`);
+}
+
 /** Read the scans of a log; also its map, where it has no scans or no other map was opened. */
 async function readLog(files: File[], mine: number): Promise<void> {
   let problem: unknown = null;
+  status.textContent = `Reading ${files[0].name} ...`;
   try {
     const found = await importScans(files, MOST_SCANS);
     if (!isLatest(mine)) return;
-    openScans(found);
+    openScans(files.find(({ name }) => !/yaml$/i.test(name))!.name, found, MOST_SCANS);
     showScanImport(found.report);
   } catch (error) {
     problem = error;
@@ -69,14 +93,13 @@ async function readLog(files: File[], mine: number): Promise<void> {
   try {
     await readMap(files, mine);
   } catch {
-    if (problem) throw problem;
-    if (!state.map) about.textContent = "The log has no map. Open the map, too.";
+    if (problem) throw problem; // a log need not have a map
   }
 }
 
 /** Take a file for what it is; proposals of changes are returned. */
-function take(name: string, text: string): [string, Proposal][] {
-  if (openLog(text)) return [];
+async function take(name: string, text: string, mine: number): Promise<[string, Proposal][]> {
+  if (openLog(name, text)) return [];
   let content: unknown;
   try {
     content = JSON.parse(text);
@@ -87,15 +110,8 @@ function take(name: string, text: string): [string, Proposal][] {
   if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan. Expected a JSON object, or an array of segments.`);
   const fields = content as Record<string, unknown>;
   if (isProposal(fields)) return [[name, fields as unknown as Proposal]];
-  if ("maps" in fields && "scan" in fields) {
-    if (!state.floors.length) throw new Error(`${name} refers to several maps. Search on them first, under "Stored maps".`);
-    takeScan(fields.scan as Scan);
-  } else if ("map" in fields && "scan" in fields) {
-    // A request as it is sent.
-    const { map, scan } = fields as { map: MapDocument; scan: Scan };
-    if (!("segments" in map)) throw new Error(`${name} refers to a stored map. Open that map first, then a file with the scan.`);
-    takeMap(map);
-    takeScan(scan);
+  if ("scan" in fields && ("map" in fields || "maps" in fields)) {
+    await takeRequest(name, fields as unknown as Asked, mine);
   } else if ("ranges" in fields) takeScan({ laser: fields } as unknown as Scan);
   else if ("laser" in fields || ("points" in fields && !("segments" in fields))) takeScan(fields as Scan);
   else if ("segments" in fields) {
@@ -105,6 +121,22 @@ function take(name: string, text: string): [string, Proposal][] {
     else takeMap(fields as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);
   return [];
+}
+
+/** Take a request as it is sent: its maps, its scan, its options, and a prior of the page. */
+async function takeRequest(name: string, { map, maps, scan, options, prior }: Asked, mine: number): Promise<void> {
+  const ids = Array.isArray(maps) && maps.every((one) => !("segments" in one)) ? maps.map((one) => one.map_id) : [];
+  if (map && "segments" in map) takeMap(map);
+  else if (map) await openStored(map.map_id, mine);
+  else if (ids.length) await openSeveral(ids, mine);
+  else throw new Error(`${name} refers to maps that are not stored as they were sent. Search on several maps first, under "Stored maps", then open a file with the scan.`);
+  if (!isLatest(mine)) return;
+  takeScan(scan);
+  const set = (id: string, value: unknown) => typeof value === "number" && (document.querySelector<HTMLInputElement>(id)!.value = String(value));
+  set("#on-map", options?.on_map);
+  set("#usable-from", options?.usable_from);
+  if (prior) Object.assign(state.robot, { x: prior.x, y: prior.y, theta: prior.theta });
+  document.querySelector<HTMLInputElement>("#near")!.checked = Boolean(prior);
 }
 
 function takeMap(map: MapDocument): void {
@@ -127,15 +159,15 @@ function takeScan(scan: Scan): void {
 
 const input = document.querySelector<HTMLInputElement>("#files")!;
 input.addEventListener("change", () => {
-  void open([...(input.files ?? [])]);
+  open([...(input.files ?? [])]);
   input.value = "";
 });
 // After a message about a missing unit the drawing need not be opened again.
 units.addEventListener("change", () => {
-  if (drawing.length) void open(drawing);
+  if (drawing.length) open(drawing);
 });
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {
   event.preventDefault();
-  void open([...(event.dataTransfer?.files ?? [])]);
+  open([...(event.dataTransfer?.files ?? [])]);
 });

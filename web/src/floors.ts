@@ -18,8 +18,7 @@ let followed: { answer: Answer | null; other: number } = { answer: null, other: 
 let drawn = ""; // the thumbnails that are in the row
 
 /** Search the scan on several stored maps, and show the first. */
-export async function openSeveral(ids: string[]): Promise<void> {
-  const mine = supersede();
+export async function openSeveral(ids: string[], mine = supersede()): Promise<void> {
   const first = await getMap(ids[0]);
   if (!isLatest(mine)) return;
   documents.clear();

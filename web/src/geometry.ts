@@ -102,6 +102,12 @@ export function pointsOf(scan: Scan): [number, number][] {
   return points;
 }
 
+/** The beams of a scan that returned, from sensor to point, in the scan's frame. */
+export function beamsOf(scan: Scan): Segment[] {
+  const views: Partial<View>[] = scan.views ?? [scan];
+  return views.flatMap(({ pose = { x: 0, y: 0, theta: 0 }, ...one }) => pointsOf({ views: [{ ...one, pose }] }).map((to): Segment => [pose.x, pose.y, ...to]));
+}
+
 function round(value: number): number {
   return Math.round(1e4 * value) / 1e4;
 }

@@ -2,7 +2,7 @@
 
 import { onChange, state } from "./state";
 import type { Imported, MapDocument, Note, Report } from "./types";
-import { list } from "./verdict";
+import { list } from "./words";
 
 const box = document.querySelector<HTMLDetailsElement>("#imported")!;
 const content = document.querySelector<HTMLElement>("#report")!;

@@ -7,7 +7,6 @@ import "./legend";
 import "./log";
 import "./pointer";
 import "./proposal";
-import "./share";
 import "./stored";
 import "./trying";
 import { setKey } from "./api";
@@ -15,6 +14,7 @@ import { readColours, redraw, resize } from "./drawing";
 import { update } from "./floors";
 import { drawInset } from "./inset";
 import { choose, FIRST } from "./scene";
+import { openLink } from "./share";
 import { onChange } from "./state";
 
 const key = document.querySelector<HTMLInputElement>("#key")!;
@@ -32,5 +32,5 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 new ResizeObserver(resize).observe(document.querySelector("#plan")!);
 resize();
 
-const named = new URLSearchParams(location.search).get("example") ?? "";
-void choose(/^[a-z]+$/.test(named) ? named : FIRST);
+const named = openLink() ? null : new URLSearchParams(location.search).get("example") ?? "";
+if (named !== null) void choose(/^[a-z]+$/.test(named) ? named : FIRST);

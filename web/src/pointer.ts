@@ -7,12 +7,13 @@ import { wrap } from "./geometry";
 import { showLegend } from "./legend";
 import { describe, placeAt, wallAt } from "./pointed";
 import { lookAt } from "./proposal";
-import { addWalls, boundsOf, changed, state } from "./state";
+import { addWalls, boundsOf, changed, state, type Layer } from "./state";
 import { step } from "./verdict";
-import { fit, toMetres, toPixels, view, zoom } from "./view";
+import { fit, keepVisible, toMetres, toPixels, view, zoom } from "./view";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const hover = document.querySelector<HTMLElement>("#hover")!;
+const cursor = document.querySelector<HTMLElement>("#cursor")!;
 const erase = document.querySelector<HTMLInputElement>("#erase")!;
 const build = document.querySelector<HTMLInputElement>("#build")!;
 const BOX = [1, 0.6]; // m; of a box that is added
@@ -85,12 +86,14 @@ canvas.addEventListener("pointermove", (event) => {
 /** Describe what the mouse points at. */
 function point(px: number, py: number): void {
   const text = describe(px, py);
-  const pointed = placeAt(...toMetres(px, py));
+  const [x, y] = toMetres(px, py);
+  cursor.textContent = `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
+  const pointed = placeAt(x, y);
   if (pointed !== state.pointed) {
     state.pointed = pointed;
     looked();
   }
-  lookAt(changeAt(...toMetres(px, py), 8 / view.scale));
+  lookAt(changeAt(x, y, 8 / view.scale));
   hover.hidden = !text;
   hover.textContent = text;
   if (text) besides(px, py);
@@ -121,6 +124,7 @@ canvas.addEventListener("pointercancel", (event) => {
 });
 canvas.addEventListener("pointerleave", () => {
   hover.hidden = true;
+  cursor.textContent = "";
   lookAt(-1);
 });
 
@@ -205,6 +209,7 @@ canvas.addEventListener("keydown", (event) => {
   event.preventDefault();
   if (robot[name]) {
     robot[name]();
+    keepVisible(state.robot.x, state.robot.y);
     askSoon();
   } else {
     plan[name]();
@@ -224,9 +229,14 @@ for (const [id, action] of Object.entries({
     looked();
   });
 
-const help = document.querySelector<HTMLButtonElement>("#help")!;
-help.addEventListener("click", () => {
-  const keys = document.querySelector<HTMLElement>("#keys")!;
-  keys.hidden = !keys.hidden;
-  help.setAttribute("aria-expanded", String(!keys.hidden));
-});
+for (const button of document.querySelectorAll<HTMLButtonElement>("#tools [aria-controls]"))
+  button.addEventListener("click", () => {
+    const panel = document.getElementById(button.getAttribute("aria-controls")!)!;
+    panel.hidden = !panel.hidden;
+    button.setAttribute("aria-expanded", String(!panel.hidden));
+  });
+for (const tick of document.querySelectorAll<HTMLInputElement>("#layers input"))
+  tick.addEventListener("change", () => {
+    state.layers[tick.value as Layer] = tick.checked;
+    changed();
+  });

@@ -6,6 +6,7 @@ import { redraw } from "./drawing";
 import { isLatest, showAll, supersede } from "./scene";
 import { asStored, changed, forget, onChange, setMap, state } from "./state";
 import type { MapDocument, Proposal, Scan, View } from "./types";
+import { messageOf } from "./words";
 
 const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const box = element<HTMLDetailsElement>("#changes");
@@ -87,7 +88,8 @@ function list(proposal: Proposal): void {
       label.className = "check";
       Object.assign(tick, { type: "checkbox", checked: one.accepted });
       tick.setAttribute("aria-describedby", "evidence");
-      words.className = `key ${colourOf(one.code)}`;
+      words.className = "key";
+      words.style.setProperty("--colour", `var(--${colourOf(one.code)})`);
       words.textContent = `${k}: ${titleOf(one)}`;
       const sure = document.createElement("small");
       sure.textContent = confidenceOf(one);
@@ -153,7 +155,7 @@ function doing(button: HTMLButtonElement, action: () => Promise<void>): void {
     try {
       await action();
     } catch (error) {
-      summary.textContent = error instanceof Error ? error.message : String(error);
+      summary.textContent = messageOf(error);
     } finally {
       button.disabled = false;
     }

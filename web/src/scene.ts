@@ -1,11 +1,12 @@
 // Examples, and what happens when another map is shown.
 
-import { example } from "./api";
+import { example, getMap } from "./api";
 import { askSoon } from "./asking";
 import { boundsOf, changed, onChange, setMap, state } from "./state";
 import type { Example } from "./types";
 import { showProblem } from "./verdict";
 import { fit } from "./view";
+import { messageOf } from "./words";
 
 const NAMES: Record<string, string> = {
   flat: "A flat",
@@ -38,13 +39,22 @@ export function showAll(about: string, example = ""): void {
   changed();
 }
 
+/** Show a stored map, and search the scan on it. */
+export async function openStored(id: string, mine = supersede()): Promise<void> {
+  const map = await getMap(id);
+  if (!isLatest(mine)) return;
+  setMap(map, id);
+  showAll(`The stored map ${id}.`);
+  askSoon();
+}
+
 export async function choose(name: string): Promise<void> {
   const mine = supersede();
   let found: Example;
   try {
     found = await example<Example>(name);
   } catch (error) {
-    showProblem(error instanceof Error ? error.message : String(error));
+    showProblem(messageOf(error));
     return;
   }
   if (mine !== latest) return;

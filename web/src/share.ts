@@ -1,6 +1,9 @@
 // The request as it was sent, for a terminal, a program or a report.
 
 import { request } from "./asking";
+import { open } from "./files";
+import { showProblem } from "./verdict";
+import { messageOf } from "./words";
 
 const text = document.querySelector<HTMLElement>("#copied")!;
 
@@ -38,12 +41,48 @@ function asPython(json: string): string {
   ].join("\n");
 }
 
-function copying(id: string, form: (json: string) => string): void {
+const LINK = "#request=";
+const LONGEST = 60_000; // characters of a link
+
+/** A link that opens the page with the request; what is behind the # is not sent to any service. */
+async function asLink(json: string): Promise<string> {
+  const packed = new Uint8Array(await streamed(json, new CompressionStream("deflate-raw")).arrayBuffer());
+  const link = location.origin + location.pathname + LINK + btoa(Array.from(packed, (one) => String.fromCharCode(one)).join("")).replace(/\+/g, "-").replace(/\//g, "_");
+  if (link.length > LONGEST) throw new Error("The request is too long for a link. Store the map under \"Stored maps\" and open it there, or download the request.");
+  return link;
+}
+
+const streamed = (content: BlobPart, through: CompressionStream | DecompressionStream) => new Response(new Blob([content]).stream().pipeThrough(through));
+
+/** Open the request of a link that the page was called with; return whether there is one. */
+export function openLink(): boolean {
+  if (!location.hash.startsWith(LINK)) return false;
+  const packed = location.hash.slice(LINK.length).replace(/-/g, "+").replace(/_/g, "/");
+  const unpacked = async () => {
+    const bytes = Uint8Array.from(atob(packed), (one) => one.charCodeAt(0));
+    return new File([await streamed(bytes, new DecompressionStream("deflate-raw")).blob()], "link.json");
+  };
+  unpacked().then(
+    (file) => open([file]),
+    () => showProblem("The link is damaged. Copy it again."),
+  );
+  return true;
+}
+addEventListener("hashchange", openLink);
+
+function copying(id: string, form: (json: string) => string | Promise<string>): void {
   document.querySelector(id)!.addEventListener("click", async () => {
     const json = body();
     if (json === null) return;
+    let copied: string;
     try {
-      await navigator.clipboard.writeText(form(json));
+      copied = await form(json);
+    } catch (error) {
+      text.textContent = messageOf(error);
+      return;
+    }
+    try {
+      await navigator.clipboard.writeText(copied);
       text.textContent = "Copied.";
     } catch {
       text.textContent = "The browser does not let this page copy; download the request instead.";
@@ -51,6 +90,7 @@ function copying(id: string, form: (json: string) => string): void {
   });
 }
 
+copying("#link", asLink);
 copying("#curl", asCurl);
 copying("#powershell", asPowerShell);
 copying("#python", asPython);

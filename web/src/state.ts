@@ -18,6 +18,7 @@ export interface State {
   laser: Example["laser"];
   noise: number; // m
   sent: { scan: Scan } | null; // the request that was answered
+  answered: Scan | null; // its scan as it was opened
   answer: Answer | null;
   sentTo: number[]; // index of each wall that was sent, among all walls
   others: Alternative[]; // the alternatives that are counted and shown
@@ -30,6 +31,8 @@ export interface State {
   log: (LogLine | null)[]; // null: not searched yet
   scans: Scan[]; // of a log whose scans are searched here
   logAt: number;
+  filter: string; // of the scans of the log: empty for all, or what they have in common
+  layers: Record<Layer, boolean>;
 }
 
 /** The picture of a grid; `pose` is that of its lower left corner. */
@@ -39,6 +42,7 @@ export interface Picture {
   resolution: number; // m
 }
 
+export type Layer = "map" | "scan" | "beams" | "correspondences" | "alternatives";
 export type Shown = "now" | "driven" | "landmark";
 
 export const state: State = {
@@ -57,6 +61,7 @@ export const state: State = {
   laser: { fov: 2 * Math.PI, beams: 720, range_max: 20, sigma: 0.02 },
   noise: 0,
   sent: null,
+  answered: null,
   answer: null,
   sentTo: [],
   others: [],
@@ -69,6 +74,8 @@ export const state: State = {
   log: [],
   scans: [],
   logAt: 0,
+  filter: "",
+  layers: { map: true, scan: true, beams: false, correspondences: true, alternatives: true },
 };
 
 const listeners: (() => void)[] = [];
@@ -145,7 +152,7 @@ export function restore(): void {
 
 /** Forget the answer, which belongs to another request. */
 export function forget(): void {
-  Object.assign(state, { answer: null, sent: null, sentTo: [], others: [], other: -1 });
+  Object.assign(state, { answer: null, sent: null, answered: null, sentTo: [], others: [], other: -1 });
 }
 
 export function boundsOf(segments: Segment[]): Segment {

@@ -1,12 +1,11 @@
 // Maps that the service stores.
 
-import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
+import { checkMap, deleteMap, listMaps, putMap } from "./api";
 import type { MapList } from "./contract";
-import { askSoon } from "./asking";
 import { openSeveral } from "./floors";
-import { kept, setMap, state } from "./state";
-import { isLatest, showAll, supersede } from "./scene";
-import { list } from "./verdict";
+import { openStored } from "./scene";
+import { kept, state } from "./state";
+import { list, messageOf } from "./words";
 
 const box = document.querySelector<HTMLDetailsElement>("#stored")!;
 const maps = document.querySelector<HTMLUListElement>("#maps")!;
@@ -27,7 +26,7 @@ async function trying(action: () => Promise<void>): Promise<void> {
   try {
     await action();
   } catch (error) {
-    show(error instanceof Error ? error.message : String(error));
+    show(messageOf(error));
   }
 }
 
@@ -52,7 +51,7 @@ function row(id: string, segments: number): HTMLLIElement {
   choice.append(tick, `${id} (${segments} walls)`);
   item.append(choice);
   const actions: [string, () => Promise<void>][] = [
-    ["Open", () => use(id)],
+    ["Open", () => openStored(id)],
     ["Check", () => check(id)],
     ["Delete", () => remove(id)],
   ];
@@ -64,15 +63,6 @@ function row(id: string, segments: number): HTMLLIElement {
     item.append(button);
   }
   return item;
-}
-
-async function use(id: string): Promise<void> {
-  const mine = supersede();
-  const map = await getMap(id);
-  if (!isLatest(mine)) return;
-  setMap(map, id);
-  showAll(`The stored map ${id}.`);
-  askSoon();
 }
 
 async function check(id: string): Promise<void> {

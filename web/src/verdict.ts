@@ -1,7 +1,8 @@
 // The verdict in words and numbers, and the alternatives.
 
 import { changed, onChange, state, wallOf } from "./state";
-import type { Pose } from "./types";
+import type { Answer, LogLine, Pose } from "./types";
+import { list, sentenceOf, write } from "./words";
 
 const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const card = element("#verdict");
@@ -18,30 +19,26 @@ function showNotice(kind: "problem" | "waiting", message: string): void {
 }
 
 function show(): void {
-  const answer = notice ? null : state.answer;
-  card.dataset.state = notice ? notice.kind : answer ? (answer.usable ? "usable" : answer.status) : "none";
-  element("#verdict-title").textContent = notice ? (notice.kind === "problem" ? "Error" : "The service is starting") : answer ? title() : "Verdict";
-  if (notice || answer) element("#message").textContent = notice?.message ?? answer!.message;
-  else if (state.map) element("#message").textContent = "No search yet.";
-  list(element("#reasons"), answer ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
+  const { answer, log, logAt } = notice ? { answer: null, log: [], logAt: 0 } : state;
+  const verdict = answer ?? log[logAt]; // a line of a replay has no answer
+  card.dataset.state = notice ? notice.kind : verdict ? (verdict.usable ? "usable" : verdict.status) : "none";
+  element("#verdict-title").textContent = notice ? (notice.kind === "problem" ? "Error" : "The service is starting") : verdict ? titleOf(verdict) : "Verdict";
+  write(element("#message"), notice?.message ?? (answer ? messageOf(answer) : verdict ? "" : MISSING[state.map ? "search" : state.scan ? "map" : "both"]));
+  list(element("#reasons"), [...reasonsOf(verdict), ...(answer?.warnings ?? []).map((one) => sentenceOf(one.code, one.message))]);
   numbers();
   others();
 }
 
-function title(): string {
-  const { answer } = state;
-  return `${answer!.status.replace("_", " ")}, ${answer!.usable ? "usable" : "not usable"}`;
-}
+const MISSING = { search: "No search yet.", map: "There is a scan and no map yet. Open its map.", both: "Open a map and a scan, or choose an example." };
 
-export function list(into: HTMLElement, lines: string[]): void {
-  into.replaceChildren(
-    ...[...new Set(lines)].map((line) => {
-      const item = document.createElement("li");
-      item.textContent = line;
-      return item;
-    }),
-  );
-}
+export const titleOf = ({ status, usable }: { status: string; usable: boolean }) => `${status.replace("_", " ")}, ${usable ? "usable" : "not usable"}`;
+
+/** The sentences of the reasons of an answer, or of a line of a replay, which may have codes alone. */
+const reasonsOf = (one: Answer | LogLine | null | undefined) =>
+  (one?.reasons ?? []).map((each) => (typeof each === "string" ? sentenceOf(each, each.replaceAll("_", " ")) : sentenceOf(each.code, each.message)));
+
+/** The message of an answer; its reasons are below it. */
+const messageOf = ({ message }: Answer) => message.replace(": see `reasons`", "");
 
 function numbers(): void {
   const answer = notice ? null : state.answer;

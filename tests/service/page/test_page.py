@@ -44,6 +44,7 @@ def test_every_example(page: Page, title: str, state: str, said: str) -> None:
     verdict(page, state)
     expect(page.locator("#message")).to_contain_text(said)
     expect(page.locator("#numbers")).to_contain_text("correspondences")
+    expect(page.locator("#verdict")).not_to_contain_text("`")
 
 
 def test_the_keyboard_alone(page: Page) -> None:
@@ -127,12 +128,13 @@ def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
 
 def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
     detail = "the service cannot read files of other tools: it lacks the extra `formats`"
-    problem = {**PROBLEM, "status": 415, "detail": detail}
+    problem = {**PROBLEM, "status": 415, "detail": detail, "code": "unsupported_media_type"}
     page.route("**/v1/maps:import", lambda route: route.fulfill(status=415, json=problem))
     page.goto("/")
     (tmp_path / "plan.dxf").write_text("0")
     page.set_input_files("#files", [tmp_path / "plan.dxf"])
-    expect(page.locator("#reading")).to_have_text(detail)
+    expect(page.locator("#reading")).to_have_text(detail.replace("`", ""))
+    expect(page.locator("#reading code")).to_have_text("formats")
 
 
 def test_a_refusal_and_a_lost_connection(page: Page) -> None:
@@ -140,7 +142,7 @@ def test_a_refusal_and_a_lost_connection(page: Page) -> None:
     page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=PROBLEM))
     page.get_by_role("button", name="Search").click()
     verdict(page, "problem")
-    expect(page.locator("#message")).to_have_text("All places are taken")
+    expect(page.locator("#message")).to_have_text("The service is busy. Try again in some seconds.")
     page.unroute("**/v1/associate")
     page.route("**/v1/associate", lambda route: route.abort())
     page.get_by_role("button", name="Search").click()
@@ -154,11 +156,12 @@ def test_a_key_without_a_role(page: Page) -> None:
     shown(page, "flat", "usable")
     detail = "the key lacks the role `associate`; send a key that has it"
     page.route(
-        "**/v1/associate", lambda route: route.fulfill(status=403, json={**PROBLEM, "status": 403, "detail": detail})
+        "**/v1/associate",
+        lambda route: route.fulfill(status=403, json={**PROBLEM, "status": 403, "detail": detail, "code": "forbidden"}),
     )
     page.get_by_role("button", name="Search").click()
     verdict(page, "problem")
-    expect(page.locator("#message")).to_have_text(f"{detail} (see Key below).")
+    expect(page.locator("#message")).to_have_text(f"{detail} (see Key below).".replace("`", ""))
 
 
 def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
@@ -262,25 +265,6 @@ def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     expect(report).to_be_hidden()
 
 
-def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
-    lines = [
-        {"stamp": k, "status": "ok" if k else "no_match", "usable": k > 0, "probability": 0.9, "reasons": [],
-         "pose": {"x": 0.1 * k, "y": 0.0, "theta": 0.0} if k else None, "timing_ms": {}}
-        for k in range(4)
-    ]  # fmt: skip
-    (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
-    shown(page, "flat", "usable")  # with a virtual robot, which goes
-    expect(page.get_by_label("simulate the scan")).to_be_checked()
-    page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
-    told = page.locator("#scan-of-log")
-    expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
-    page.get_by_role("button", name="Play").click()
-    expect(page.get_by_label("simulate the scan")).not_to_be_checked()
-    expect(told).to_contain_text("Scan 4 of 4: ok, usable")
-    expect(told).to_contain_text("3 of 4 are usable")
-    expect(page.get_by_role("button", name="Play")).to_be_enabled()
-
-
 def test_a_request_is_taken_along(page: Page, client: httpx.Client, tmp_path: Path) -> None:
     shown(page, "flat", "usable")
     page.locator("#share summary").click()
@@ -299,6 +283,32 @@ def test_a_request_is_taken_along(page: Page, client: httpx.Client, tmp_path: Pa
     assert ran.stdout.startswith("ok True"), ran.stderr
     page.set_input_files("#files", [kept])
     verdict(page, "usable")
+
+
+def test_a_link_opens_the_stored_map_and_the_scan(page: Page, client: httpx.Client, tmp_path: Path) -> None:
+    client.put("/v1/maps/page-room", json={"segments": examples.WALLS}).raise_for_status()
+    page.goto("/")
+    verdict(page, "ambiguous")
+    page.set_input_files("#files", files(tmp_path, scan=SCAN))
+    page.locator("#stored summary").click()
+    page.get_by_role("button", name="Open page-room").click()
+    verdict(page, "usable")
+    page.get_by_label("Usable from probability").fill("0.9")
+    page.locator("#share summary").click()
+    page.get_by_role("button", name="Copy a link").click()
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    link = page.evaluate("navigator.clipboard.readText()")
+    page.goto("about:blank")
+    with page.expect_request("**/v1/associate") as asked:
+        page.goto(link)
+    assert asked.value.post_data_json["map"] == {"map_id": "page-room"}
+    assert asked.value.post_data_json["scan"] == SCAN
+    assert asked.value.post_data_json["options"]["usable_from"] == 0.9
+    verdict(page, "usable")
+    expect(page.locator("#about")).to_have_text("The stored map page-room.")
+    page.goto(link[: len(link) // 2])
+    expect(page.locator("#message")).to_have_text("The link is damaged. Copy it again.")
+    client.delete("/v1/maps/page-room")
 
 
 MEANT_FOR_SHELLS = "a' & calc & $(id) `id` \" | \\ %PATH% ^ ! ; \u2018\u2019\u201a\u201b \n --output x <y >z \u2028 #"

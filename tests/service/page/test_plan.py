@@ -115,6 +115,25 @@ def test_a_line_at_each_metre(page: Page) -> None:
     assert [plan.colour(x, 4.5)[3] for x in (9.3, 9.5, 9.7)] == [0, 0, 0]
 
 
+def test_layers_are_switched(page: Page) -> None:
+    """A wall, free space with beams alone, and the pose of an alternative."""
+    with page.expect_response("**/v1/associate") as response:
+        shown(page, "rooms", "ambiguous")
+    plan, other = Plan(page, ROOMS), response.value.json()["alternatives"][0]["pose"]
+    places = {"map": (2.0, 0.0), "beams": (5.4, 4.0), "alternatives": (other["x"], other["y"])}
+    page.get_by_role("button", name="Layers").click()
+    for layer, place in places.items():
+        drawn = plan.colour(*place)
+        page.locator("#layers").get_by_label(layer).click()
+        page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        assert plan.colour(*place) != drawn, layer
+    expect(page.locator("#legend")).not_to_contain_text("wall that")
+    assert legend(page)[:5] == ["true pose", "measured point", "beam", "scan segment on a wall", legend(page)[-1]]
+    for layer in ("scan", "correspondences"):
+        page.locator("#layers").get_by_label(layer).click()
+    assert legend(page)[:2] == ["true pose", "beam"]
+
+
 def test_an_imported_grid_lies_under_its_walls(page: Page, tmp_path: Path) -> None:
     """A room of 8 by 5 m with a pillar of 1 m, and a wall of 20 cm about it."""
     for name, content in room_grid().items():
