@@ -55,7 +55,7 @@ class UpdateRequest(Strict):
     """Scans of several visits, from which changes of the map are learned."""
 
     visits: Annotated[list[Visit], Field(min_length=1, max_length=MOST_VISITS)] = Field(
-        description="a change needs scans of two visits at least; all scans together at most `batch` of /v1/limits"
+        description="a change needs scans of two visits at least; all scans together at most `max_batch` of /v1/limits"
     )
     accept: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
         None, description="confidence below which a change is not in the new map; null: all changes are in it"
