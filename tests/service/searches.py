@@ -13,6 +13,11 @@ from tests.running import RunningService, client_of, until
 POST = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
 
+def post(body: bytes) -> bytes:
+    """Return the bytes of a request for an association."""
+    return POST + b"Content-Length: %d\r\n\r\n" % len(body) + body
+
+
 def store_hard_map(running: RunningService, workers: int = 1) -> None:
     """Store a map for `searched_for`, and have every worker index it: the search is all that is left to do."""
     rng = np.random.default_rng(1)
@@ -54,9 +59,8 @@ def slow_to_index(walls: int) -> bytes:
 @contextmanager
 def searching(running: RunningService) -> Iterator[None]:
     """Have the hard map searched for as long as the block takes; then its client hangs up."""
-    body = searched_for(30.0)
     with running.connection() as connection:
-        connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        connection.sendall(post(searched_for(30.0)))
         until(lambda: running.count("linefix_searches_running") == 1.0)
         yield
         assert running.count("linefix_searches_running") >= 1.0

@@ -55,6 +55,7 @@ def test_a_key_that_withholds_leaves_the_others_room(start_service: Callable[...
     until(lambda: running.count("linefix_bodies_bytes") == 0.0)
 
 
+@pytest.mark.long
 def test_packed_bodies_count_as_what_they_unpack_to(start_service: Callable[..., RunningService]) -> None:
     """1.9 MB sent were 1.17 GB held."""
     running = start_service(searches=1, max_bodies_bytes=40_000_000, max_body_bytes=20_000_000)
@@ -107,6 +108,7 @@ def test_many_wrong_things_cost_no_more_than_a_few(service: RunningService, kind
         assert peak() - before < 25.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["include", "unknown fields"])
 def test_nor_in_the_parser(service: RunningService, kind: str) -> None:
     """1.9 million took 2.7 GB there."""

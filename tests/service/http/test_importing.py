@@ -5,30 +5,20 @@ from __future__ import annotations
 import base64
 import gzip
 import io
-import os
-import signal
-import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
-import pytest
 from ezdxf.filemanagement import new
 from PIL import Image
 
 from formats import read_map
 from linefix.documents import examples
-from tests.running import RunningService, children_of, client_of, until
+from tests.running import RunningService
 from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
 
 URL = "/v1/maps:import"
-
-
-@pytest.fixture
-def client(patient: RunningService) -> httpx.Client:
-    return patient.client
 
 
 def send(client: httpx.Client, files: dict[str, bytes], *fields: tuple[str, str], **headers: str) -> httpx.Response:
@@ -109,22 +99,6 @@ def test_a_body_is_held_to_what_every_body_is(client: httpx.Client, guarded: Run
     assert guarded.client.post(URL, content=bytes(form({})), headers=told).status_code == 401
     assert client.get(URL).status_code == 405
     assert client.get("/livez").status_code == 200
-
-
-def test_reading_files_takes_no_place_of_a_search(start_service: Callable[..., RunningService]) -> None:
-    """Class of attack: one key's long work in the only place. Others searched in what it left, 4 % of the time."""
-    running = start_service(searches=1, max_deadline_ms=600_000)
-    curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
-    before = children_of(running.process.pid)
-    importing = threading.Thread(target=send, args=(running.client, {"a.svg": curves}))
-    importing.start()
-    with client_of(running.url) as client:
-        until(lambda: len(children_of(running.process.pid) - before) > 0)
-        assert running.count("linefix_searches_running") == 0
-        assert client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
-        for child in children_of(running.process.pid) - before:
-            os.kill(child, signal.SIGKILL)
-    importing.join()
 
 
 def scans_of(client: httpx.Client, files: dict[str, bytes], *fields: tuple[str, str]) -> httpx.Response:

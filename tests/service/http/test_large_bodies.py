@@ -15,7 +15,6 @@ import pytest
 from linefix.documents import examples
 from tests.running import RunningService, children_of, is_running, until
 from tests.service.parsing.bodies import large_map
-from tests.service.searches import POST, searching, slow_to_index, store_hard_map
 
 
 def test_a_large_body_is_answered_like_a_small_one(client: httpx.Client) -> None:
@@ -38,38 +37,7 @@ def test_a_large_map_is_stored_and_found(client: httpx.Client) -> None:
     client.delete("/v1/maps/large")
 
 
-def test_no_large_body_waits_for_a_search(start_service: Callable[..., RunningService]) -> None:
-    """Nor a middling one, or a packed one."""
-    running = start_service(searches=1, queue=1)
-    store_hard_map(running)
-    with searching(running):
-        for count in (1_000, 20_000):
-            for packed in (False, True):
-                body = large_map(count, least=0)
-                headers = {"content-encoding": "gzip"} if packed else {}
-                content = gzip.compress(body, 1) if packed else body
-                running.client.put("/v1/maps/large", content=content, headers=headers).raise_for_status()
-
-
-def test_no_search_waits_for_a_large_map_to_be_indexed(start_service: Callable[..., RunningService]) -> None:
-    """A search can rest for another, what indexes a map cannot."""
-    running = start_service(searches=1, queue=4)
-    seen = b', "scan": ' + orjson.dumps({"segments": examples.SEEN}) + b"}"
-    large = b'{"map": ' + slow_to_index(60_000) + seen[:-1] + b', "options": {"oriented": false, "deadline_ms": 30000}}'
-    with running.connection(timeout=60.0) as connection:
-        connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(large) + large)
-        until(lambda: running.count("linefix_indexing_running") == 1.0)
-        running.client.post("/v1/associate", json=examples.ASSOCIATE).raise_for_status()
-        assert running.count("linefix_indexing_running") == 1.0
-        assert b" 200 OK" in connection.recv(12 + 4)
-
-
-def test_many_values_over_http_are_413(client: httpx.Client) -> None:
-    limit = client.get("/v1/limits").json()["max_values"]
-    answer = client.post("/v1/associate", content=b'{"a": [' + b"[]," * (limit // 2 + 1) + b"[]]}")
-    assert (answer.status_code, answer.json()["code"]) == (413, "too_large")
-
-
+@pytest.mark.long
 def test_a_service_with_large_bodies_keeps_nothing_of_them_and_takes_its_parser_along(
     start_service: Callable[..., RunningService],
 ) -> None:

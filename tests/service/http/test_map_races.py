@@ -14,7 +14,7 @@ import pytest
 
 from linefix.documents import examples
 from tests.running import RunningService, running
-from tests.service.conftest import KINDS, empty_database
+from tests.service.conftest import empty_database
 
 WRITERS = 8
 
@@ -27,7 +27,7 @@ class Pair:
         self.clients = [each.client for each in services]
 
 
-@pytest.fixture(scope="module", params=KINDS)
+@pytest.fixture(scope="module", params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])
 def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
     folder = tmp_path_factory.mktemp("pair")
     with ExitStack() as stack:

@@ -14,7 +14,6 @@ import pytest
 
 from linefix.documents import examples
 from tests.running import RunningService, until
-from tests.service.searches import POST, searching, store_hard_map
 
 
 def test_probes_and_version(client: httpx.Client) -> None:
@@ -44,62 +43,6 @@ def test_metrics_count(client: httpx.Client) -> None:
     assert "/nothing/at/all" not in text
     assert "linefix_verdicts_total" in text
     assert "linefix_searches_running 0.0" in text
-
-
-RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
-
-
-def refused(running: RunningService) -> bytes:
-    """Return the answer to a request whose body has not arrived."""
-    answer = b""
-    with running.connection() as connection:
-        connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")
-        while not answer.endswith(b"}"):
-            part = connection.recv(4096)
-            assert part, answer
-            answer += part
-    return answer
-
-
-def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(searches=1, queue=0)
-    store_hard_map(running)
-    with searching(running):
-        answer = refused(running)
-        assert answer.startswith(b"HTTP/1.1 503")
-        assert b"retry-after: 1\r\n" in answer
-        assert b'"code":"overloaded"' in answer
-        # What needs no search is answered all the same, also on a connection that was refused before.
-        with running.connection() as connection:
-            connection.sendall(b"POST /v1/register HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n{}" * 3)
-            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            answers = b""
-            while not answers.endswith(b'{"status":"ok"}'):
-                part = connection.recv(65_536)
-                assert part, answers
-                answers += part
-            assert answers.count(b"HTTP/1.1 503") == 3
-        assert running.client.get("/readyz").status_code == 200
-        assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
-    until(lambda: running.count(RUNNING) == 0.0)
-    assert running.client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
-    counted = 'linefix_http_requests_total{method="POST",route="/v1/register",status="503"}'
-    until(lambda: running.count(counted) == 3.0)
-    assert '"message":"refused","route":"/v1/register","code":"overloaded","count":3' in running.log()
-
-
-def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(searches=1, queue=1)
-    store_hard_map(running)
-    body = orjson.dumps(examples.ASSOCIATE)
-    with searching(running):
-        with running.connection() as connection:
-            connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)
-            until(lambda: running.count(WAITING) == 1.0)
-        # The one before it still runs: the place came free because its client left.
-        until(lambda: running.count(WAITING) == 0.0)
-    until(lambda: running.count(RUNNING) == 0.0)
-    assert "a defect" not in running.log()
 
 
 def test_before_the_kernels_are_there_nothing_is_searched(

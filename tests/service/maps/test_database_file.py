@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from linefix.documents import examples
 from service.app import create_app
 from service.database_location import database_url
 from service.maps import MapStore
 from service.maps.errors import StoreAwayError
 from service.settings import Settings
-from tests.running import RunningService, children_of, until
 
 from .stores import BOX
 
@@ -89,22 +86,3 @@ def test_none_of_several_workers_makes_it(tmp_path: Path) -> None:
         services.store.open()
     assert list(tmp_path.iterdir()) == []
     services.close()
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_without_its_file_the_service_is_not_ready(start_service: Callable[..., RunningService], workers: int) -> None:
-    """A new one was made, empty, and all was well."""
-    running = start_service(workers=workers, searches=2)
-    path = running.data_dir / "maps.sqlite3"
-    running.client.put("/v1/maps/m", json=examples.MAP).raise_for_status()
-    path.rename(path.with_name("away"))
-    until(lambda: running.client.get("/readyz").status_code == 503)
-    for answer in (running.client.get("/v1/maps/m"), running.client.put("/v1/maps/m", json=examples.MAP)):
-        assert (answer.status_code, answer.json()["code"]) == (503, "not_ready")
-    assert running.client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {}}).status_code == 200
-    assert not path.exists()
-    assert running.process.poll() is None
-    assert workers == 1 or len(children_of(running.process.pid)) >= workers
-    path.with_name("away").rename(path)
-    assert running.client.get("/v1/maps/m").json() == examples.MAP
-    until(lambda: running.client.get("/readyz").status_code == 200)

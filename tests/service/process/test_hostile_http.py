@@ -60,7 +60,9 @@ TRAILERS = {
 }
 
 
-@pytest.mark.parametrize("kind", TRAILERS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(one, marks=pytest.mark.long) if one != "many short" else one for one in TRAILERS]
+)
 def test_trailers_cost_nothing(service: RunningService, kind: str) -> None:
     """121 MB of them took 2.9 GB, before a key was asked for."""
     head = b"GET /livez HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + LAST_CHUNK
@@ -114,6 +116,7 @@ def test_an_unknown_key_ends_the_connection(guarded: RunningService) -> None:
         assert len(statuses(answer)) == 1
 
 
+@pytest.mark.long
 def test_long_heads_leave_nothing_behind(guarded: RunningService) -> None:
     """A thousand connections with 31 KB each, without a key, took 98 MB, and the next thousand as much again."""
     tail = b"x" * 31_000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n"
@@ -144,6 +147,7 @@ def test_many_requests_at_once_are_all_answered_in_order(service: RunningService
     assert ids == list(range(count))
 
 
+@pytest.mark.long
 def test_many_requests_at_once_take_little_memory(service: RunningService) -> None:
     """Each read held some ten thousand of them, each with all that belongs to one, and that on every connection."""
     requests = b"GET / HTTP/1.1\r\nHost:1\r\n\r\n" * 10_000
@@ -172,6 +176,8 @@ REFUSED = {
     "rubbish": b"RUBBISH\r\n\r\n",
     "TLS": b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc",
     "HTTP/0.9": b"GET /livez\r\n\r\n",
+    "a control character in the path": b"GET /metrics\x0b HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "an escaped one": b"GET http://localhost/metrics%0A HTTP/1.1\r\nHost: localhost\r\n\r\n",
     "a head without end": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nA: " + b"a" * 3_000_000,
     "a target without end": b"GET /" + b"a" * 3_000_000,
     "NUL in a field": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nA: a\0b\r\n\r\n",

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 import httpx
+import pytest
 
 from tests.running import RunningService, until
 from tests.service.parsing.bodies import large_map
@@ -27,6 +28,7 @@ def test_beyond_all_that_may_be_open_a_request_is_refused(start_service: Callabl
     until(lambda: running.client.get("/livez").status_code == 200)
 
 
+@pytest.mark.long
 def test_answers_that_nobody_reads_are_bounded(start_service: Callable[..., RunningService]) -> None:
     """Sixty readers of a map of 10 MB that took their time held 898 MB."""
     running = start_service(max_answers_bytes=30_000_000, max_body_bytes=12_000_000)
@@ -52,6 +54,7 @@ def test_answers_that_nobody_reads_are_bounded(start_service: Callable[..., Runn
     until(lambda: running.client.get("/v1/maps/large").status_code == 200)
 
 
+@pytest.mark.long
 def test_many_readers_of_the_pages_share_what_they_read(service: RunningService) -> None:
     """A script of 1.5 MB that everybody may request, without a key."""
     before = service.memory_mb()

@@ -57,6 +57,7 @@ def test_slow_clients_are_closed(impatient: RunningService) -> None:
             assert found[name].result()[9:12] == status, name
 
 
+@pytest.mark.long
 def test_who_does_not_read_the_answer_is_closed(impatient: RunningService) -> None:
     segments = [[float(i % 1000), 0.125, float(i % 1000) + 0.1234567890123, 0.1234567890123] for i in range(150_000)]
     body = gzip.compress(orjson.dumps({"segments": segments}), 1)  # small: it has to arrive in time
@@ -76,11 +77,11 @@ def test_who_does_not_read_the_answer_is_closed(impatient: RunningService) -> No
     assert 0 < received < 5_000_000
 
 
-@pytest.mark.parametrize("size", [1_000, 60_000, 1_000_000, 8_000_000])
+@pytest.mark.parametrize("size", [1_000, 8_000_000])
 def test_a_refusal_arrives_though_the_body_was_not_read(service: RunningService, size: int) -> None:
     """A reset overtook it: the client saw a broken connection."""
     head = HEAD.replace(b"/v1/associate", b"/nothing").replace(b"5000", b"%d" % size) + b"\r\n"
-    for _ in range(20):
+    for _ in range(5):
         with service.connection() as connection:
             connection.sendall(head)
             connection.sendall(b" " * size)

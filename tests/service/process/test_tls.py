@@ -38,7 +38,7 @@ def trusting(authority: trustme.CA, url: str) -> Iterator[httpx.Client]:
         yield client
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_it_speaks_https_alone(start_service: Callable[..., RunningService], tmp_path: Path, workers: int) -> None:
     authority = trustme.CA()
     chain, key = written(authority, tmp_path, "service")
