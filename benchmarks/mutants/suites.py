@@ -35,7 +35,7 @@ SUITES = {
     "association/index/kernels/": Suite(
         ("tests/association/kernels/test_walls.py", "tests/association/test_map_index.py")
     ),
-    "association/scan/kernels/joining": Suite(("tests/association/kernels/test_joining.py",)),
+    "association/scan/kernels/joining.py": Suite(("tests/association/kernels/test_joining.py",)),
     "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),

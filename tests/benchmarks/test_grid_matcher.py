@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from benchmarks.peers.grid_matcher import SIGMA, GridMatcher
 from registration import RigidTransform
@@ -34,8 +35,13 @@ def cast(occupied: np.ndarray, x: float, y: float, theta: float) -> tuple[np.nda
     return angles, (reach[occupied[rows, columns].argmax(axis=1)] + 0.5) * RESOLUTION
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("x", "y", "theta"), [(12.5, 30.5, 0.4), (45.5, 10.5, -2.0), (20.5, 8.5, 3.0)])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "theta"),
+    [(12.5, 30.5, 0.4), pytest.param(45.5, 10.5, -2.0, marks=LONG), pytest.param(20.5, 8.5, 3.0, marks=LONG)],
+)
 def test_the_pose_is_found(x: float, y: float, theta: float) -> None:
     occupied, free = room()
     found = GridMatcher(occupied, free, RESOLUTION, ORIGIN).match(*cast(occupied, x, y, theta))
@@ -45,6 +51,7 @@ def test_the_pose_is_found(x: float, y: float, theta: float) -> None:
     assert found.usable
 
 
+@LONG
 def test_no_other_pose_scores_more() -> None:
     """Of all free cells and headings, by the same points one after the other."""
     occupied, free = room()
@@ -52,8 +59,6 @@ def test_no_other_pose_scores_more() -> None:
     angles, ranges = cast(occupied, 20.5, 12.5, 1.0)
     angles, ranges = angles[:60], ranges[:60] + np.random.default_rng(0).normal(0.0, 0.1, 60)
     found = matcher.match(angles, ranges)
-    from scipy import ndimage
-
     likelihood = np.exp(-0.5 * (ndimage.distance_transform_edt(~occupied) * RESOLUTION / SIGMA) ** 2)
     rows, columns = np.nonzero(free)
     best = 0.0

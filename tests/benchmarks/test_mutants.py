@@ -55,6 +55,7 @@ def test_a_run_reports_the_mutants_that_no_test_notices(project: Path) -> None:
     assert survivors == ["package/module.py:9  return x > y  ->  return x >= y"]
 
 
+@pytest.mark.long
 def test_tests_that_fail_without_a_mutant_are_an_error(project: Path) -> None:
     session = project / "session.sqlite"
     prepare(session, modules_of(project, "package"), 0, 1)

@@ -26,7 +26,9 @@ def easy() -> Cell:
     return Cell("polygons", 60, "easy", tuple(draw_query(segments, EASY, rng) for _ in range(2)))
 
 
-@pytest.fixture(params=list(PEERS))
+@pytest.fixture(
+    params=["linefix", *(pytest.param(name, marks=pytest.mark.long) for name in PEERS if name != "linefix")]
+)
 def racer(request: pytest.FixtureRequest) -> Iterator[Racer]:
     if not PEERS[request.param].installed:
         pytest.skip(f"{PEERS[request.param].module} is not installed")

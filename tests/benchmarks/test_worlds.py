@@ -10,14 +10,13 @@ import pytest
 
 from association import Status
 from batch import Processes
-from benchmarks.worlds import CONDITIONS, FAMILIES, draw_case
+from benchmarks.worlds import FAMILIES, draw_case
 from benchmarks.worlds.__main__ import _worlds as worlds_named
 from benchmarks.worlds.__main__ import main
 from benchmarks.worlds.measured.goals import BEFORE, rows
 from benchmarks.worlds.measured.outcomes import WorldOutcome, answer, read, share_read, write
-from benchmarks.worlds.measured.pictures import draw_worlds
-from benchmarks.worlds.measured.questions import FORMS, question, questions
-from benchmarks.worlds.measured.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
+from benchmarks.worlds.measured.questions import FORMS, question
+from benchmarks.worlds.measured.running import Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.measured.tables import could_be_told, held, quantile_bins, worst_gap
 from registration import RigidTransform
 
@@ -60,14 +59,6 @@ def test_both_forms_are_of_one_scan_and_the_segments_come_without_beams() -> Non
     assert prior.radius == window.radius
 
 
-def test_questions_are_drawn_by_world_condition_and_number() -> None:
-    drawn = list(questions(["museum", "garage"], ["clean", "doors"], [0, 4]))
-    named = [(q.case.world, q.case.condition, q.case.number) for q in drawn]
-    assert named == [(w, c, n) for w in ("museum", "garage") for c in ("clean", "doors") for n in (0, 4)]
-    alone = next(iter(questions(["garage"], ["doors"], [4])))
-    np.testing.assert_array_equal(alone.case.ranges, drawn[-1].case.ranges)
-
-
 def test_an_answer_is_held_against_the_truth() -> None:
     asked = question(draw_case("factory", "clean", 0))
     for form in FORMS:
@@ -106,17 +97,6 @@ def test_what_brings_no_return_agrees_with_a_map_that_shows_nothing() -> None:
     assert share_read(case, case.truth) > 0.99
     near = replace(case, ranges=np.where(nothing, 0.5 * case.scanner.range_max, case.ranges))
     assert share_read(near, case.truth) == pytest.approx(1.0 - nothing.mean(), abs=0.02)
-
-
-def test_what_is_drawn_is_as_much_as_was_promised() -> None:
-    everything = Choice().chunks
-    drawn = dict.fromkeys((False, True), 0)
-    for chunk in everything:
-        drawn[CONDITIONS[chunk.condition].stranger is not None] += len(chunk.numbers)
-    assert min(drawn.values()) >= 10_000
-    assert len(everything) == len(FAMILIES) * len(CONDITIONS)
-    assert {len(c.numbers) for c in Choice(quick=10).chunks} == {round(IN_MAP / 10), round(STRANGERS / 10)}
-    assert Choice(quick=10**6, first=7).chunks[0].numbers == range(7, 8)
 
 
 @pytest.mark.long
@@ -187,15 +167,6 @@ def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
             main()
         assert caught.value.code == 2
         assert told in capsys.readouterr().err
-
-
-def test_worlds_are_drawn_as_pictures(monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr("benchmarks.pictures.FOLDER", tmp_path)
-    monkeypatch.setattr("benchmarks.worlds.measured.pictures.FOLDER", tmp_path)
-    draw_worlds(["museum"])
-    drawn = (tmp_path / "worlds" / "museum.png").read_bytes()
-    assert drawn.startswith(b"\x89PNG")
-    assert len(drawn) > 10_000
 
 
 def test_bins_hold_as_many_answers_as_asked_and_the_rest_in_the_last() -> None:

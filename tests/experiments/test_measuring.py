@@ -7,7 +7,6 @@ import pytest
 
 from experiments.measuring import Setup, take
 from experiments.scenes import CLEARANCE, NAMES, UNIT, bound, poses, world
-from experiments.trials import Condition
 from registration import RigidTransform, wrap_angle
 from simulation import Scanner, scan
 
@@ -88,10 +87,3 @@ def test_the_bound_is_that_of_the_ranges_derivatives():
     np.testing.assert_allclose(
         bound(name, pose, points, sigma), np.linalg.inv(jacobian.T @ jacobian / sigma**2), rtol=1e-4
     )
-
-
-def test_nothing_smaller_than_asked_for_is_a_pair():
-    rng = Condition("CutSquare", 1000, 3.0, 8, 1).rng(3)
-    setup = Setup(min_length=0.0, purity=0.0)
-    scans = [take(world("CutSquare"), poses("CutSquare")[3], (1000, 3.0), setup, rng) for _ in range(4)]
-    assert all((s.measured.point_counts[s.pairs[:, 0]] >= setup.min_points).all() for s in scans)

@@ -29,11 +29,11 @@ FILES = {
     "unknown": ["unknown.csv", "unknown.png"],
     "basin": ["basin.csv", "basin.png"],
 }  # fmt: skip
-SLOW = {"basin", "hypotheses", "unknown", "sweep", "raw_beams"}  # even in the quick mode
+SHORT = {"printed", "mean_angles", "unreliable"}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.long] if name in SLOW else []) for name in EXPERIMENTS]
+    "name", [pytest.param(name, marks=[] if name in SHORT else [pytest.mark.long]) for name in EXPERIMENTS]
 )
 def test_the_quick_mode_writes_tables_without_gaps_and_figures(name, tmp_path):
     run([name], QUICK, tmp_path, 1)
@@ -54,6 +54,7 @@ def test_every_published_figure_and_table_comes_from_an_experiment():
     assert all(f"experiments/{name}" in text for name in published if name.endswith(".png"))
 
 
+@pytest.mark.long
 def test_two_processes_give_the_numbers_of_one(tmp_path):
     for processes in (1, 2):
         run(["unreliable"], QUICK, tmp_path / str(processes), processes)

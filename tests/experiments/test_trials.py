@@ -18,7 +18,6 @@ from experiments.accuracy import (
     over_bound,
     slopes,
 )
-from experiments.hypotheses import gains_defined_otherwise
 from experiments.measuring import Setup
 from experiments.trials import ESTIMATORS, Condition, Trials, of_world, run
 
@@ -114,19 +113,6 @@ def test_over_the_bound():
     errors[..., 0], errors[..., 2] = 8.0, 6.0
     trials = made(Condition("CutSquare", 300, 3.0, 3, 1), errors, np.ones((2, 3, 2, 2)))
     assert over_bound(trials, "unweighted") == (pytest.approx(2.0), pytest.approx(3.0))
-
-
-def test_other_readings_of_table_1():
-    trials = drawn()
-    weights = np.ones((4, 6, 2))
-    weights[..., 1] = 50.0
-    found = gains_defined_otherwise([dataclasses.replace(trials, weights=weights)])
-    plain = found["geometric mean over conditions"]
-    assert found["arithmetic mean over conditions"].D_t == pytest.approx(plain.D_t)
-    assert found["sums over conditions"].A_t == pytest.approx(plain.A_t)
-    assert found["roots of the mean squares"].D_t == pytest.approx(np.sqrt(plain.D_t))
-    assert found["weights not divided by their sum"].A_t == pytest.approx(50.0 * plain.A_t)
-    assert found["error of the transform, not of the sensor"].D_t == pytest.approx(plain.D_t)
 
 
 def test_the_same_condition_gives_the_same_scans_whatever_is_estimated():

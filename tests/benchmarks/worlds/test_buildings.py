@@ -1,16 +1,21 @@
+"""Drawn buildings: their free sides and things, places in them, and floors that share what floors share."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np
 import pytest
 
-from benchmarks.worlds import FAMILIES, free_place
+from benchmarks.worlds import FAMILIES, FLOOR_KINDS, draw_floors, free_place, free_places
 from benchmarks.worlds.buildings import FIXED, Building
 from benchmarks.worlds.buildings.plan import Plan
-from benchmarks.worlds.buildings.shapes import arc, box, chamfered, crosses, edges, oblong, ring
+from benchmarks.worlds.buildings.shapes import box, crosses, edges
+from benchmarks.worlds.places import distances, is_free
+from registration import Segments
 from simulation import Scanner, SimulationError, scan
 
 ALL_AROUND = Scanner.over(math.tau, 720, range_max=500.0, sigma=0.0)
-SEEDS = (1, 2)
 
 
 def draw(name: str, seed: int) -> Building:
@@ -24,9 +29,8 @@ def area(outline: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_robot_sees_free_sides_alone(name: str, seed: int) -> None:
-    building, rng = draw(name, seed), np.random.default_rng(seed)
+def test_a_robot_sees_free_sides_alone(name: str) -> None:
+    building, rng = draw(name, 1), np.random.default_rng(1)
     for _ in range(6):
         pose = free_place(building.segments, rng)
         seen = scan(building.segments, pose, ALL_AROUND)
@@ -41,32 +45,6 @@ def test_a_building_is_closed_but_for_a_street(name: str) -> None:
     building = draw(name, 3)
     pose = free_place(building.segments, np.random.default_rng(3))
     assert np.isfinite(scan(building.segments, pose, ALL_AROUND).ranges).all()
-
-
-@pytest.mark.parametrize("name", FAMILIES)
-@pytest.mark.parametrize("seed", SEEDS)
-def test_sizes_are_those_of_buildings(name: str, seed: int) -> None:
-    building = draw(name, seed)
-    corners = building.segments.endpoints.reshape(-1, 2)
-    assert 40 <= len(building.segments) <= 1700
-    assert np.ptp(corners, axis=0).min() > 8.0
-    assert np.ptp(corners, axis=0).max() < 150.0
-    assert building.segments.lengths.min() > 0.01
-    assert building.name == name
-
-
-@pytest.mark.parametrize("name", FAMILIES)
-def test_the_same_seed_draws_the_same_building_and_sisters_differ(name: str) -> None:
-    one, again, other = draw(name, 5), draw(name, 5), draw(name, 6)
-    np.testing.assert_array_equal(one.segments.endpoints, again.segments.endpoints)
-    np.testing.assert_array_equal(one.things, again.things)
-    rng = np.random.default_rng(5)
-    style = FAMILIES[name].draw(rng)
-    sisters = style.build(rng), style.build(rng)
-    for different in (other, sisters[1]):
-        assert different.segments.endpoints.shape != one.segments.endpoints.shape or not np.allclose(
-            different.segments.endpoints, one.segments.endpoints
-        )
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -97,31 +75,6 @@ def test_half_of_the_families_are_kept_for_the_report() -> None:
     assert sum(family.held_out for family in FAMILIES.values()) == len(FAMILIES) // 2
 
 
-def test_an_opening_joins_two_rooms() -> None:
-    plan = Plan()
-    plan.room(box(0.0, 0.0, 4.0, 3.0))
-    plan.room(box(4.2, 0.0, 8.0, 3.0))
-    plan.opening((4.0, 1.0), (4.0, 2.0), 0.2, door=True)
-    building = plan.building("two rooms")
-    expected = [
-        [0, 0, 4, 0], [4, 3, 0, 3], [0, 3, 0, 0], [4.2, 0, 8, 0], [8, 0, 8, 3], [8, 3, 4.2, 3],
-        [4, 1, 4.2, 1], [4.2, 2, 4, 2], [4, 0, 4, 1], [4, 2, 4, 3], [4.2, 3, 4.2, 2], [4.2, 1, 4.2, 0],
-    ]  # fmt: skip
-    drawn = sorted(np.round(building.segments.endpoints, 9).tolist())
-    assert drawn == sorted(np.array(expected, dtype=float).tolist())
-    assert building.doors.tolist() == [[4.0, 1.0, 4.0, 2.0]]
-
-
-def test_a_recess_sets_a_wall_back() -> None:
-    plan = Plan()
-    plan.room(box(0.0, 0.0, 4.0, 3.0))
-    plan.recess((1.0, 0.0), (3.0, 0.0), 0.5)
-    drawn = np.round(plan.building("niche").segments.endpoints, 9).tolist()
-    for wall in ([0, 0, 1, 0], [1, 0, 1, -0.5], [1, -0.5, 3, -0.5], [3, -0.5, 3, 0], [3, 0, 4, 0]):
-        assert [float(v) for v in wall] in drawn
-    assert len(drawn) == 8
-
-
 def test_an_opening_in_no_wall_is_refused() -> None:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 3.0))
@@ -129,43 +82,6 @@ def test_an_opening_in_no_wall_is_refused() -> None:
     with pytest.raises(SimulationError) as caught:
         plan.building("no room behind")
     assert caught.value.argument == "opening"
-
-
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_parts_lie_where_they_are_put_with_free_space_on_the_left(mirrored: bool) -> None:
-    plan = Plan()
-    part = plan.at(10.0, 5.0, 0.5 * math.pi, mirrored=mirrored)
-    part.room(box(0.0, 0.0, 4.0, 3.0))
-    part.thing("box", box(1.0, 1.0, 2.0, 2.0))
-    part.wall([(0.5, 0.5), (3.5, 0.5)])
-    building = plan.building("part")
-    sign = -1.0 if mirrored else 1.0
-    room, wall, thing = np.split(building.segments.endpoints, [4, 5])
-    assert area(room) == pytest.approx(12.0)
-    assert area(thing) == pytest.approx(-1.0)
-    # x of the part is y of the plan, its y is -x.
-    assert thing[:, :2].mean(axis=0).tolist() == pytest.approx([8.5, 5.0 + 1.5 * sign])
-    begin, end = (wall[0, :2], wall[0, 2:]) if not mirrored else (wall[0, 2:], wall[0, :2])
-    assert begin.tolist() == pytest.approx([9.5, 5.0 + 0.5 * sign])
-    assert end.tolist() == pytest.approx([9.5, 5.0 + 3.5 * sign])
-
-
-def test_a_thing_in_a_wall_or_in_another_is_left_out() -> None:
-    plan = Plan()
-    plan.room(box(0.0, 0.0, 4.0, 3.0))
-    plan.thing("first", box(1.0, 1.0, 2.0, 2.0))
-    plan.thing("in the first", box(1.5, 1.5, 2.5, 2.5))
-    plan.thing("in a wall", box(3.5, 1.0, 4.5, 2.0))
-    plan.thing("last", box(2.5, 0.5, 3.0, 1.0))
-    assert plan.building("room").kinds == ("first", "last")
-
-
-def test_shapes_are_counter_clockwise_and_of_their_size() -> None:
-    assert area(edges(box(0, 0, 2, 1))) == pytest.approx(2.0)
-    assert area(edges(oblong(3, 4, 2, 1, 0.7))) == pytest.approx(2.0)
-    assert area(edges(chamfered(0, 0, 2, 1, 0.3, 0.2))) == pytest.approx(2.0 - 4 * 0.5 * 0.2**2)
-    assert area(edges(ring(1, 1, 2.0, 400))) == pytest.approx(4.0 * math.pi, rel=1e-3)
-    np.testing.assert_allclose(arc(0, 0, 1.0, 0.0, math.pi, 2), [[1, 0], [0, 1], [-1, 0]], atol=1e-12)
 
 
 def test_outlines_that_cross_are_told_from_those_that_touch() -> None:
@@ -177,3 +93,72 @@ def test_outlines_that_cross_are_told_from_those_that_touch() -> None:
     angle = edges(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]))
     assert not crosses(angle, np.array([[0.5, 0.5, 0.5, 1.5], [1.2, 1.2, 1.8, 1.8]]))
     assert crosses(angle, np.array([[0.5, 0.6, 1.5, 1.8]]))
+
+
+ROOM = np.vstack([edges(box(0, 0, 6, 4)), edges(box(2, 1, 3, 2)[::-1])])  # with a pillar
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "free"),
+    [(1.0, 1.0, True), (4.5, 2.0, True), (0.3, 2.0, False), (2.5, 1.5, False), (3.3, 1.5, False), (7.0, 2.0, False)],
+)
+def test_a_place_is_free_away_from_walls_and_on_their_free_side(x: float, y: float, free: bool) -> None:
+    assert is_free(Segments.from_array(ROOM), x, y) is free
+
+
+def test_a_place_from_which_nothing_is_seen_is_none() -> None:
+    far = Segments.from_array([[0.0, 0.0, 1.0, 0.0]])
+    assert not is_free(far, 0.5, 10.0)
+
+
+def test_distances_are_those_of_segments_and_not_of_lines() -> None:
+    walls = Segments.from_array([[0, 0, 2, 0], [5, 0, 5, 1]])
+    np.testing.assert_allclose(distances(walls, 1.0, 3.0), [3.0, np.hypot(4.0, 2.0)])
+
+
+def test_places_are_spread_over_all_that_is_free() -> None:
+    rng = np.random.default_rng(1)
+    places = [free_place(Segments.from_array(ROOM), rng) for _ in range(400)]
+    x = np.array([p.x for p in places])
+    # 0.4 m off all walls: 5.2 m by 3.2 m less a pillar; a third of it is right of 4 m.
+    assert np.mean(x > 4.0) == pytest.approx(1.6 * 3.2 / (5.2 * 3.2 - 1.8**2), abs=0.08)
+    assert len({round(p.theta, 6) for p in places}) == 400
+
+
+def test_where_there_is_no_room_there_is_an_error() -> None:
+    with pytest.raises(SimulationError) as caught:
+        free_place(Segments.from_array(edges(box(0, 0, 0.6, 0.6))), np.random.default_rng(0))
+    assert caught.value.argument == "segments"
+
+
+@pytest.mark.parametrize("name", FLOOR_KINDS)
+def test_floors_share_outer_walls_and_shafts_and_differ_otherwise(name: str) -> None:
+    kind = FLOOR_KINDS[name]
+    floors = draw_floors(kind, 4, np.random.default_rng(3))
+    rows = [{tuple(row) for row in floor.endpoints.tolist()} for floor in floors]
+    shared = set.intersection(*rows)
+    width, depth = kind.size
+    outer = {(0.0, 0.0, width, 0.0), (width, 0.0, width, depth), (width, depth, 0.0, depth), (0.0, depth, 0.0, 0.0)}
+    assert outer <= shared
+    assert len(shared) >= 4 + 3 * 4  # the outer walls, and three cores
+    assert all(len(own - shared) >= 10 for own in rows)
+    assert all(own != other for k, own in enumerate(rows) for other in rows[:k])
+
+
+def test_the_same_generator_draws_the_same_floors() -> None:
+    kind = FLOOR_KINDS["flats"]
+    first, second = (draw_floors(kind, 2, np.random.default_rng(8)) for _ in range(2))
+    assert all((a.endpoints == b.endpoints).all() for a, b in zip(first, second, strict=True))
+
+
+@pytest.mark.parametrize("name", FLOOR_KINDS)
+def test_places_are_free_and_inside(name: str) -> None:
+    kind, rng = FLOOR_KINDS[name], np.random.default_rng(1)
+    (floor,) = draw_floors(kind, 1, rng)
+    for x, y in free_places(floor, kind, 20, rng):
+        assert 0.0 < x < kind.size[0]
+        assert 0.0 < y < kind.size[1]
+        begins, ends = floor.endpoints[:, :2], floor.endpoints[:, 2:]
+        along = np.clip(((np.array([x, y]) - begins) * (ends - begins)).sum(axis=1) / floor.lengths**2, 0.0, 1.0)
+        gaps = np.linalg.norm(begins + along[:, None] * (ends - begins) - [x, y], axis=1)
+        assert gaps.min() >= 0.45
