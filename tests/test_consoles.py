@@ -16,7 +16,10 @@ def place() -> Iterator[tuple[Path, str]]:
         yield given
 
 
-@pytest.mark.parametrize("document", documents(), ids=lambda path: path.name)
+PARTS = [pytest.param(path, marks=[pytest.mark.long] * (path.name != "README.md")) for path in documents()]
+
+
+@pytest.mark.parametrize("document", PARTS, ids=lambda path: path.name)
 def test_the_output_of_the_blocks_is_as_shown(document: Path, place: tuple[Path, str]) -> None:
     assert faults(document, *place) == []
 

@@ -132,6 +132,7 @@ def caddy(service_port: int, port: int, folder: Path) -> list[str]:
     return [*data, "caddy", "run", "--adapter", "caddyfile", "--config", str(written)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("proxy", [nginx, caddy])
 def test_a_proxy_stands_in_front(
     proxy: Callable[[int, int, Path], list[str]], start_service: Callable[..., RunningService], tmp_path: Path
@@ -175,6 +176,7 @@ def in_a_head(port: int) -> socket.socket:
     return connection
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "count"), [(silent, 600), (in_a_handshake, 600), (in_a_head, 100)])
 def test_connections_that_say_little_end_at_nginx(
     kind: Callable[[int], socket.socket], count: int, start_service: Callable[..., RunningService], tmp_path: Path
@@ -201,6 +203,7 @@ def test_connections_that_say_little_end_at_nginx(
         process.wait(60)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("proxy", [nginx, caddy])
 def test_no_way_of_writing_a_path_passes_its_rule(
     proxy: Callable[[int, int, Path], list[str]], service: RunningService, tmp_path: Path

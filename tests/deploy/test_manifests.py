@@ -13,7 +13,7 @@ import yaml
 
 from service.serving import GRACE
 from service.settings import Settings
-from tests.faults.replicas import CONF
+from tests.deploy.replicas import CONF
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 KUBERNETES = DEPLOY / "kubernetes"
@@ -141,7 +141,7 @@ def test_compose_file_is_valid() -> None:
     "line", ["max_fails=0;", "proxy_next_upstream ", "proxy_next_upstream_tries", "proxy_connect_timeout"]
 )
 def test_the_proxy_does_what_was_tested(line: str) -> None:
-    """By tests/faults/test_replicas.py, with a file of its own."""
+    """By tests/deploy/test_replicas.py, with a file of its own."""
     deployed = [text for text in (REPLICAS / "nginx.conf").read_text().splitlines() if line in text]
     tested = [text for text in CONF.splitlines() if line in text]
     if line == "max_fails=0;":

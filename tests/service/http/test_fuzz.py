@@ -21,7 +21,7 @@ from linefix.documents import examples
 from tests.running import RunningService, running
 from tests.service.importing.forms import SQUARE, TYPE, form, room_grid
 
-CASES = int(os.environ.get("FUZZ_CASES", "1000"))
+CASES = int(os.environ.get("FUZZ_CASES", "300"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
 HELD = [
     checks.status_code_conformance,
@@ -36,7 +36,7 @@ GROWTH = 32e6  # bytes that requests may leave behind
 def fuzz(share: float) -> settings:
     """Give a test its share of the cases; the same ones every time, unless there are many."""
     return settings(
-        max_examples=max(5, round(share * CASES)),
+        max_examples=max(3, round(share * CASES)),
         deadline=None,
         suppress_health_check=list(HealthCheck),
         phases=[Phase.explicit, Phase.generate],
@@ -306,7 +306,7 @@ def test_memory_stays_flat(fuzzed: RunningService, client: httpx.Client) -> None
     """The same again after everything else: what the requests took has been given back."""
     bodies = [orjson.dumps(BODIES[path]) for path in PATHS] + [b"[" * 100_000, b"\xff" * 100_000]
     before = resident(fuzzed)
-    for number in range(max(300, CASES // 20)):
+    for number in range(max(200, CASES // 20)):
         assert_sane(client.post(PATHS[number % 4], content=bodies[number % len(bodies)]))
     assert resident(fuzzed) - before < GROWTH
     print(f"memory after {CASES} cases: {resident(fuzzed) / 1e6:.0f} MB")

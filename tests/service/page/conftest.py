@@ -12,6 +12,15 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from tests.running import RunningService
 
 CHROMIUM = "LINEFIX_TEST_CHROMIUM"
+# All others that drive a browser are long.
+SHORT = ("test_it_opens_with_an_example", "test_a_robot_is_dragged", "test_files_of_a_user", "test_stored_maps")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "browser" in getattr(item, "fixturenames", ()) and item.name not in SHORT:
+            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="module")

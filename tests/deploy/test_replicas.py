@@ -12,9 +12,10 @@ import httpx
 import pytest
 
 from linefix.documents import examples
-from tests.faults.replicas import Replicas, replicas
+from tests.deploy.replicas import Replicas, replicas
 from tests.running import client_of, until
 
+pytestmark = pytest.mark.long
 STORED = {"map": {"map_id": "m"}, "scan": {"segments": examples.SEEN}}
 CLIENTS = 4
 
@@ -137,7 +138,6 @@ def test_a_lost_database_is_told_and_recovered_from(three: Replicas) -> None:
     nothing_is_lost(three, load)
 
 
-@pytest.mark.long
 def test_a_killed_replica_costs_what_it_was_at(three: Replicas) -> None:
     with loaded(three.url) as load:
         three.kill(1)
@@ -152,7 +152,6 @@ def test_a_killed_replica_costs_what_it_was_at(three: Replicas) -> None:
     nothing_is_lost(three, load)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("rounds", [3])
 def test_a_rolling_update_costs_what_comes_in_the_moment_of_the_end(three: Replicas, rounds: int) -> None:
     with loaded(three.url) as load:

@@ -118,6 +118,7 @@ def test_a_read_only_disk_is_read(start_service: Callable[..., Any], disk: Path)
     assert "a defect" not in again.log()
 
 
+@pytest.mark.long
 def test_a_read_only_disk_without_a_database(start_service: Callable[..., Any], disk: Path) -> None:
     assert mount("-o", "remount,ro", str(disk)).returncode == 0
     running = start_service(probe="/livez", database_url=f"sqlite:///{disk / 'maps.sqlite3'}")
