@@ -9,10 +9,9 @@ import pytest
 
 from association import CancelledError, Deadline, MapIndex, MapPoints, Status
 from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
-from map_quality.analyze.standing import is_free
 from map_quality.views import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from registration import Segments
-from simulation import corridor, l_room, outline, rectangle_room
+from simulation import corridor, l_room, outline
 
 L = [(0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (5.0, 3.0), (5.0, 6.0), (0.0, 6.0)]
 
@@ -73,12 +72,6 @@ def test_points_separate_equal_rooms_and_stand_in_the_way() -> None:
     assert not any(one.usable for one in found if one.pose.x > 10.0)
 
 
-def test_a_rectangle_is_its_own_look_alike() -> None:
-    one = next(iter(looks(analyzed(rectangle_room().segments))))
-    assert one.similar_pose is not None
-    assert (one.similar_pose.x, one.similar_pose.y) == pytest.approx((-one.pose.x, -one.pose.y), abs=0.1)
-
-
 def test_a_corridor_leaves_one_direction_free() -> None:
     found = looks(analyzed(corridor().segments, 1.3, Robot(range_max=8.0)))
     inside = [one for one in found if abs(one.pose.x) < 20.0]
@@ -88,16 +81,6 @@ def test_a_corridor_leaves_one_direction_free() -> None:
         assert one.probability is None
         assert one.unobservable is not None
         assert abs(one.unobservable[0]) == pytest.approx(1.0, abs=1e-3)
-
-
-def test_places_outside_and_near_walls_are_not_free() -> None:
-    segments = Segments.from_array(outline(L))
-    standing = standing_places(segments, Robot(), 0.3)
-    assert standing.poses[:, 1].min() == pytest.approx(0.15)
-    for k in range(len(standing.poses)):
-        pose = standing.pose(k)
-        inside = 0.2 < pose.x < 7.8 and 0.2 < pose.y < (2.8 if pose.x > 4.8 else 5.8)
-        assert is_free(segments, pose, 20.0, oriented=True) == inside, pose
 
 
 def test_a_sure_answer_that_is_another_place_is_a_look_alike() -> None:
@@ -146,13 +129,6 @@ def test_a_place_is_the_same_whenever_it_is_tried() -> None:
     assert [first.look(k) for k in numbers] == [second.look(k) for k in reversed(numbers)][::-1]
     other = Analysis(first.index, first.segments, first.robot, first.standing, seed=1)
     assert [first.look(k) for k in numbers] != [other.look(k) for k in numbers]
-
-
-def test_the_order_covers_the_map_early() -> None:
-    places = standing_places(two_rooms(), Robot(), 0.5)
-    early = places.poses[places.order[: len(places.order) // 10]]
-    assert (early[:, 0] < 10.0).mean() == pytest.approx((places.poses[:, 0] < 10.0).mean(), abs=0.15)
-    assert sorted(places.order.tolist()) == list(range(len(places.poses)))
 
 
 def test_far_from_the_origin() -> None:

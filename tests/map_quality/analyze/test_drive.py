@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from association import Deadline, MapIndex, Scan, Status
+from association import Deadline, MapIndex, Status
 from map_quality import Analysis, PlaceVerdict, Robot, standing_places
-from map_quality.analyze.drive import CLEARANCE, STEP, seen_on_the_way, ways_from
+from map_quality.analyze.drive import CLEARANCE, STEP, ways_from
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 from simulation import corridor, outline, rectangle_room
@@ -83,34 +83,6 @@ def test_a_drive_keeps_from_walls_and_ends_where_there_is_no_room() -> None:
             assert CLEARANCE * 0.9 < after.x < 40.0 - CLEARANCE * 0.9
     closet = Segments.from_array(outline([(0.0, 0.0), (1.2, 0.0), (1.2, 1.2), (0.0, 1.2)]))
     assert [list(way) for way in ways_from(closet, RigidTransform(0.6, 0.6, 0.0), 30.0, REACH)] == [[], []]
-
-
-def test_it_sets_out_to_where_most_room_is() -> None:
-    """Of four wings of different length, one this way and one that way, and on the other drive to the next longest."""
-    wings = [(9.0, 0.4), (3.0, 0.4 + 0.5 * math.pi), (6.0, 0.4 + math.pi), (4.0, 0.4 - 0.5 * math.pi)]
-    corners = []
-    for long, way in sorted(wings, key=lambda wing: math.remainder(wing[1], math.tau)):
-        ahead, aside = np.array([math.cos(way), math.sin(way)]), np.array([-math.sin(way), math.cos(way)])
-        corners += [ahead - aside, long * ahead - aside, long * ahead + aside]
-    segments = Segments.from_array(outline([(float(x), float(y)) for x, y in corners]))
-    ways = [list(way) for way in ways_from(segments, RigidTransform(0.0, 0.0, 1.0), 5.5, 20.0)]
-    assert [len(way) for way in ways] == [5, 5]
-    assert ways[0][0].theta == pytest.approx(0.4, abs=math.radians(5.0))
-    assert abs(math.remainder(ways[1][0].theta - 0.4 - math.pi, math.tau)) < math.radians(10.0)
-
-
-def test_what_was_seen_is_told_in_the_frame_of_the_last_view() -> None:
-    """Without errors each view would be where it was; with them it is off by a few centimetres."""
-    analysis = hall(10.0)
-    poses = [RigidTransform(x, 1.0, theta) for x, theta in ((20.0, 1.4), (21.0, 0.0), (21.0, 1.5), (22.0, 1.5))]
-    views = [(pose, analysis._scan(pose, k)) for k, pose in enumerate(poses)]
-    together = seen_on_the_way(views, np.random.default_rng(3))
-    assert together.views is not None
-    in_order = [poses[-1].inverse().compose(pose) for pose in reversed(poses)]
-    for told, true in zip(together.views.poses, in_order, strict=True):
-        assert (told.x, told.y, told.theta) == pytest.approx((true.x, true.y, true.theta), abs=0.15)
-    assert together.views.poses[1:] != tuple(in_order[1:])
-    assert isinstance(seen_on_the_way(views[:1], np.random.default_rng(3)), Scan)
 
 
 def test_a_drive_is_the_same_whenever_it_is_tried() -> None:

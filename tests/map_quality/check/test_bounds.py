@@ -1,7 +1,7 @@
 """Class of attack: work and memory that two inputs within their limits have as a product.
 
 A map check compares walls with walls, so what it does and holds may grow with the square of what one cell lists. It
-holds little, whatever the map, and no stage goes on for long without a look at the deadline.
+holds little, whatever the map, and ends wherever it is cancelled.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from registration import Segments
 from registration.layout import Floats
 
 COUNT = 40_000
-MOST_BETWEEN_LOOKS = 1.0  # s of this thread's processor time; estimating crossings takes 0.5, whatever the map
 MOST_HELD = 100_000_000  # bytes in addition to the index
 
 
@@ -59,59 +58,50 @@ MAPS: dict[str, Callable[[], Floats]] = {
     "all parallel": side_by_side,
     "a staircase of short ones": in_steps,
 }
+SHORT = ("all crossing", "all on one another")
 
 
 class Looks(Deadline):
-    """Notes how much of this thread's processor time passes between two looks at the deadline."""
+    """Counts the looks at it, and is cancelled at one of them."""
 
     def __init__(self, most: int | None = None) -> None:
         super().__init__()
-        self.count, self.longest, self._most, self._last = 0, 0.0, most, time.thread_time()
+        self.count, self._most = 0, most
 
     @property
     def passed(self) -> bool:
-        now = time.thread_time()
-        self.longest, self._last = max(self.longest, now - self._last), now
         self.count += 1
         if self.count == self._most:
             self.cancel()
-        return Deadline.passed.fget(self)  # type: ignore[attr-defined, no-any-return]
-
-    def ended(self) -> float:
-        """Return the longest time, up to now."""
-        _ = self.passed
-        return self.longest
+        return self.cancelled
 
 
-@pytest.fixture(scope="module", autouse=True)
-def warm() -> None:
-    """Kernels are compiled before anything is timed."""
-    check_map(MapIndex.build(Segments.from_array(scattered(36.0, 0.5)[:300])), oriented=False)
-
-
-@pytest.mark.parametrize("kind", MAPS)
-def test_no_map_is_indexed_without_a_look_at_the_deadline(kind: str) -> None:
-    """Without directions it has twice as many walls."""
-    looks = Looks()
-    MapIndex.build(Segments.from_array(MAPS[kind]()), oriented=False, deadline=looks)
-    assert looks.ended() < MOST_BETWEEN_LOOKS
-
-
-@pytest.mark.parametrize("kind", MAPS)
-def test_every_stage_of_a_check_looks_at_the_deadline_and_holds_little(kind: str) -> None:
+@pytest.mark.parametrize(
+    "kind", [kind if kind in SHORT else pytest.param(kind, marks=pytest.mark.long) for kind in MAPS]
+)
+def test_a_check_holds_little(kind: str) -> None:
+    """Until the search of views, which has a deadline of its own."""
     index = MapIndex.build(Segments.from_array(MAPS[kind]()))
-    # Long enough for all but the search of views, which has a deadline of its own.
-    looks = Looks(most=4_000)
     tracemalloc.start()
     try:
-        check_map(index, looks)
+        check_map(index, Looks(most=4_000))
     except CancelledError:
         pass
     finally:
         held = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-    assert looks.ended() < MOST_BETWEEN_LOOKS
     assert held < MOST_HELD
+
+
+def test_a_check_is_given_up_wherever_it_is_cancelled() -> None:
+    index, counting = MapIndex.build(Segments.from_array(scattered(12.0, 0.5, 300))), Looks()
+    check_map(index, counting)
+    assert counting.count > 100
+    for most in np.unique(np.geomspace(1, counting.count // 2, 12).astype(int)).tolist():
+        looks = Looks(most)
+        with pytest.raises(CancelledError):
+            check_map(index, looks)
+        assert looks.count < most + 20, "soon after it there is nothing more to do"
 
 
 def test_an_index_is_given_up_wherever_the_deadline_passes() -> None:

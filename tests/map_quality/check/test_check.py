@@ -10,8 +10,7 @@ import pytest
 
 from association import CancelledError, Deadline, MapIndex
 from map_quality import MapCheck, check_map
-from map_quality.views import Robot, look
-from registration import RigidTransform, Segments
+from registration import Segments
 from registration.layout import Floats
 from simulation import OfficePlan, offices
 
@@ -175,19 +174,6 @@ def test_what_looks_alike() -> None:
         assert abs(round(away / 5.0)) in (1, 2)
         assert away == pytest.approx(5.0 * round(away / 5.0), abs=0.05)
         assert place.similar_pose.y == pytest.approx(place.pose.y, abs=0.05)
-
-
-def test_a_view_is_what_stands_there() -> None:
-    here, segments = RigidTransform(4.0, 3.0, 0.7), Segments.from_array(ROOM)
-    seen = look(segments, here, Robot(beams=720, sigma=1e-4), np.random.default_rng(0))
-    assert set(seen.hits.tolist()) >= {0, 1, 2, 3, 4, 8}
-    back = here.apply(seen.scan.measured.segments.endpoints.reshape(-1, 2, 2))
-    assert len(back) >= 6
-    for ends in back:
-        off = [np.abs((ends - wall[:2]) @ normal).max() for wall, normal in zip(ROOM, segments.normals, strict=True)]
-        wall = int(np.argmin(off))
-        assert off[wall] < 0.01
-        assert (ends[1] - ends[0]) @ (ROOM[wall, 2:] - ROOM[wall, :2]) > 0.0
 
 
 def test_maps_far_out_and_of_one_segment() -> None:

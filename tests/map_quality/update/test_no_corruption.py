@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import map_quality
-from association import CancelledError, Deadline, MapIndex
+from association import CancelledError, Deadline, MapIndex, mirrored
+from linefix import LaserScan, scan_of
 from map_quality import UpdateError, VisitScan
 from map_quality.scale import Matched, errors_of
 from map_quality.update.hanging import hanging_lines, on_lines
 from map_quality.update.scans import Localized, held_back, search
 from registration import InputError, RigidTransform, Segments
-from simulation import Scanner
+from simulation import Scanner, scan
 
 from .hall import PILLAR, RACK, SCANNER, box, segments, visit
 
@@ -42,16 +43,8 @@ def test_scans_off_scale_change_nothing(factor: float) -> None:
 
 
 def test_scans_of_a_mirrored_laser_change_nothing() -> None:
-    mirrored = replace(SCANNER, angle_min=-SCANNER.angle_min, angle_increment=-SCANNER.angle_increment)
-    scans = []
-    for one in days(TODAY, scanner=mirrored):
-        beams = one.scan.beams
-        assert beams is not None
-        flipped = map_quality.VisitScan(one.scan, one.visit)
-        scans.append(flipped)
-    from association import mirrored as mirror
-
-    scans = [replace(one, scan=mirror(one.scan)) for one in scans]
+    backward = replace(SCANNER, angle_min=-SCANNER.angle_min, angle_increment=-SCANNER.angle_increment)
+    scans = [replace(one, scan=mirrored(one.scan)) for one in days(TODAY, scanner=backward)]
     found = map_quality.update(index(), scans)
     assert found.changes == ()
     assert found.refused_visits
@@ -127,9 +120,6 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     corridor = Segments.from_array(np.array([[0, 0, 30, 0], [30, 0, 30, 2], [30, 2, 0, 2]], dtype=float))
     known = MapIndex.build(corridor, 0.01)
     at = RigidTransform(24.0, 1.0, 0.0)
-    from linefix import LaserScan, scan_of
-    from simulation import scan
-
     ranges = scan(corridor, at, SCANNER, np.random.default_rng(1)).ranges
     seen = scan_of(LaserScan(SCANNER.angle_min, SCANNER.angle_increment, ranges, 0.0, 20.0))
     one = VisitScan(seen, "day 0", at, np.diag([0.01, 0.01, 0.01]))
@@ -143,15 +133,7 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
 FEW_USABLE = pytest.mark.xfail(strict=True, reason="1 to 3 scans are usable, not 4")
 
 
-@pytest.mark.parametrize(
-    "factor",
-    [
-        pytest.param(0.98, marks=FEW_USABLE),
-        pytest.param(0.995, marks=FEW_USABLE),
-        1.0,
-        pytest.param(1.015, marks=FEW_USABLE),
-    ],
-)
+@pytest.mark.parametrize("factor", [1.0, pytest.param(1.015, marks=FEW_USABLE)])
 def test_the_scale_of_scans_is_estimated_with_their_poses_and_an_error_of_all_ranges(factor: float) -> None:
     known, found = index(), []
     for one in days(HALL, change=lambda ranges: ranges * factor + 0.01):

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
-import pytest
 
 import map_quality
-from association import AssociationResult, Deadline, MapIndex
+from association import MapIndex
 from benchmarks.worlds.map_errors import walls_off
-from map_quality import MapUpdate, VisitScan
-from map_quality.update.scans import search
+from map_quality import MapUpdate
 from registration import Segments
 
 from .hall import PILLAR, RACK, box, segments, visit
@@ -38,7 +34,7 @@ def off(ends: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 def test_walls_come_nearer_to_the_truth_and_their_sigma_tells_how_near() -> None:
     squares, ratios = [], []
-    for seed in range(6):
+    for seed in range(3):
         old = blurred(seed)
         found = updated(old)
         assert found.changes == ()
@@ -78,23 +74,3 @@ def test_a_map_that_is_sharp_or_does_not_declare_its_sigma_stays_as_it_is() -> N
     scans = [one for k in range(3) for one in visit(TRUE, f"day {k}", k)]
     found = map_quality.update(MapIndex.build(TRUE), scans)
     assert (found.sigma, len(found.sharpened.segments)) == (None, 0)
-
-
-def test_scans_that_see_no_change_are_searched_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On the old map, and on the sharper one; they serve the sharpening of the other walls as they are."""
-    updating = importlib.import_module("map_quality.update.update")
-    maps: list[int] = []
-
-    def counted(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
-        maps.append(len(index.segments))
-        return search(index, one, deadline)
-
-    monkeypatch.setattr(updating, "search", counted)
-    in_the_niche = box(5.8, 8.2, 6.4, 8.8)  # that few of the places see
-    old = walls_off(segments(RACK, PILLAR, in_the_niche), np.random.default_rng(3), SIGMA).segments
-    scans = [one for k in range(5) for one in visit(segments(RACK, PILLAR), f"day {k}", k)]
-    found = map_quality.update(MapIndex.build(old, SIGMA), scans)
-    assert sorted(k for one in found.changes for k in one.segments) == [20, 21, 22, 23]
-    assert len(found.sharpened.segments) >= 10
-    assert maps.count(len(old)) == len(scans)
-    assert len(maps) < 3 * len(scans)

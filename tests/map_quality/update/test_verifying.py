@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from association import Deadline, MapIndex, Reason, ReasonCode
-from map_quality import Change, Evidence, VisitScan
-from map_quality.update.applying import apply, kept_indices
-from map_quality.update.beams import Chunks, sees
+from map_quality import Evidence, VisitScan
 from map_quality.update.changes import Draft
 from map_quality.update.evidence import Gatherer
 from map_quality.update.scans import Localized, is_vouched, on_map, search
@@ -71,18 +69,6 @@ def test_the_changes_that_lost_scans_see_are_blamed_and_no_others() -> None:
     assert blamed(seen[1:2], 0.0) == []  # no change is to blame
 
 
-def test_a_scan_sees_a_wall_if_a_beam_meets_it() -> None:
-    (one, *_) = localized(HALL, HALL)
-    assert one.usable
-    rack, pillar, away = (Chunks.of(Segments.derived(HALL.endpoints[rows])) for rows in ([12], [17], [5]))
-    behind = Chunks.of(Segments.from_array(np.array([[13.5, 2.0, 13.5, 3.0]])))
-    assert sees(rack, one, 0.005, Deadline())
-    assert sees(pillar, one, 0.005, Deadline()) or sees(away, one, 0.005, Deadline())
-    assert not sees(behind, one, 0.005, Deadline())
-    lost = replace(one, result=replace(one.result, covariance=None))
-    assert sees(behind, lost, 0.005, Deadline())  # it may be anywhere
-
-
 @pytest.mark.parametrize(
     ("codes", "vouched"),
     [(("single_wall",), True), (("map_mismatch", "single_wall"), True), (("similar_place",), False)],
@@ -97,19 +83,6 @@ def test_a_pose_of_the_sender_confirms_one_that_an_old_map_makes_unusable(
         sent = VisitScan(one.scan, "day 0", pose, np.diag([0.04, 0.04, math.radians(6.0) ** 2]))
         assert is_vouched(sent, result) is confirmed
     assert not is_vouched(VisitScan(one.scan, "day 0"), result)
-
-
-def test_changes_replace_remove_and_append_segments_in_their_order() -> None:
-    old = Segments.from_array(np.array([[k, 0.0, k + 1.0, 0.0] for k in range(5)]))
-    shorter = np.array([[1.0, 0.0, 1.3, 0.0], [1.6, 0.0, 2.0, 0.0]])
-    new = np.array([[0.0, 5.0, 1.0, 5.0]])
-    changes = [
-        Change("shortened", (1,), shorter, np.full(2, 0.01), SHOWN, 0.99),
-        Change("moved", (3,), new, np.full(1, 0.01), SHOWN, 0.99),
-    ]
-    expected = [old.endpoints[0], shorter[0], old.endpoints[2], old.endpoints[4], shorter[1], new[0]]
-    assert apply(old, changes).endpoints.tolist() == np.array(expected).tolist()
-    assert kept_indices(5, changes).tolist() == [0, -1, 2, 4, -1, -1]
 
 
 def test_correspondences_go_over_to_another_map_with_the_same_walls() -> None:
