@@ -70,8 +70,9 @@ async function readMap(files: File[], mine: number): Promise<void> {
   changed();
 }
 
-/** Raise an error where a grid's YAML file was chosen without its picture. */
+/** Raise an error where of a grid's YAML file and its picture only one was chosen. */
 async function requirePicture(files: File[]): Promise<void> {
+  if (files.every(({ name }) => /\.(pgm|png|bmp)$/i.test(name))) throw new Error(`${files[0].name} needs its YAML file: choose both.`);
   const grid = files.find(({ name }) => /\.ya?ml$/i.test(name));
   const picture = grid && /^image: *["']?(?:[^"'\n]*[/\\])?([^"'\n#]*\w)/m.exec(await grid.text())?.[1];
   if (picture && !files.some(({ name }) => name === picture)) throw new Error(`${grid.name} needs ${picture}: choose both.`);

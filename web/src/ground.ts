@@ -18,7 +18,7 @@ export function drawPicture(context: CanvasRenderingContext2D): void {
   context.rotate(-pose.theta);
   context.scale(resolution * view.scale, resolution * view.scale);
   context.imageSmoothingEnabled = view.scale * resolution < 1;
-  context.globalAlpha = 0.45;
+  context.globalAlpha = matchMedia("(prefers-color-scheme: dark)").matches ? 0.2 : 0.45;
   context.drawImage(image, 0, -image.naturalHeight); // its first row is the highest
   context.restore();
 }

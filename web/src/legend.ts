@@ -29,7 +29,7 @@ function entries(): [string, string][] {
   if (log.length && lastPose()) parts.push(["robot", "last pose"]);
   const kinds = new Set([
     ...(state.analysis?.places ?? []).map(shownOf).flatMap((one) => (one ? [kindOf(one)] : [])),
-    ...log.flatMap((one) => (one?.pose ? [kindOf(one)] : [])),
+    ...log.flatMap((one) => (one ? [kindOf(one)] : [])),
   ]);
   for (const kind of KINDS) if (kinds.has(kind)) parts.push([kind, kind.replace("_", " ")]);
   return parts;

@@ -74,6 +74,7 @@ async function run(): Promise<void> {
 
 play.addEventListener("click", () => {
   playing = !playing;
+  document.querySelector("aside")!.scrollTop = 0; // to the verdict
   if (playing) void run();
   changed();
 });

@@ -4,7 +4,7 @@ import type { Segment } from "./types";
 
 export const view = { x: 0, y: 0, scale: 40, width: 100, height: 100, ratio: 1 };
 
-const BORDER = 40; // px
+const BORDER = 12; // px, within the margin of a map that is fitted
 
 export function toPixels(x: number, y: number): [number, number] {
   return [view.width / 2 + (x - view.x) * view.scale, view.height / 2 - (y - view.y) * view.scale];

@@ -9,7 +9,7 @@ const REASONS: Record<ReasonAnswer["code"], string> = {
   not_on_map:
     "The scan fits the map no better than an unrelated scan would. The robot may be in a place that the map does not contain. " +
     "If it is on the map, run `linefix map check MAP --log LOG`: scale, mirror, unit or mount may be wrong.",
-  similar_place: "Another pose fits the scan about as well. Step through the alternatives. Search with a prior, or move and scan again.",
+  similar_place: "Other places are similar to this one. Step through the alternatives. Search with a prior, or move and scan again.",
   single_wall: "The pose depends on a single wall. Move and scan again.",
   map_mismatch: "The scan and the map differ: much of the scan is not on the map, or mapped walls are not in the scan. Check that the map is up to date.",
   insufficient_evidence: "The scan has too few walls to distinguish this place from others. Move and scan again.",

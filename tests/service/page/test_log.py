@@ -59,6 +59,8 @@ def test_a_log_is_played_and_the_verdict_follows(log: Page) -> None:
     told(log, "Scan 1 of 6: no match, not usable, 90.00 %: not on map. (2 of 6 are usable.)")
     verdict(log, "no_match")
     expect(log.locator("#reasons")).to_contain_text("The scan fits the map no better than an unrelated scan would.")
+    for kind in ("usable", "ambiguous", "no match"):
+        expect(log.locator("#legend").get_by_text(kind, exact=True)).to_be_visible()
     log.get_by_role("button", name="Play").click()
     expect(log.get_by_label("simulate the scan")).not_to_be_checked()
     told(log, "Scan 6 of 6: ok, usable")

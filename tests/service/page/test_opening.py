@@ -80,6 +80,9 @@ def test_a_grid_needs_its_picture(page: Page, tmp_path: Path) -> None:
     page.goto("/")
     page.set_input_files("#files", [tmp_path / "hq.yaml"])
     expect(page.locator("#reading")).to_have_text("hq.yaml needs hq floor.pgm: choose both.")
+    (tmp_path / "hq floor.pgm").write_bytes(b"P5 1 1 255 0")
+    page.set_input_files("#files", [tmp_path / "hq floor.pgm"])
+    expect(page.locator("#reading")).to_have_text("hq floor.pgm needs its YAML file: choose both.")
 
 
 def test_an_example_that_is_chosen_meanwhile_stays(page: Page, tmp_path: Path) -> None:
