@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import shutil
-import socket
 import subprocess
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import httpx
 import pytest
 
 from examples.running import free_port
 from tests.running import RunningService, client_of, start, stop, until
-from tests.service.conftest import LOCAL, empty_database
+from tests.service.conftest import empty_database
+from tests.service.lines import Line
 
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")
 
@@ -57,57 +55,6 @@ http {{
 """
 
 
-class Line:
-    """A way to a database that can be cut: connections are dropped, and new ones refused, until it is mended."""
-
-    def __init__(self, host: str, port: int) -> None:
-        self._there = (host, port)
-        self._cut = False
-        self._ends: set[socket.socket] = set()
-        self._lock = threading.Lock()
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listener.getsockname()[1]
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def cut(self) -> None:
-        with self._lock:
-            self._cut = True
-            for end in self._ends:
-                with suppress(OSError):
-                    end.shutdown(socket.SHUT_RDWR)
-
-    def mend(self) -> None:
-        self._cut = False
-
-    def close(self) -> None:
-        self.cut()
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                here, _ = self._listener.accept()
-                with self._lock:
-                    if self._cut:
-                        here.close()
-                        continue
-                    there = socket.create_connection(self._there)
-                    self._ends |= {here, there}
-                for ends in ((here, there), (there, here)):
-                    threading.Thread(target=self._pass, args=ends, daemon=True).start()
-
-    def _pass(self, one: socket.socket, other: socket.socket) -> None:
-        with suppress(OSError):
-            while data := one.recv(65_536):
-                other.sendall(data)
-        for end in (one, other):
-            with suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
-        one.close()
-        with self._lock:
-            self._ends.discard(one)
-
-
 @dataclass
 class Replicas:
     """Three services, and what stands between them, their clients and their database."""
@@ -139,10 +86,8 @@ def replicas(folder: Path, count: int = 3, **settings: object) -> Iterator[Repli
         pytest.skip("no nginx")
     with ExitStack() as stack:
         url = stack.enter_context(empty_database("postgresql", folder))
-        parts = urlsplit(LOCAL)
-        line = Line(parts.hostname or "127.0.0.1", parts.port or 5432)
-        stack.callback(line.close)
-        told = {"database_url": url.replace(f":{parts.port}/", f":{line.port}/"), "drain_s": 1, **settings}
+        line = stack.enter_context(Line.to(url))
+        told = {"database_url": line.url, "drain_s": 1, **settings}
         places = [folder / f"replica-{number}" for number in range(count)]
         for place in places:
             place.mkdir()

@@ -23,7 +23,8 @@ def breaking(old: Any, new: Any) -> list[str]:
     """Return the places of a contract that break clients of an older one.
 
     A client sends what requests describe and reads what answers do: nothing that was there may be missing or of
-    another type, and a request may neither demand more nor take less.
+    another type, and a request may neither demand more nor take less. A type of a request that becomes wider is listed,
+    too: that is to be seen by a reader, who corrects the file.
     """
     asked: set[str] = set()
     for _, _, operation in operations(old):

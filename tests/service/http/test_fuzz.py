@@ -64,28 +64,12 @@ def client(fuzzed: RunningService) -> httpx.Client:
     return fuzzed.client
 
 
-OPERATIONS = [
-    ("POST", "/v1/register"),
-    ("POST", "/v1/associate"),
-    ("POST", "/v1/associate:batch"),
-    ("POST", "/v1/vectorize"),
-    ("PUT", "/v1/maps/{map_id}"),
-    ("GET", "/v1/maps/{map_id}"),
-    ("DELETE", "/v1/maps/{map_id}"),
-    ("GET", "/v1/maps"),
-    ("GET", "/v1/maps/{map_id}:check"),
-    ("POST", "/v1/maps/{map_id}:check"),
-    ("POST", "/v1/analyze"),
-    ("POST", "/v1/maps/{map_id}:analyze"),
-    ("POST", "/v1/maps/{map_id}:update"),
-    ("POST", "/v1/maps:apply"),
-    ("GET", "/v1/limits"),
-    ("GET", "/version"),
-    ("GET", "/livez"),
-    ("GET", "/readyz"),
+CALLS = [
+    *("POST /v1/register", "POST /v1/associate", "POST /v1/associate:batch", "POST /v1/vectorize", "GET /v1/limits"),
+    *("PUT /v1/maps/{map_id}", "GET /v1/maps/{map_id}", "DELETE /v1/maps/{map_id}", "GET /v1/maps", "GET /livez"),
+    *("GET /v1/maps/{map_id}:check", "POST /v1/maps/{map_id}:check", "POST /v1/maps/{map_id}:analyze", "GET /version"),
+    *("POST /v1/analyze", "POST /v1/maps/{map_id}:update", "POST /v1/maps:apply", "GET /readyz"),
 ]
-MODES = [GenerationMode.POSITIVE, GenerationMode.NEGATIVE]
-IDS = [" ".join(operation) for operation in OPERATIONS]
 
 
 @pytest.fixture(scope="module")
@@ -93,10 +77,10 @@ def schema(fuzzed: RunningService) -> Any:
     return schemathesis.openapi.from_url(fuzzed.url + "/openapi.json")
 
 
-@pytest.mark.parametrize("mode", MODES, ids=str)
-@pytest.mark.parametrize("operation", OPERATIONS, ids=IDS)
-def test_the_schema_holds(schema: Any, operation: tuple[str, str], mode: GenerationMode) -> None:
-    method, path = operation
+@pytest.mark.parametrize("mode", [GenerationMode.POSITIVE, GenerationMode.NEGATIVE], ids=str)
+@pytest.mark.parametrize("call", CALLS)
+def test_the_schema_holds(schema: Any, call: str, mode: GenerationMode) -> None:
+    method, path = call.split()
     if mode is GenerationMode.NEGATIVE and path in ("/v1/limits", "/version", "/livez", "/readyz"):
         return  # nothing there that could be sent wrongly
 
