@@ -9,8 +9,8 @@ import shutil
 import socket
 import ssl
 import subprocess
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -132,30 +132,44 @@ def caddy(service_port: int, port: int, folder: Path) -> list[str]:
     return [*data, "caddy", "run", "--adapter", "caddyfile", "--config", str(written)]
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("proxy", [nginx, caddy])
-def test_a_proxy_stands_in_front(
-    proxy: Callable[[int, int, Path], list[str]], start_service: Callable[..., RunningService], tmp_path: Path
-) -> None:
+Proxy = Callable[[int, int, Path], list[str]]
+BEARER = {"authorization": "Bearer sesame"}
+
+
+@contextmanager
+def behind(proxy: Proxy, service: RunningService, folder: Path, *, elsewhere: bool = False) -> Iterator[httpx.Client]:
+    """Put a proxy in front of a service; it takes us for a client on this machine, or on another one."""
     if shutil.which(proxy.__name__) is None:
         pytest.skip(f"no {proxy.__name__}")
-    keys, port = tmp_path / "keys.toml", free_port()
-    keys.write_text(key_lines("sesame", ["associate"]))
-    running = start_service(keys_file=keys)
-    with (tmp_path / "proxy.log").open("wb") as log:
-        process = subprocess.Popen(proxy(running.port, port, tmp_path), stdout=log, stderr=log)
+    port = free_port()
+    command = proxy(service.port, port, folder)
+    if elsewhere:
+        (written,) = [path for path in (folder / "nginx.conf", folder / "Caddyfile") if path.exists()]
+        rule = "allow 127.0.0.1;" if proxy is nginx else "not remote_ip 127.0.0.1"
+        assert rule in written.read_text()
+        written.write_text(written.read_text().replace(rule, ""))
+    with (folder / "proxy.log").open("wb") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log)
     try:
         with httpx.Client(base_url=f"https://127.0.0.1:{port}", headers=JSON, verify=False, timeout=60) as client:
             until(lambda: _answers(client))
-            bearer = {"authorization": "Bearer sesame"}
-            assert client.post("/v1/associate", json=examples.ASSOCIATE, headers=bearer).status_code == 200
-            assert client.post("/v1/associate", json=examples.ASSOCIATE).json()["code"] == "unauthorized"
-            assert client.put("/v1/maps/m", json=examples.MAP, headers=bearer).json()["code"] == "forbidden"
-            assert client.post("/v1/associate", content=b" " * 34_000_000, headers=bearer).status_code == 413
-            assert client.get("/metrics").status_code == 200  # from here
+            yield client
     finally:
         process.terminate()
         process.wait(60)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("proxy", [nginx, caddy])
+def test_a_proxy_stands_in_front(proxy: Proxy, start_service: Callable[..., RunningService], tmp_path: Path) -> None:
+    keys = tmp_path / "keys.toml"
+    keys.write_text(key_lines("sesame", ["associate"]))
+    with behind(proxy, start_service(keys_file=keys), tmp_path) as client:
+        assert client.post("/v1/associate", json=examples.ASSOCIATE, headers=BEARER).status_code == 200
+        assert client.post("/v1/associate", json=examples.ASSOCIATE).json()["code"] == "unauthorized"
+        assert client.put("/v1/maps/m", json=examples.MAP, headers=BEARER).json()["code"] == "forbidden"
+        assert client.post("/v1/associate", content=b" " * 34_000_000, headers=BEARER).status_code == 413
+        assert client.get("/metrics").status_code == 200  # from here
 
 
 def silent(port: int) -> socket.socket:
@@ -182,81 +196,29 @@ def test_connections_that_say_little_end_at_nginx(
     kind: Callable[[int], socket.socket], count: int, start_service: Callable[..., RunningService], tmp_path: Path
 ) -> None:
     """The service alone would refuse other clients: it serves seven connections, and ends none of them in time."""
-    if shutil.which("nginx") is None:
-        pytest.skip("no nginx")
-    running, port = start_service(max_connections=8, request_timeout_s=600), free_port()
-    with (tmp_path / "proxy.log").open("wb") as log:
-        process = subprocess.Popen(nginx(running.port, port, tmp_path), stdout=log, stderr=log)
-    try:
-        with (
-            ExitStack() as held,
-            httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=False, timeout=60) as client,
-        ):
-            until(lambda: _answers(client))
-            connections = [held.enter_context(kind(port)) for _ in range(count)]
-            assert httpx.get(f"https://127.0.0.1:{port}/livez", verify=False, timeout=60).status_code == 200
-            connections[0].settimeout(60)
-            with suppress(ConnectionError):
-                assert connections[0].recv(65_536) == b""  # nginx ends it
-    finally:
-        process.terminate()
-        process.wait(60)
+    running = start_service(max_connections=8, request_timeout_s=600)
+    with ExitStack() as held, behind(nginx, running, tmp_path) as client:
+        connections = [held.enter_context(kind(client.base_url.port or 0)) for _ in range(count)]
+        assert httpx.get(f"{client.base_url}/livez", verify=False, timeout=60).status_code == 200
+        connections[0].settimeout(60)
+        with suppress(ConnectionError):
+            assert connections[0].recv(65_536) == b""  # nginx ends it
+
+
+CONTROLS = ("%0A", "%0D%0A", "%00", "%09", "%7F", "%C2%85", "%E2%80%A8", "%23", "%3F", "%2F", "/", ";x", "%20", "#x")
+WRITINGS = ("//metrics", "/./metrics", "/x/../metrics", "/x/%2e%2e/metrics", "/%6detrics", "/METRICS", "/%0A/metrics")
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("proxy", [nginx, caddy])
-def test_no_way_of_writing_a_path_passes_its_rule(
-    proxy: Callable[[int, int, Path], list[str]], service: RunningService, tmp_path: Path
-) -> None:
+def test_no_way_of_writing_a_path_passes_its_rule(proxy: Proxy, service: RunningService, tmp_path: Path) -> None:
     """Class of attack: two that read one path differently."""
-    if shutil.which(proxy.__name__) is None:
-        pytest.skip(f"no {proxy.__name__}")
-    port = free_port()
-    command = proxy(service.port, port, tmp_path)
-    (written,) = [path for path in (tmp_path / "nginx.conf", tmp_path / "Caddyfile") if path.exists()]
-    rule = "allow 127.0.0.1;" if proxy is nginx else "not remote_ip 127.0.0.1"
-    text = written.read_text()
-    assert rule in text
-    written.write_text(text.replace(rule, ""))  # as from elsewhere
-    with (tmp_path / "proxy.log").open("wb") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=log)
-    try:
-        with httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=False, timeout=60) as client:
-            until(lambda: _answers(client))
-            assert client.get("/metrics").status_code == 403
-            controls = (
-                "%0A",
-                "%0D%0A",
-                "%00",
-                "%09",
-                "%7F",
-                "%C2%85",
-                "%E2%80%A8",
-                "%23",
-                "%3F",
-                "%2F",
-                "/",
-                ";x",
-                "%20",
-            )
-            paths = [f"/metrics{control}" for control in controls]
-            paths += [
-                "//metrics",
-                "/./metrics",
-                "/x/../metrics",
-                "/x/%2e%2e/metrics",
-                "/%6detrics",
-                "/METRICS",
-                "/%0A/metrics",
-                "/metrics#x",
-            ]
-            for path in paths:
-                answer = client.get("/", extensions={"target": path.encode()})  # as it stands there
-                assert answer.status_code in (400, 403, 404), path
-                assert "linefix_" not in answer.text, path
-    finally:
-        process.terminate()
-        process.wait(60)
+    with behind(proxy, service, tmp_path, elsewhere=True) as client:
+        assert client.get("/metrics").status_code == 403
+        for path in [*(f"/metrics{control}" for control in CONTROLS), *WRITINGS]:
+            answer = client.get("/", extensions={"target": path.encode()})  # as it stands there
+            assert answer.status_code in (400, 403, 404), path
+            assert "linefix_" not in answer.text, path
 
 
 def _changed(path: Path, folder: Path, changes: dict[str, str]) -> Path:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,74 +20,64 @@ DEPLOY = Path(__file__).parents[2] / "deploy"
 ONE, OTHER = key_lines("sesame", ["read"]), key_lines("other", ["read"])
 
 
-def in_place(folder: Path) -> Path:
+@contextmanager
+def in_place(folder: Path) -> Iterator[None]:
     """As `>>` and some editors write."""
     (folder / "keys.toml").write_text(ONE + OTHER)
-    return folder
-
-
-def take_back_in_place(folder: Path) -> None:
+    yield
     (folder / "keys.toml").write_text(OTHER)
 
 
-def take_back_replaced(folder: Path) -> None:
+@contextmanager
+def replaced(folder: Path) -> Iterator[None]:
     """As most editors, and tools that copy files, write."""
+    (folder / "keys.toml").write_text(ONE + OTHER)
+    yield
     (folder / "new").write_text(OTHER)
     (folder / "new").rename(folder / "keys.toml")
 
 
-def take_back_as_if_nothing_had_changed(folder: Path) -> None:
+@contextmanager
+def as_if_nothing_had_changed(folder: Path) -> Iterator[None]:
     """Of the same length, and with the time of the old one, as some tools that copy set it."""
+    (folder / "keys.toml").write_text(ONE + OTHER)
     before = (folder / "keys.toml").stat()
+    yield
     (folder / "keys.toml").write_text(key_lines("change", ["read"]) + OTHER)
     os.utime(folder / "keys.toml", ns=(before.st_atime_ns, before.st_mtime_ns))
     assert (folder / "keys.toml").stat().st_size == before.st_size
 
 
-def a_file_each(folder: Path) -> Path:
+@contextmanager
+def a_file_each(folder: Path) -> Iterator[None]:
     (folder / "one.toml").write_text(ONE)
     (folder / "other.toml").write_text(OTHER)
-    return folder
-
-
-def remove(folder: Path) -> None:
+    yield
     (folder / "one.toml").unlink()
 
 
-def mounted(folder: Path) -> Path:
-    """As the kubelet mounts a secret."""
-    (folder / "..1").mkdir()
-    (folder / "..1" / "keys.toml").write_text(ONE + OTHER)
+@contextmanager
+def mounted(folder: Path) -> Iterator[None]:
+    """As the kubelet mounts a secret, and exchanges it."""
+    for version, text in (("..1", ONE + OTHER), ("..2", OTHER)):
+        (folder / version).mkdir()
+        (folder / version / "keys.toml").write_text(text)
     (folder / "..data").symlink_to("..1")
     (folder / "keys.toml").symlink_to("..data/keys.toml")
-    return folder
-
-
-def exchange(folder: Path) -> None:
-    (folder / "..2").mkdir()
-    (folder / "..2" / "keys.toml").write_text(OTHER)
+    yield
     (folder / "..data_tmp").symlink_to("..2")
     (folder / "..data_tmp").rename(folder / "..data")
 
 
-@pytest.mark.parametrize(
-    ("lay", "take_back"),
-    [
-        (in_place, take_back_in_place),
-        (in_place, take_back_replaced),
-        (in_place, take_back_as_if_nothing_had_changed),
-        (a_file_each, remove),
-        (mounted, exchange),
-    ],
-)
+@pytest.mark.parametrize("taken_back", [in_place, replaced, as_if_nothing_had_changed, a_file_each, mounted])
 def test_a_key_is_refused_however_its_files_change(
-    lay: Callable[[Path], Path], take_back: Callable[[Path], None], tmp_path: Path
+    taken_back: Callable[[Path], AbstractContextManager[None]], tmp_path: Path
 ) -> None:
     """A service that runs reads them again, too: test_roles."""
-    ring = Keyring([], lay(tmp_path))
     first, other = ([(b"authorization", b"Bearer " + key)] for key in (b"sesame", b"other"))
-    assert ring.grant(first).roles == {Role.READ}
-    take_back(tmp_path)
+    with taken_back(tmp_path):
+        ring = Keyring([], tmp_path)
+        assert ring.grant(first).roles == {Role.READ}
     ring.refresh()
     with pytest.raises(UnknownKeyError):
         ring.grant(first)

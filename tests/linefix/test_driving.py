@@ -14,7 +14,6 @@ import association
 import linefix
 from association import (
     AnswerExplanation,
-    AssociationOptions,
     AssociationResult,
     AssociationWarning,
     HardPrior,
@@ -179,13 +178,6 @@ def test_a_critical_wall_has_the_indices_of_the_drive() -> None:
     assert found.diagnostics.critical_wall == replace(wall, scan=(before, before + 2))
 
 
-def test_what_the_last_view_leaves_unmatched_stays_so() -> None:
-    whole, before = latest_last()
-    alone = replace(ALONE, unmatched_scan=(1,))
-    found = search_drive(lambda scan: DRIVE if scan is whole else alone, whole)
-    assert found.unmatched_scan == (*range(before), before + 1)
-
-
 def test_a_drive_that_is_usable_is_searched_once() -> None:
     usable = replace(DRIVE, usable=True)
     assert answered(drive=usable) is usable
@@ -298,10 +290,3 @@ def test_several_sensors_at_the_last_place_are_one_view(with_beams: bool) -> Non
     np.testing.assert_allclose(found.scan.measured.segments.endpoints, both.measured.segments.endpoints, atol=1e-12)
     np.testing.assert_array_equal(found.scan.views.of_segment, both.views.of_segment)
     np.testing.assert_array_equal(found.scan.views.of_beam, both.views.of_beam)
-
-
-@pytest.mark.usefixtures("_judged")
-def test_options_hold_for_both_searches() -> None:
-    found = linefix.locate(INDEX, WHOLE, options=AssociationOptions(include=(), max_alternatives=0))
-    assert (found.usable, found.correspondences, found.missing_map) == (True, (), ())
-    assert len(found.unmatched_scan) >= len(WHOLE.measured) - len(FIRST.measured)

@@ -25,39 +25,35 @@ def a_map(size: int) -> CachedMap:
     return CachedMap(INDEX, "map", size)
 
 
-def test_the_least_recently_used_goes_first() -> None:
-    cache = IndexCache(100, Metrics())
-    for name in "abc":
-        cache.get(name, lambda: a_map(30), NO_END)
-    cache.get("a", lambda: pytest.fail("is there"), NO_END)
-    cache.get("d", lambda: a_map(30), NO_END)
-    assert (len(cache), cache.bytes) == (3, 90)
-    cache.get("a", lambda: pytest.fail("is there"), NO_END)
-    built: list[str] = []
-
-    def build() -> CachedMap:
-        built.append("b")
-        return a_map(30)
-
-    cache.get("b", build, NO_END)
-    assert built == ["b"]
+# Maps that are looked up, and room that is made before something is built; what was built; maps and bytes at the end.
+LOOKED_UP = {
+    "the least recently used goes first": (100, "a30 b30 c30 a30 d30 a30 b30", "abcdb", (3, 90)),
+    "room is made": (100, "a30 b30 c30 room40 c30", "abc", (2, 60)),
+    "as much as there is": (100, "a30 b30 room1000", "ab", (0, 0)),
+    "what is too large is used and not kept": (10, "a30 a30", "aa", (0, 0)),
+    "what fits exactly is kept": (60, "a30 b30 room0 a30 c60 d121 c60", "abcd", (1, 60)),
+    "what is larger than the cache is kept alone until the next comes": (60, "a30 b61 b61", "ab", (1, 61)),
+    "and goes where room is made": (60, "b61 room0 b120 a30", "bba", (1, 30)),
+}
 
 
-def test_room_is_made_before_something_is_built() -> None:
-    cache = IndexCache(100, Metrics())
-    for name in "abc":
-        cache.get(name, lambda: a_map(30), NO_END)
-    cache.make_room(40)
-    assert (len(cache), cache.bytes) == (2, 60)
-    cache.get("c", lambda: pytest.fail("is there"), NO_END)
-    cache.make_room(1000)
-    assert (len(cache), cache.bytes) == (0, 0)
-
-
-def test_what_is_too_large_is_used_and_not_kept() -> None:
-    cache = IndexCache(10, Metrics())
-    assert cache.get("a", lambda: a_map(30), NO_END).bytes == 30
-    assert (len(cache), cache.bytes) == (0, 0)
+@pytest.mark.parametrize("kind", LOOKED_UP)
+def test_what_is_kept(kind: str) -> None:
+    capacity, steps, wanted, held = LOOKED_UP[kind]
+    metrics = Metrics()
+    cache, built, gets = IndexCache(capacity, metrics), "", 0
+    for step in steps.split():
+        if step.startswith("room"):
+            cache.make_room(int(step[4:]))
+            continue
+        name, size = step[0], int(step[1:])
+        there = cache.has(name)
+        assert cache.get(name, lambda size=size: a_map(size), NO_END).bytes == size  # type: ignore[misc]
+        built, gets = built + name * (not there), gets + 1
+    assert (built, (len(cache), cache.bytes)) == (wanted, held)
+    counts = metrics.rendered().decode()
+    assert f"linefix_map_cache_hits_total {gets - len(built)}.0" in counts
+    assert f"linefix_map_cache_misses_total {len(built)}.0" in counts
 
 
 def test_callers_at_the_same_time_share_one_build() -> None:
@@ -78,7 +74,7 @@ def test_callers_at_the_same_time_share_one_build() -> None:
     assert all(answer is answers[0] for answer in answers)
 
 
-def test_who_waits_for_a_build_that_fails_is_told_so() -> None:
+def test_a_build_that_fails_is_told_to_all_that_wait_and_not_remembered() -> None:
     cache = IndexCache(100, Metrics())
     release = threading.Event()
 
@@ -96,32 +92,7 @@ def test_who_waits_for_a_build_that_fails_is_told_so() -> None:
     assert cache.get("a", lambda: a_map(1), NO_END).bytes == 1
 
 
-def test_what_fits_exactly_is_kept() -> None:
-    cache = IndexCache(60, Metrics())
-    for name in "ab":
-        cache.get(name, lambda: a_map(30), NO_END)
-    assert (len(cache), cache.bytes) == (2, 60)
-    cache.make_room(0)
-    assert len(cache) == 2
-    cache.get("c", lambda: a_map(60), NO_END)
-    assert (len(cache), cache.bytes) == (1, 60)
-    cache.get("d", lambda: a_map(121), NO_END)
-    cache.get("c", lambda: pytest.fail("is there"), NO_END)
-
-
-def test_what_is_larger_than_the_cache_is_kept_alone_until_the_next_comes() -> None:
-    cache = IndexCache(60, Metrics())
-    cache.get("a", lambda: a_map(30), NO_END)
-    cache.get("b", lambda: a_map(61), NO_END)
-    assert (len(cache), cache.bytes) == (1, 61)
-    cache.get("b", lambda: pytest.fail("is there"), NO_END)
-    cache.make_room(0)
-    assert len(cache) == 0
-    cache.get("b", lambda: a_map(120), NO_END)
-    cache.get("a", lambda: a_map(30), NO_END)
-    assert (len(cache), cache.bytes) == (1, 30)
-
-
+@pytest.mark.long
 def test_the_default_cache_keeps_the_largest_map() -> None:
     """Of walls of 5 m in all directions, which are on many lists; one without directions may be larger than that."""
     rng = np.random.default_rng(1)
@@ -134,23 +105,6 @@ def test_the_default_cache_keeps_the_largest_map() -> None:
         cache.get("a", lambda: CachedMap(index, "map", index.nbytes), NO_END)
     assert cache.has("a")
     assert cache.bytes <= Settings().cache_bytes
-
-
-def test_hits_and_misses_are_counted() -> None:
-    metrics = Metrics()
-    cache = IndexCache(100, metrics)
-    for name in "aab":
-        cache.get(name, lambda: a_map(1), NO_END)
-    text = metrics.rendered().decode()
-    assert "linefix_map_cache_hits_total 1.0" in text
-    assert "linefix_map_cache_misses_total 2.0" in text
-
-
-def test_a_failed_build_is_not_remembered() -> None:
-    cache = IndexCache(100, Metrics())
-    with pytest.raises(ZeroDivisionError):
-        cache.get("a", lambda: a_map(1 // 0), NO_END)
-    assert cache.get("a", lambda: a_map(1), NO_END).bytes == 1
 
 
 @pytest.mark.parametrize("cancelled", [False, True])

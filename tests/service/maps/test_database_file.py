@@ -55,21 +55,6 @@ def test_one_that_is_moved_away_is_missed(tmp_path: Path) -> None:
     store.close()
 
 
-def test_another_in_its_place_is_the_one_from_then_on(tmp_path: Path) -> None:
-    path = tmp_path / "maps.sqlite3"
-    store = open_store(path)
-    put(store)
-    path.rename(tmp_path / "away")
-    other = open_store(path)
-    for _ in range(3):
-        put(other)
-    assert store.load("m").record.revision == 3
-    put(store)
-    assert other.load("m").record.revision == 4
-    store.close()
-    other.close()
-
-
 def test_who_stands_in_for_another_makes_none(tmp_path: Path) -> None:
     path = tmp_path / "maps.sqlite3"
     with pytest.raises(StoreAwayError):
