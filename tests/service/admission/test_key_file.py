@@ -100,21 +100,6 @@ def test_the_files_of_a_directory_count_together(tmp_path: Path) -> None:
         read_keys(tmp_path)
 
 
-def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
-    path = tmp_path / "keys.toml"
-    path.write_text(key_lines("sesame", ["read"]))
-    keys = Keyring([], path)
-    first = keys.grants
-    keys.refresh()
-    assert keys.grants is first, "nothing to read"
-    for text, roles in ((key_lines("sesame", ["read", "write"]), {Role.READ, Role.WRITE}), ("[[", None)):
-        path.write_text(text)
-        before = keys.grants
-        keys.refresh()
-        assert (keys.grants is before) is (roles is None), "what is wrong leaves them"
-        assert [grant.roles for grant in keys.grants.values()] == [{Role.READ, Role.WRITE}]
-
-
 def test_an_empty_file_lets_nobody_in(tmp_path: Path) -> None:
     path = tmp_path / "keys.toml"
     path.write_text("")

@@ -92,15 +92,6 @@ def test_two_equal_rooms_and_a_point_in_one_of_them(client: httpx.Client) -> Non
     assert answer["summary"]["similar_pose"] == len(answer["places"]) > 20
 
 
-def test_directions_that_mean_nothing(client: httpx.Client) -> None:
-    flipped = [[c, d, a, b] for a, b, c, d in examples.WALLS]
-    put(client, flipped)
-    outside = [one["pose"] for one in analyzed(client, {"laser": LASER, "spacing": 1.0})["places"]]
-    assert all(pose["x"] > 2.5 and pose["y"] > 1.0 for pose in outside)
-    put(client, flipped, oriented=False)
-    assert analyzed(client, {"laser": LASER, "spacing": 1.0})["summary"]["usable"] > 20
-
-
 def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
     put(client, offices(np.random.default_rng(0)).segments.endpoints)
     answer = analyzed(client, {"spacing": 0.3, "deadline_ms": 500})

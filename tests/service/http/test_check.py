@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from linefix.documents import examples
-from tests.map_quality.check.drawn import THICK, centre_lines, faces, sampled
+from tests.map_quality.check.drawn import faces, sampled
 
 URL = "/v1/maps/checked:check"
 
@@ -75,31 +75,6 @@ def test_findings_name_segments(client: httpx.Client) -> None:
     put(client, [*examples.WALLS, *many])
     short = next(one for one in checked(client)["findings"] if one["code"] == "short_pieces")
     assert (len(short["segments"]), short["count"]) == (1000, 1500)
-
-
-@pytest.mark.xfail(strict=True, reason="looks_alike is found as well")
-def test_lines_along_the_middle_of_walls_and_what_to_do_about_them(client: httpx.Client) -> None:
-    """Without a word next to nothing in such a drawing was usable."""
-    put(client, centre_lines())
-    by_itself = checked(client)
-    assert codes(by_itself) == ["mixed_directions"]
-    assert by_itself["advice"] == {"sigma": None, "oriented": False}
-    seen = checked(client, {"scans": scans(6), "client_ref": 7})
-    assert codes(seen) == ["centre_lines", "undirected", "mixed_directions"]
-    assert seen["samples"]["wall_thickness"] == pytest.approx(THICK, abs=0.02)
-    assert seen["client_ref"] == 7
-    samples, advice = seen["samples"], seen["advice"]
-    assert samples["usable_as_advised"] > samples["usable"] + 1
-    assert [one["index"] for one in samples["scans"]] == list(range(6))
-    assert sum(one["usable"] for one in samples["scans"]) == samples["usable"]
-    assert advice["oriented"] is False
-    put(client, centre_lines(), **advice)
-    again = checked(client, {"scans": scans(6)})
-    assert codes(again) == ["centre_lines"]  # two faces would be better still
-    bodies = ({"map": {"map_id": "checked"}, "scan": scan} for scan in scans(6))
-    usable = sum(client.post("/v1/associate", json=body).json()["usable"] for body in bodies)
-    assert usable == again["samples"]["usable"]
-    assert usable > samples["usable"] + 1
 
 
 def test_poses_in_another_frame(client: httpx.Client) -> None:

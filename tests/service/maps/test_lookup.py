@@ -15,10 +15,9 @@ from linefix.documents import examples
 from linefix.documents.errors import TooManyError
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap
 from linefix.documents.several import MapPrefix, NamedMap
-from registration import InputError
 from service.database_location import database_url
 from service.maps import CachedMap, IndexCache, MapOutline, MapStore
-from service.maps.errors import BusyStoreError, IndexNotReadyError, UnknownMapError
+from service.maps.errors import BusyStoreError, IndexNotReadyError
 from service.maps.lookup import OVERHEAD, FoundMap, MapLookup, outline_of
 from service.parsing.child import LARGE, Child
 from service.telemetry.metrics import Metrics
@@ -92,38 +91,6 @@ def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) ->
     assert again is one
     assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes + 2 * OVERHEAD
     assert other.index.undirected is other.index
-
-
-@pytest.mark.parametrize(
-    ("asked", "own", "oriented"),
-    [
-        (None, None, True), (None, True, True), (None, False, False), (True, None, True), (True, False, True),
-        (False, None, False), (False, True, False),
-    ],
-)  # fmt: skip
-def test_the_request_s_option_goes_before_the_map_s_property(
-    lookup: Lookup, asked: bool | None, own: bool | None, oriented: bool
-) -> None:
-    lookup.put("m", segments=examples.WALLS, oriented=own)
-    sent, _ = lookup.look(inline(oriented=own), oriented=asked)
-    stored, _ = lookup.look(StoredMap(map_id="m"), oriented=asked)
-    assert (sent.oriented, stored.oriented) == (oriented, oriented)
-    assert lookup.find("m", oriented=oriented).document is None  # the same place in the cache
-    assert lookup.look(inline(), oriented=oriented)[0] is sent
-
-
-def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
-    asked = StoredMap(map_id="m")
-    with pytest.raises(UnknownMapError):
-        lookup.look(asked, oriented=True)
-    lookup.put("m", segments=examples.WALLS)
-    first, revision = lookup.look(asked, oriented=True)
-    assert (revision, first.frame_id) == (1, "map")
-    assert lookup.look(asked, oriented=True)[0] is first
-    assert lookup.look(asked, oriented=False)[0] is not first
-    lookup.put("m", segments=examples.WALLS, frame_id="new", sigma=0.1)
-    second, revision = lookup.look(asked, oriented=True)
-    assert (revision, second.frame_id, second.index.sigma) == (2, "new", 0.1)
 
 
 def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
@@ -200,12 +167,6 @@ def document(rows: object) -> MapDocument:
     return MapDocument.model_validate({"segments": rows})
 
 
-def test_what_is_stored_has_a_count_and_bounds() -> None:
-    found = outline_of(document([[-1.0, 2.0, 3.0, -0.0], [0.0, 0.0, 1.0, 5.0]]))
-    assert (found.segments, found.points, found.bounds) == (2, 0, (-1.0, 0.0, 3.0, 5.0))
-    assert str(found.bounds[1]) == "0.0"  # not -0.0, which not every database keeps
-
-
 @pytest.mark.parametrize("width", [1e5, 1e5 + 0.001])
 def test_a_map_is_at_most_100_km_wide(width: float) -> None:
     for rows in (
@@ -217,9 +178,3 @@ def test_a_map_is_at_most_100_km_wide(width: float) -> None:
         else:
             with pytest.raises(InvalidMapError, match="extent"):
                 outline_of(document(rows))
-
-
-def test_what_could_not_be_searched_is_not_stored() -> None:
-    for rows, message in (([], "at least one"), ([[0.0, 0.0, 0.0, 0.0]], "shorter")):
-        with pytest.raises(InputError, match=message):
-            outline_of(document(rows))
