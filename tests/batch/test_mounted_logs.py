@@ -24,8 +24,7 @@ from tests.cli.test_replay_bags import (
     swept,
     write_drive,
 )
-from tests.formats.robots import Robots
-from tests.formats.test_logs import SECOND
+from tests.formats.bags import SECOND, Robots
 
 from .logs import rows
 from .test_running import SMALL, Here

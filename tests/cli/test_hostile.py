@@ -14,7 +14,7 @@ from linefix_client import Client, ProblemError, UnreachableError
 from linefix_client import asking as requests
 
 from cli import asking
-from tests.formats.recorded import BEGUN, Recording
+from tests.formats.bags import BEGUN, Recording
 
 from .running import Linefix, refused
 

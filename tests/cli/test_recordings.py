@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import linefix as library
-from tests.formats.recorded import BEGUN, GRID, SECOND, Laser, Recording, grid_bytes, scan_bytes
+from tests.formats.bags import BEGUN, GRID, SECOND, Laser, Recording, grid_bytes, scan_bytes
 
 from .running import Linefix, refused
 

@@ -12,8 +12,7 @@ import pytest
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
-from tests.formats.robots import Robots
-from tests.formats.test_logs import SECOND
+from tests.formats.bags import SECOND, Laser, Robots
 from tests.running import RunningService
 from vectorization import Motion
 
@@ -40,11 +39,8 @@ def swept(walls: list[list[float]], robot: RigidTransform, mount: RigidTransform
 
 
 def put_scan(bag: Robots, ns: int, ranges: Any, frame: str = "laser", *, moving: bool = False) -> None:
-    kind = "sensor_msgs/msg/LaserScan"
-    beat = SECONDS / BEAMS if moving else 0.0
-    numbers = (-math.pi, -math.pi + STEP * (BEAMS - 1), STEP, beat, SECONDS, 0.05, 30.0)
-    nothing = np.zeros(0, dtype=np.float32)
-    bag.write("/scan", kind, ns, bag.type(kind, bag.header(ns, frame), *numbers, ranges, nothing))
+    beat, last = SECONDS / BEAMS if moving else 0.0, -math.pi + STEP * (BEAMS - 1)
+    bag.scan(ns, frame=frame, laser=Laser(ranges, -math.pi, last, STEP, 0.05, 30.0, beat, SECONDS))
 
 
 def robots() -> list[RigidTransform]:

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Writer
 from cli.inputs import FILES
 from formats import MAP_SUFFIXES
 from linefix.documents import examples
-from tests.formats.recorded import GRID, TYPES, grid_bytes
+from tests.formats.bags import GRID, TYPES, grid_bytes
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 

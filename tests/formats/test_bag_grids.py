@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, read_map
-from tests.formats.recorded import BEGUN, GRID, Recording, grid_bytes
+
+from .bags import BEGUN, GRID, Recording, grid_bytes
 
 
 def room() -> Any:

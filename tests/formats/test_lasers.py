@@ -11,8 +11,9 @@ import pytest
 
 from formats import MalformedFileError, read_log
 from formats.report import ImportReport
-from tests.formats.recorded import BEGUN, SECOND, USUAL, Laser, Recording, scan_bytes
 from vectorization import LaserScan
+
+from .bags import BEGUN, SECOND, USUAL, Laser, Recording, scan_bytes
 
 FLT_MAX = float(np.finfo(np.float32).max)
 MIXED = (2.0,) * 89 + (math.inf, 0.0)  # two beams without a return, as one driver and another write them

@@ -11,8 +11,7 @@ import pytest
 from formats import FormatError, IncompleteFileError, LogOptions, read_log
 from registration import RigidTransform
 
-from .robots import Quaternion, Robots, codes, fixed, pitched, read
-from .test_logs import SECOND, near
+from .bags import SECOND, Quaternion, Robots, codes, fixed, near, pitched, read
 
 
 def no_odom(bag: Robots) -> None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from formats import LogOptions
 from registration import RigidTransform
 
-from .robots import UP, Robots, codes, fixed, read
-from .test_logs import SECOND
+from .bags import FOUR_BEAMS, SECOND, UP, Robots, codes, fixed, read
 
 BEGUN = 100 * SECOND
 
@@ -79,10 +77,7 @@ def test_a_robot_that_stands_has_a_motion_of_zero(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("scan_time", "expected"), [(0.1, 0.025), (0.0, 0.05), (math.nan, 0.05), (30.0, 0.05)])
 def test_a_time_increment_in_another_unit_is_replaced(tmp_path: Path, scan_time: float, expected: float) -> None:
     bag = Robots("mcap", tmp_path)
-    kind = "sensor_msgs/msg/LaserScan"
-    ranges, nothing = np.ones(4, dtype=np.float32), np.zeros(0, dtype=np.float32)
-    numbers = (-0.2, 0.1, 0.1, 100.0, scan_time, 0.05, 10.0)
-    bag.write("/scan", kind, 1, bag.type(kind, bag.header(1, "laser"), *numbers, ranges, nothing))
+    bag.scan(1, laser=FOUR_BEAMS.but(ranges=(1.0,) * 4, time_increment=100.0, scan_time=scan_time))
     (scan,), log = read(bag)
     assert scan.time_increment == pytest.approx(expected)
     assert codes(log)["time_increment"] == 1

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from formats import LoggedScan, read_log
 
-from .robots import Robots, codes, fixed, read
-from .test_logs import SECOND
+from .bags import SECOND, Robots, codes, fixed, read
 
 TENTH = SECOND // 10
 BEGUN = 100 * SECOND
@@ -29,8 +27,8 @@ class Recorded(Robots):
 
     now = 0
 
-    def write(self, topic: str, kind: str, ns: int, message: Any) -> None:
-        super().write(topic, kind, self.now, message)
+    def write(self, topic: str, kind: str, ns: int, data: bytes) -> None:
+        super().write(topic, kind, self.now, data)
 
 
 def recorded(

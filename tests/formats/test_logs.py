@@ -5,14 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from formats import (
     FormatError,
@@ -25,7 +20,8 @@ from formats import (
     read_log,
     read_map,
 )
-from registration import RigidTransform
+
+from .bags import FOUR_BEAMS, GRID, KINDS, SECOND, Robots, near, yawed
 
 FLASER = "FLASER 4 1.0 2.0 81.91 3.0 10 20 1.5 9 20 0 100.25 host 100.25\n"
 ROBOTLASER = (
@@ -38,11 +34,6 @@ def written(tmp_path: Path, content: str) -> Path:
     path = tmp_path / "robot.log"
     path.write_text(content)
     return path
-
-
-def near(pose: RigidTransform | None, x: float, y: float, theta: float) -> bool:
-    assert pose is not None
-    return np.allclose([pose.x, pose.y, pose.theta], [x, y, theta], atol=1e-6)
 
 
 def test_flaser_looks_over_half_a_turn_and_says_where_the_laser_was(tmp_path: Path) -> None:
@@ -113,97 +104,13 @@ def test_broken_lines_are_dropped_and_counted(tmp_path: Path) -> None:
     assert {n.code: n.count for n in log.report.dropped} == counts
 
 
-Write = Callable[[Any, Any], None]
-ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
-ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
-KINDS = ["bag", "sqlite3", "mcap"]
-
-
-class Recorder:
-    """Writes the same messages as a bag of either ROS."""
-
-    def __init__(self, kind: str, folder: Path) -> None:
-        self.types = ROS1 if kind == "bag" else ROS2
-        self.path = folder / ("robot.bag" if kind == "bag" else f"robot_{kind}")
-        if kind == "bag":
-            self.writer: Any = Writer1(self.path)
-        else:
-            plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
-            self.writer = Writer2(self.path, version=9, storage_plugin=plugin)
-        self.kind = kind
-        self.topics: dict[str, Any] = {}
-        self.writer.open()
-
-    def type(self, name: str, *values: Any) -> Any:
-        return self.types.types[name](*values)
-
-    def time(self, ns: int) -> Any:
-        return self.type("builtin_interfaces/msg/Time", *divmod(ns, 10**9))
-
-    def header(self, ns: int, frame: str) -> Any:
-        stamp = self.time(ns)
-        return self.type("std_msgs/msg/Header", *((0,) if self.kind == "bag" else ()), stamp, frame)
-
-    def point(self, name: str, x: float, y: float, z: float = 0.0) -> Any:
-        return self.type(f"geometry_msgs/msg/{name}", x, y, z)
-
-    def turn(self, yaw: float, roll: float = 0.0) -> Any:
-        s, c, sr, cr = math.sin(yaw / 2), math.cos(yaw / 2), math.sin(roll / 2), math.cos(roll / 2)
-        return self.type("geometry_msgs/msg/Quaternion", c * sr, s * sr, s * cr, c * cr)
-
-    def write(self, topic: str, kind: str, ns: int, message: Any) -> None:
-        if topic not in self.topics:
-            self.topics[topic] = self.writer.add_connection(topic, kind, typestore=self.types)
-        to_bytes = self.types.serialize_ros1 if self.kind == "bag" else self.types.serialize_cdr
-        self.writer.write(self.topics[topic], ns, to_bytes(message, kind))
-
-    def scan(self, ns: int, topic: str = "/scan", increment: float = 0.1, frame: str = "laser") -> None:
-        kind = "sensor_msgs/msg/LaserScan"
-        ranges = np.array([1.0, np.inf, np.nan, 2.0], dtype=np.float32)
-        numbers = (-0.2, 0.1, increment, 0.001, 0.1, 0.05, 10.0)
-        values = (numbers[0], 0.1, *numbers[2:], ranges, np.zeros(0, dtype=np.float32))
-        self.write(topic, kind, ns, self.type(kind, self.header(ns, frame), *values))
-
-    def frame(
-        self, ns: int, parent: str, child: str, pose: tuple[float, float, float], roll: float = 0.0, *, static: bool
-    ) -> None:
-        place = self.type(
-            "geometry_msgs/msg/Transform", self.point("Vector3", *pose[:2], 0.3), self.turn(pose[2], roll)
-        )
-        one = self.type("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, place)
-        kind = "tf2_msgs/msg/TFMessage"
-        self.write("/tf_static" if static else "/tf", kind, ns, self.type(kind, [one]))
-
-    def odometry(self, ns: int, x: float) -> None:
-        kind = "nav_msgs/msg/Odometry"
-        pose = self.type("geometry_msgs/msg/Pose", self.point("Point", x, 0.0), self.turn(0.0))
-        still = self.type("geometry_msgs/msg/Twist", self.point("Vector3", 0, 0), self.point("Vector3", 0, 0))
-        sure = np.zeros(36)
-        twist = self.type("geometry_msgs/msg/TwistWithCovariance", still, sure)
-        place = self.type("geometry_msgs/msg/PoseWithCovariance", pose, sure)
-        self.write("/odom", kind, ns, self.type(kind, self.header(ns, "odom"), "base_link", place, twist))
-
-    def grid(self, cells: Any, resolution: float, origin: tuple[float, float, float]) -> None:
-        kind = "nav_msgs/msg/OccupancyGrid"
-        pose = self.type("geometry_msgs/msg/Pose", self.point("Point", *origin[:2]), self.turn(origin[2]))
-        info = self.type("nav_msgs/msg/MapMetaData", self.time(0), resolution, cells.shape[1], cells.shape[0], pose)
-        self.write("/map", kind, 1, self.type(kind, self.header(1, "world"), info, cells.ravel().astype(np.int8)))
-
-    def done(self) -> Path:
-        self.writer.close()
-        return self.path
-
-
-SECOND = 10**9
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bag_gives_scans_where_tf_has_the_sensor(tmp_path: Path, kind: str) -> None:
-    bag = Recorder(kind, tmp_path)
-    bag.frame(0, "base_link", "laser", (0.5, 0.1, 0.0), math.pi, static=True)
-    bag.frame(SECOND, "odom", "base_link", (1.0, 0.0, 0.0), static=False)
-    bag.frame(3 * SECOND // 2, "odom", "base_link", (2.0, 0.0, math.pi / 2), static=False)
-    bag.frame(SECOND, "map", "odom", (100.0, 0.0, 0.0), static=False)
+    bag = Robots(kind, tmp_path)
+    bag.transform("/tf_static", 0, "base_link", "laser", (0.5, 0.1, 0.3), yawed(0.0, upside_down=True))
+    bag.transform("/tf", SECOND, "odom", "base_link", (1.0, 0.0, 0.3))
+    bag.transform("/tf", 3 * SECOND // 2, "odom", "base_link", (2.0, 0.0, 0.3), yawed(math.pi / 2))
+    bag.transform("/tf", SECOND, "map", "odom", (100.0, 0.0, 0.3))
     for ns in (SECOND, 5 * SECOND // 4, 3 * SECOND // 2, 9 * SECOND):
         bag.scan(ns)
     log = read_log(bag.done())
@@ -228,7 +135,7 @@ def test_a_bag_gives_scans_where_tf_has_the_sensor(tmp_path: Path, kind: str) ->
 
 
 def test_a_single_mcap_is_read_without_its_folder(tmp_path: Path) -> None:
-    bag = Recorder("mcap", tmp_path)
+    bag = Robots("mcap", tmp_path)
     bag.scan(SECOND)
     (file,) = bag.done().glob("*.mcap")
     log = read_log(file)
@@ -238,20 +145,20 @@ def test_a_single_mcap_is_read_without_its_folder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_odometry_stands_in_where_tf_says_nothing(tmp_path: Path, kind: str) -> None:
-    bag = Recorder(kind, tmp_path)
-    bag.odometry(SECOND, 1.0)
-    bag.odometry(3 * SECOND // 2, 3.0)
+    bag = Robots(kind, tmp_path)
+    bag.says(SECOND, 1.0)
+    bag.says(3 * SECOND // 2, 3.0)
     bag.scan(5 * SECOND // 4, frame="base_link")
     (scan,) = read_log(bag.done())
     assert near(scan.pose, 2.0, 0.0, 0.0)
 
 
 def test_the_topic_with_most_scans_is_taken_and_broken_scans_are_dropped(tmp_path: Path) -> None:
-    bag = Recorder("mcap", tmp_path)
+    bag = Robots("mcap", tmp_path)
     bag.scan(1, "/rear")
     for ns in (2, 3):
         bag.scan(ns, "/front")
-    bag.scan(4, "/front", increment=0.0)
+    bag.scan(4, "/front", laser=FOUR_BEAMS.but(angle_increment=0.0))
     path = bag.done()
     log = read_log(path)
     assert [scan.topic for scan in log] == ["/front"] * 2
@@ -267,8 +174,8 @@ def test_a_grid_in_a_bag_is_a_map(tmp_path: Path, kind: str) -> None:
     cells = np.full((60, 80), -1)
     cells[9:51, 9:71] = 100
     cells[10:50, 10:70] = 0
-    bag = Recorder(kind, tmp_path)
-    bag.grid(cells, 0.1, (5.0, 0.0, 0.0))
+    bag = Robots(kind, tmp_path)
+    bag.write("/map", GRID, 1, bag.messages.grid(cells, (5.0, 0.0, 0.0), frame="world"))
     imported = read_map(bag.done())
     assert imported.map.frame_id == "world"
     s = imported.map.segments
@@ -292,7 +199,7 @@ def cut(path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["mcap", "sqlite3"])
 def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
-    bag = Recorder(kind, tmp_path)
+    bag = Robots(kind, tmp_path)
     bag.scan(0)
     path = bag.done()
     [held] = [file for file in path.iterdir() if file.name != "metadata.yaml"]
@@ -322,7 +229,7 @@ def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
 def test_broken_bags_are_refused_in_one_line(
     tmp_path: Path, kind: str, spoilt: str, how: Callable[[Path], None], error: type[FormatError], message: str
 ) -> None:
-    bag = Recorder(kind, tmp_path)
+    bag = Robots(kind, tmp_path)
     for k in range(200):
         bag.scan(k * SECOND)
     path = bag.done()
@@ -351,12 +258,12 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str, message: str) -> N
 @pytest.mark.parametrize("folder", ["100%", "a%2f..", "what?", "no#1"])
 def test_a_path_that_sqlite_takes_for_another_is_refused(tmp_path: Path, folder: str) -> None:
     """Class of attack: path traversal. SQLite is given a URI, of which these signs are no part of the path."""
-    bag = Recorder("sqlite3", tmp_path)
+    bag = Robots("sqlite3", tmp_path)
     bag.scan(SECOND)
     path = bag.done().rename(tmp_path / folder)
     for one in (path, next(path.glob("*.db3"))):
         with pytest.raises(UnsupportedFormatError, match="rename it"):
             list(read_log(one))
-    bag = Recorder("mcap", path)
+    bag = Robots("mcap", path)
     bag.scan(SECOND)
     assert len(list(read_log(bag.done()))) == 1

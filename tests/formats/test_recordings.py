@@ -14,7 +14,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from formats import FormatError, IncompleteFileError, LogOptions, MalformedFileError, UnsupportedFormatError, read_log
 from formats.report import ImportReport
-from tests.formats.recorded import BEGUN, SCAN, SECOND, TYPES, Recording, scan_bytes
+
+from .bags import BEGUN, SCAN, SECOND, TYPES, Messages, Recording, scan_bytes
 
 
 def read(path: Path, topic: str | None = None) -> tuple[list[int], ImportReport]:
@@ -39,7 +40,7 @@ def test_the_profile_of_an_mcap_does_not_matter(tmp_path: Path, profile: str, ch
 def test_an_mcap_of_ros_1(tmp_path: Path, kind: str) -> None:
     recording = Recording(tmp_path / "a.mcap", "ros1")
     for k in range(3):
-        recording.put("/scan", k + 1, scan_bytes(BEGUN + k * SECOND, encoding="ros1"), kind, "ros1", "ros1msg")
+        recording.put("/scan", k + 1, Messages("ros1").scan(BEGUN + k * SECOND), kind, "ros1", "ros1msg")
     found, report = read(recording.done())
     assert (found, dropped(report)) == ([0, 1, 2], {})
 

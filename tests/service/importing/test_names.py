@@ -15,7 +15,7 @@ import pytest
 
 from linefix.documents.errors import InvalidRequestError
 from service.importing.reader import Bounds, read_files
-from tests.formats.test_logs import Recorder
+from tests.formats.bags import GRID, Robots
 
 from .forms import SQUARE, TYPE, YAML, form, room_grid
 
@@ -25,10 +25,10 @@ BOUNDS = Bounds(1_000_000_000, 32_000_000, 200_000)
 @pytest.fixture
 def elsewhere(tmp_path: Path) -> Path:
     """Return a bag of SQLite that lies on this machine, and was not sent."""
-    bag = Recorder("sqlite3", tmp_path)
+    bag = Robots("sqlite3", tmp_path)
     cells = np.zeros((60, 80))
     cells[[0, -1]] = cells[:, [0, -1]] = 100
-    bag.grid(cells, 0.05, (0.0, 0.0, 0.0))
+    bag.write("/map", GRID, 1, bag.messages.grid(cells))
     (path,) = bag.done().glob("*.db3")
     return path
 
