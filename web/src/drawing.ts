@@ -1,6 +1,7 @@
 // Everything on the canvas, from the state alone.
 
 import { CODES, colourOf, drawChanges } from "./changes";
+import { arrow, element, sized } from "./dom";
 import { beamsOf, place, placed, pointsOf } from "./geometry";
 import { drawGrid, drawPicture } from "./ground";
 import { drawHeat, kindOf } from "./heat";
@@ -10,13 +11,14 @@ import { FADED, passes } from "./timeline";
 import { toPixels, view } from "./view";
 import { drawWalls } from "./walls";
 
-const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
+const canvas = element<HTMLCanvasElement>("#plan");
 const context = canvas.getContext("2d")!;
 /** Everything that has a colour of its own, in the style sheet and in the legend. */
 const NAMES = ["grid", "wall", "off", "added", "robot", "scan", "beam", "matched", "unmatched", "missing", "critical", "estimate", "other"];
 export const KINDS = ["usable", "ambiguous", "degenerate", "no_match"];
 export let colours: Record<string, string> = {};
 let frame = 0;
+const FRONT = 13; // px from the robot to its front
 export const HANDLE = 46; // px from the robot to its handle
 const SMALLEST = 14; // px; a smaller ellipse is drawn larger, which the legend states
 
@@ -28,8 +30,7 @@ export function readColours(): void {
 export function resize(): void {
   const box = canvas.getBoundingClientRect();
   Object.assign(view, { width: box.width, height: box.height, ratio: window.devicePixelRatio || 1 });
-  canvas.width = Math.round(box.width * view.ratio);
-  canvas.height = Math.round(box.height * view.ratio);
+  sized(canvas, box.width, box.height);
   redraw();
 }
 
@@ -173,18 +174,14 @@ export function enlarged(): number | null {
 
 function drawRobot(pose: Pose, name: string, handle: boolean): void {
   const [px, py] = toPixels(pose.x, pose.y);
-  const [c, s] = [Math.cos(pose.theta), -Math.sin(pose.theta)];
   context.strokeStyle = context.fillStyle = colours[name];
   context.lineWidth = 2;
-  context.beginPath();
-  context.moveTo(px + 13 * c, py + 13 * s);
-  context.lineTo(px - 8 * c - 8 * s, py - 8 * s + 8 * c);
-  context.lineTo(px - 8 * c + 8 * s, py - 8 * s - 8 * c);
-  context.closePath();
+  arrow(context, px, py, pose.theta, FRONT);
   if (!handle) return context.fill();
   context.stroke();
+  const [c, s] = [Math.cos(pose.theta), -Math.sin(pose.theta)];
   context.beginPath();
-  context.moveTo(px + 13 * c, py + 13 * s);
+  context.moveTo(px + FRONT * c, py + FRONT * s);
   context.lineTo(px + (HANDLE - 5) * c, py + (HANDLE - 5) * s);
   context.stroke();
   context.beginPath();

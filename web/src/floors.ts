@@ -2,6 +2,7 @@
 
 import { getMap } from "./api";
 import { askSoon } from "./asking";
+import { arrow, made, sized } from "./dom";
 import { colours } from "./drawing";
 import { isLatest, showAll, supersede } from "./scene";
 import { boundsOf, onChange, setMap, showFloor, state } from "./state";
@@ -92,9 +93,7 @@ export function update(): void {
   const ids = listed();
   const items: HTMLElement[] = ids.map((id) => button(id, verdicts.get(id)));
   if (ids.length < state.floors.length) {
-    const more = document.createElement("span");
-    more.textContent = `and ${state.floors.length - ids.length} more`;
-    items.push(more);
+    items.push(made("span", { textContent: `and ${state.floors.length - ids.length} more` }));
   }
   // The order seldom changes, and a button that is put in again loses the focus.
   const now = ids.join(" ");
@@ -103,43 +102,37 @@ export function update(): void {
 }
 
 function button(id: string, verdict: MapVerdict | undefined): HTMLButtonElement {
-  const made = buttons.get(id) ?? create(id);
+  const one = buttons.get(id) ?? create(id);
   const on = state.answer?.map?.map_id === id;
   const { status, probability } = verdict ?? { status: null, probability: null };
-  made.setAttribute("aria-pressed", String(state.mapId === id));
-  made.dataset.state = status === null ? "none" : on && state.answer!.usable ? "usable" : status;
+  one.setAttribute("aria-pressed", String(state.mapId === id));
+  one.dataset.state = status === null ? "none" : on && state.answer!.usable ? "usable" : status;
   const words = status === null ? "" : status.replace("_", " ") + (probability === null ? "" : `, ${percent(probability)}`);
-  made.querySelector("small")!.textContent = documents.get(id) === null ? "cannot be read" : words;
+  one.querySelector("small")!.textContent = documents.get(id) === null ? "cannot be read" : words;
   const map = documents.get(id);
-  if (map) draw(made.querySelector("canvas")!, map, verdict?.pose ?? null, colours[on ? "estimate" : "other"]);
-  return made;
+  if (map) draw(one.querySelector("canvas")!, map, verdict?.pose ?? null, colours[on ? "estimate" : "other"]);
+  return one;
 }
 
 function create(id: string): HTMLButtonElement {
-  const made = document.createElement("button");
-  const [canvas, name, words] = [document.createElement("canvas"), document.createElement("span"), document.createElement("small")];
-  name.textContent = id;
-  made.append(canvas, name, words);
-  made.addEventListener("click", () => {
+  const one = made("button", {}, made("canvas"), made("span", { textContent: id }), made("small"));
+  one.addEventListener("click", () => {
     state.other = followed.other = -1;
     void show(id);
   });
-  buttons.set(id, made);
-  return made;
+  buttons.set(id, one);
+  return one;
 }
 
 /** Draw the walls and the best pose on a map, unless the canvas has them. */
 function draw(canvas: HTMLCanvasElement, map: MapDocument, pose: Pose | null, colour: string): void {
-  const ratio = window.devicePixelRatio || 1;
-  const content = JSON.stringify([pose, colour, colours.wall, ratio]);
+  const content = JSON.stringify([pose, colour, colours.wall, window.devicePixelRatio]);
   if (canvas.dataset.content === content) return;
   canvas.dataset.content = content;
-  [canvas.width, canvas.height] = [WIDTH * ratio, HEIGHT * ratio];
-  const context = canvas.getContext("2d")!;
+  const context = sized(canvas, WIDTH, HEIGHT);
   const [low_x, low_y, high_x, high_y] = boundsOf(map.segments);
   const scale = 0.9 * Math.min(WIDTH / Math.max(1, high_x - low_x), HEIGHT / Math.max(1, high_y - low_y));
   const at = (x: number, y: number): [number, number] => [WIDTH / 2 + scale * (x - (low_x + high_x) / 2), HEIGHT / 2 - scale * (y - (low_y + high_y) / 2)];
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.strokeStyle = colours.wall;
   context.beginPath();
   for (const [x1, y1, x2, y2] of map.segments) {
@@ -148,14 +141,8 @@ function draw(canvas: HTMLCanvasElement, map: MapDocument, pose: Pose | null, co
   }
   context.stroke();
   if (!pose) return;
-  const [px, py] = at(pose.x, pose.y);
   context.fillStyle = colour;
-  context.translate(px, py);
-  context.rotate(-pose.theta);
-  context.beginPath();
-  context.moveTo(9, 0);
-  context.lineTo(-6, -6);
-  context.lineTo(-6, 6);
+  arrow(context, ...at(pose.x, pose.y), pose.theta, 9);
   context.fill();
 }
 

@@ -2,6 +2,8 @@
 
 import type { Example, Laser, Pose, Scan, Segment, View } from "./types";
 
+export const degrees = (radians: number) => (180 / Math.PI) * radians;
+
 export function wrap(angle: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }

@@ -1,5 +1,6 @@
 // The report on an imported map or log: what was read, merged, omitted and assumed, and the findings of the check.
 
+import { made } from "./dom";
 import { onChange, state } from "./state";
 import type { Imported, MapDocument, Note, Report } from "./types";
 import { list } from "./words";
@@ -10,10 +11,9 @@ let of: MapDocument | null = null;
 
 function section(title: string, lines: string[]): HTMLElement[] {
   if (!lines.length) return [];
-  const [head, shown] = [document.createElement("h3"), document.createElement("ul")];
-  head.textContent = title;
+  const shown = made("ul");
   list(shown, lines);
-  return [head, shown];
+  return [made("h3", { textContent: title }), shown];
 }
 
 /** Show the report on a map, open where it has findings, omissions or assumptions. */

@@ -1,25 +1,24 @@
 // The scan in the sensor's own frame, before it is laid on the map.
 
+import { arrow, sized } from "./dom";
 import { colours, sentSegments } from "./drawing";
 import { pointsOf } from "./geometry";
 import { onChange, state } from "./state";
 
 const box = document.querySelector<HTMLElement>("#inset")!;
 const canvas = box.querySelector("canvas")!;
-const context = canvas.getContext("2d")!;
 const SIDE = 150; // px
 
 export function drawInset(): void {
   const { answer, sent } = state;
   box.hidden = !answer || !sent;
   if (!answer || !sent) return;
-  const ratio = window.devicePixelRatio || 1;
-  canvas.width = canvas.height = SIDE * ratio;
+  const context = sized(canvas, SIDE, SIDE);
+  context.translate(SIDE / 2, SIDE / 2);
   const points = pointsOf(sent.scan);
   const segments = sentSegments();
   const reach = Math.max(1, ...[...points, ...segments.flatMap(([a, b, c, d]) => [[a, b], [c, d]])].map(([x, y]) => Math.max(Math.abs(x), Math.abs(y))));
   const scale = (0.46 * SIDE) / reach;
-  context.setTransform(ratio, 0, 0, ratio, (SIDE * ratio) / 2, (SIDE * ratio) / 2);
   context.fillStyle = colours.scan;
   for (const [x, y] of points) context.fillRect(scale * x - 0.7, -scale * y - 0.7, 1.4, 1.4);
   const matched = new Set(answer.correspondences.map((pair) => pair.scan));
@@ -33,11 +32,7 @@ export function drawInset(): void {
   });
   context.strokeStyle = colours.robot;
   context.lineWidth = 2;
-  context.beginPath();
-  context.moveTo(8, 0);
-  context.lineTo(-5, -5);
-  context.lineTo(-5, 5);
-  context.closePath();
+  arrow(context, 0, 0, 0, 8);
   context.stroke();
 }
 

@@ -1,11 +1,12 @@
 // The legend below the plan: only what is drawn there now.
 
 import { CODES, colourOf } from "./changes";
+import { element, made } from "./dom";
 import { enlarged, KINDS, lastPose, otherPose } from "./drawing";
 import { kindOf, shownOf } from "./heat";
 import { answerHere, onChange, state } from "./state";
 
-const box = document.querySelector<HTMLElement>("#legend")!;
+const box = element("#legend");
 
 function entries(): [string, string][] {
   const { walls, own, off, log, layers } = state;
@@ -56,15 +57,14 @@ function ofAnswer(): [string, string][] {
 }
 
 export function showLegend(): void {
-  box.replaceChildren(
-    ...entries().map(([kind, text]) => {
-      const item = document.createElement("span");
-      item.className = `key ${kind}`;
-      item.style.setProperty("--colour", `var(--${kind})`);
-      item.textContent = text;
-      return item;
-    }),
-  );
+  box.replaceChildren(...entries().map(([kind, text]) => key(kind, text)));
+}
+
+/** A text after a sample of its colour. */
+export function key(kind: string, text: string): HTMLElement {
+  const item = made("span", { className: `key ${kind}`, textContent: text });
+  item.style.setProperty("--colour", `var(--${kind})`);
+  return item;
 }
 
 onChange(showLegend);

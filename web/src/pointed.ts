@@ -2,12 +2,10 @@
 
 import { changeAt, evidenceOf, titleOf } from "./changes";
 import { otherPose, sentSegments } from "./drawing";
-import { distance, placed, wrap } from "./geometry";
+import { degrees, distance, placed, wrap } from "./geometry";
 import { answerHere, state, wallOf } from "./state";
 import type { Place, Pose } from "./types";
 import { toMetres, view } from "./view";
-
-const degrees = (radians: number) => (180 / Math.PI) * radians;
 
 /** Describe what is there; empty where nothing is. */
 export function describe(px: number, py: number): string {

@@ -2,13 +2,14 @@
 
 import { applyChanges, getMap, importScans, limits, Problem, putMap, updateMap } from "./api";
 import { colourOf, confidenceOf, evidenceOf, titleOf } from "./changes";
+import { element, made, save } from "./dom";
 import { redraw } from "./drawing";
+import { key } from "./legend";
 import { isLatest, showAll, supersede } from "./scene";
 import { asStored, changed, forget, onChange, setMap, state } from "./state";
 import type { MapDocument, Proposal, Scan, View } from "./types";
 import { messageOf } from "./words";
 
-const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const box = element<HTMLDetailsElement>("#changes");
 const summary = element("#proposed");
 const rows = element("#change-list");
@@ -84,17 +85,10 @@ function list(proposal: Proposal): void {
   listed = proposal;
   rows.replaceChildren(
     ...proposal.changes.map((one, k) => {
-      const [item, label, tick, words] = [document.createElement("li"), document.createElement("label"), document.createElement("input"), document.createElement("span")];
-      label.className = "check";
-      Object.assign(tick, { type: "checkbox", checked: one.accepted });
+      const tick = made("input", { type: "checkbox", checked: one.accepted });
       tick.setAttribute("aria-describedby", "evidence");
-      words.className = "key";
-      words.style.setProperty("--colour", `var(--${colourOf(one.code)})`);
-      words.textContent = `${k}: ${titleOf(one)}`;
-      const sure = document.createElement("small");
-      sure.textContent = confidenceOf(one);
-      label.append(tick, words, sure);
-      item.append(label);
+      const words = key(colourOf(one.code), `${k}: ${titleOf(one)}`);
+      const item = made("li", {}, made("label", { className: "check" }, tick, words, made("small", { textContent: confidenceOf(one) })));
       tick.addEventListener("change", () => {
         one.accepted = tick.checked;
         changed();
@@ -131,12 +125,7 @@ const newMap = async () => (await applyChanges(state.map!, state.proposal!)).map
 
 async function download(): Promise<void> {
   const id = state.mapId;
-  const map = await newMap();
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([JSON.stringify(map)], { type: "application/json" }));
-  link.download = `${id ?? "map"}-updated.json`;
-  link.click();
-  URL.revokeObjectURL(link.href);
+  save(JSON.stringify(await newMap()), `${id ?? "map"}-updated.json`);
 }
 
 async function storeMap(): Promise<void> {

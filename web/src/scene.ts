@@ -2,6 +2,7 @@
 
 import { example, getMap } from "./api";
 import { askSoon } from "./asking";
+import { degrees } from "./geometry";
 import { boundsOf, changed, onChange, setMap, state } from "./state";
 import type { Example } from "./types";
 import { showProblem } from "./verdict";
@@ -33,7 +34,7 @@ export const isLatest = (number: number) => number === latest;
 export function showAll(about: string, example = ""): void {
   chooser.value = state.example = example;
   document.querySelector("#about")!.textContent = about;
-  for (const [id, value] of Object.entries({ "#fov": (180 / Math.PI) * state.laser.fov, "#beams": state.laser.beams, "#range": state.laser.range_max }))
+  for (const [id, value] of Object.entries({ "#fov": degrees(state.laser.fov), "#beams": state.laser.beams, "#range": state.laser.range_max }))
     document.querySelector<HTMLInputElement>(id)!.value = String(Math.round(100 * value) / 100);
   fit(boundsOf(state.walls));
   changed();

@@ -1,11 +1,12 @@
 // The request as it was sent, for a terminal, a program or a report.
 
 import { request } from "./asking";
+import { element, save } from "./dom";
 import { open } from "./files";
 import { showProblem } from "./verdict";
 import { messageOf } from "./words";
 
-const text = document.querySelector<HTMLElement>("#copied")!;
+const text = element("#copied");
 
 function body(): string | null {
   const made = request();
@@ -71,7 +72,7 @@ export function openLink(): boolean {
 addEventListener("hashchange", openLink);
 
 function copying(id: string, form: (json: string) => string | Promise<string>): void {
-  document.querySelector(id)!.addEventListener("click", async () => {
+  element(id).addEventListener("click", async () => {
     const json = body();
     if (json === null) return;
     let copied: string;
@@ -94,13 +95,9 @@ copying("#link", asLink);
 copying("#curl", asCurl);
 copying("#powershell", asPowerShell);
 copying("#python", asPython);
-document.querySelector("#download")!.addEventListener("click", () => {
+element("#download").addEventListener("click", () => {
   const json = body();
   if (json === null) return;
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([json], { type: "application/json" }));
-  link.download = "linefix-request.json";
-  link.click();
-  URL.revokeObjectURL(link.href);
+  save(json, "linefix-request.json");
   text.textContent = "Downloaded; it can be opened here again.";
 });

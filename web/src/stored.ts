@@ -2,23 +2,22 @@
 
 import { checkMap, deleteMap, listMaps, putMap } from "./api";
 import type { MapList } from "./contract";
+import { element, made } from "./dom";
 import { openSeveral } from "./floors";
 import { openStored } from "./scene";
 import { kept, state } from "./state";
 import { list, messageOf } from "./words";
 
-const box = document.querySelector<HTMLDetailsElement>("#stored")!;
-const maps = document.querySelector<HTMLUListElement>("#maps")!;
-const more = document.querySelector<HTMLButtonElement>("#more")!;
-const findings = document.querySelector<HTMLElement>("#findings")!;
-const name = document.querySelector<HTMLInputElement>("#map-id")!;
-const prefix = document.querySelector<HTMLInputElement>("#prefix")!;
+const box = element<HTMLDetailsElement>("#stored");
+const maps = element<HTMLUListElement>("#maps");
+const more = element<HTMLButtonElement>("#more");
+const findings = element("#findings");
+const name = element<HTMLInputElement>("#map-id");
+const prefix = element<HTMLInputElement>("#prefix");
 let cursor = "";
 
 function show(...lines: string[]): void {
-  const shown = document.createElement("ul");
-  list(shown, lines);
-  findings.replaceChildren(shown);
+  list(findings, lines);
 }
 
 /** Do something, and show its error. */
@@ -34,31 +33,20 @@ async function load(from: string): Promise<void> {
   const page = await listMaps(from);
   if (!from) maps.replaceChildren();
   for (const one of page.maps) maps.append(row(one.map_id, one.segment_count));
-  if (!maps.children.length) {
-    const none = document.createElement("li");
-    none.textContent = "No map is stored yet.";
-    maps.append(none);
-  }
+  if (!maps.children.length) maps.append(made("li", { textContent: "No map is stored yet." }));
   cursor = page.next ?? "";
   more.hidden = !cursor;
 }
 
 function row(id: string, segments: number): HTMLLIElement {
-  const item = document.createElement("li");
-  const [choice, tick] = [document.createElement("label"), document.createElement("input")];
-  Object.assign(tick, { type: "checkbox", value: id });
-  choice.className = "check";
-  choice.append(tick, `${id} (${segments} walls)`);
-  item.append(choice);
+  const item = made("li", {}, made("label", { className: "check" }, made("input", { type: "checkbox", value: id }), `${id} (${segments} walls)`));
   const actions: [string, () => Promise<void>][] = [
     ["Open", () => openStored(id)],
     ["Check", () => check(id)],
     ["Delete", () => remove(id)],
   ];
   for (const [word, action] of actions) {
-    const button = document.createElement("button");
-    button.textContent = word;
-    button.setAttribute("aria-label", `${word} ${id}`);
+    const button = made("button", { textContent: word, ariaLabel: `${word} ${id}` });
     button.addEventListener("click", () => void trying(action));
     item.append(button);
   }
@@ -104,9 +92,9 @@ async function chosen(): Promise<string[]> {
   return found;
 }
 
-document.querySelector("#several")!.addEventListener("click", () => void trying(async () => openSeveral(await chosen())));
+element("#several").addEventListener("click", () => void trying(async () => openSeveral(await chosen())));
 box.addEventListener("toggle", () => {
   if (box.open) void trying(() => load(""));
 });
 more.addEventListener("click", () => void trying(() => load(cursor)));
-document.querySelector("#upload")!.addEventListener("click", () => void trying(upload));
+element("#upload").addEventListener("click", () => void trying(upload));

@@ -1,13 +1,13 @@
 // The verdicts of a log in their order, and the filter of its scans.
 
+import { element, sized } from "./dom";
 import { colours, KINDS } from "./drawing";
 import { kindOf } from "./heat";
 import { changed, onChange, state } from "./state";
 import type { LogLine } from "./types";
 
-const canvas = document.querySelector<HTMLCanvasElement>("#timeline canvas")!;
-const context = canvas.getContext("2d")!;
-const filter = document.querySelector<HTMLSelectElement>("#filter")!;
+const canvas = element<HTMLCanvasElement>("#timeline canvas");
+const filter = element<HTMLSelectElement>("#filter");
 const THUMB = 12; // px, as in the style sheet: its middle is on the scan
 const LEAST = 0.25; // height of a verdict that is worst; the best has the whole height
 export const FADED = 0.15; // opacity of a scan that the filter omits
@@ -48,8 +48,7 @@ function draw(): void {
   const { log } = state;
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const context = sized(canvas, width, height);
   const step = (width - THUMB) / Math.max(1, log.length - 1);
   log.forEach((line, k) => {
     const worse = line ? KINDS.indexOf(kindOf(line)) / (KINDS.length - 1) : 1;

@@ -1,10 +1,11 @@
 // The verdict in words and numbers, and the alternatives.
 
+import { element, made } from "./dom";
+import { degrees } from "./geometry";
 import { changed, onChange, state, wallOf } from "./state";
 import type { Answer, LogLine, Pose } from "./types";
 import { list, sentenceOf, write } from "./words";
 
-const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const card = element("#verdict");
 let notice: { kind: "problem" | "waiting"; message: string } | null = null;
 
@@ -69,14 +70,7 @@ function numbers(): void {
     rows.push(["missing map", `${answer.missing_map.length} walls`]);
     rows.push(["time", `${answer.timing_ms.total.toFixed(1)} ms`]);
   }
-  element("#numbers").replaceChildren(
-    ...rows.flatMap(([name, value]) => {
-      const [term, description] = [document.createElement("dt"), document.createElement("dd")];
-      term.textContent = name;
-      description.textContent = value;
-      return [term, description];
-    }),
-  );
+  element("#numbers").replaceChildren(...rows.flatMap(([name, value]) => [made("dt", { textContent: name }), made("dd", { textContent: value })]));
 }
 
 function others(): void {
@@ -100,7 +94,6 @@ for (const [id, by] of [["#before-other", -1], ["#next-other", 1]] as const)
     changed();
   });
 
-const degrees = (radians: number) => (180 / Math.PI) * radians;
 export const percent = (probability: number) => `${(100 * probability).toFixed(2)} %`;
 const poseText = ({ x, y, theta }: Pose) => `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`;
 

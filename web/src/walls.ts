@@ -1,5 +1,6 @@
 // The walls of the map. Large maps move as a picture and are drawn sharp once they stand still.
 
+import { made, sized } from "./dom";
 import { state } from "./state";
 import type { Segment } from "./types";
 import { toPixels, view } from "./view";
@@ -38,12 +39,8 @@ export function drawWalls(context: CanvasRenderingContext2D, colour: string, aga
 }
 
 function draw(colour: string): void {
-  const picture = drawn?.picture ?? document.createElement("canvas");
-  picture.width = Math.round(view.width * view.ratio);
-  picture.height = Math.round(view.height * view.ratio);
-  const context = picture.getContext("2d")!;
-  context.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
-  stroke(context, colour);
+  const picture = drawn?.picture ?? made("canvas");
+  stroke(sized(picture, view.width, view.height, view.ratio), colour);
   drawn = { of: state.walls, colour, view: { ...view }, picture };
 }
 

@@ -1,6 +1,7 @@
 // The page's own sentences for codes of the contract, whose messages name fields of requests and answers.
 
 import type { Problem, ReasonAnswer } from "./contract";
+import { made } from "./dom";
 
 const REASONS: Record<ReasonAnswer["code"], string> = {
   prior_contradicted: "The pose that the scan supports contradicts the prior. Check the initial pose, or search without the prior.",
@@ -31,20 +32,14 @@ export function sentenceOf(code: string, message: string): string {
 
 /** Show a text; what is in backticks is a command or a field of a file. */
 export function write(element: HTMLElement, text: string): void {
-  const parts = text.split("`").map((part, k) => {
-    if (k % 2 === 0) return part;
-    const code = document.createElement("code");
-    code.textContent = part;
-    return code;
-  });
-  element.replaceChildren(...parts);
+  element.replaceChildren(...text.split("`").map((part, k) => (k % 2 ? made("code", { textContent: part }) : part)));
 }
 
 /** Show lines as a list, each once. */
 export function list(into: HTMLElement, lines: string[]): void {
   into.replaceChildren(
     ...[...new Set(lines)].map((line) => {
-      const item = document.createElement("li");
+      const item = made("li");
       write(item, line);
       return item;
     }),
