@@ -17,7 +17,7 @@ from linefix.documents import examples
 from tests.issuing import ADMIN
 from tests.running import RunningService
 
-from .plan import shown, verdict
+from .plan import ROOMS, Plan, box_of, shown, verdict
 
 SCAN = {"segments": examples.SEEN, "sigma": 0.02}
 PROBLEM = {"title": "t", "status": 503, "detail": "All places are taken", "code": "overloaded"}
@@ -67,15 +67,10 @@ def test_the_keyboard_alone(page: Page) -> None:
 
 def test_a_robot_is_dragged(page: Page) -> None:
     shown(page, "rooms", "ambiguous")
-    box = page.locator("#plan").bounding_box()
-    assert box is not None
-    # The plan is 13.6 m wide and fills 88 % of the canvas; the robot stands at (6.75, 4.2), the middle at (5.8, 2.575).
-    scale = 0.88 * box["width"] / 13.6
-    at = [(box["x"] + box["width"] / 2 + (x - 5.8) * scale, box["y"] + box["height"] / 2 - (y - 2.575) * scale)
-          for x, y in ((6.75, 4.2), (4.0, 1.0))]  # fmt: skip
-    page.mouse.move(*at[0])
+    plan = Plan(page, ROOMS)
+    page.mouse.move(*plan.at(6.75, 4.2))
     page.mouse.down()
-    page.mouse.move(*at[1], steps=4)
+    page.mouse.move(*plan.at(4.0, 1.0), steps=4)
     page.mouse.up()
     verdict(page, "usable")
     expect(page.locator("#numbers")).to_contain_text("4.0")
@@ -93,8 +88,7 @@ def test_noise_and_walls_that_are_missing(page: Page) -> None:
     verdict(page, "usable")
     expect(page.get_by_role("button", name="Restore the map")).to_be_disabled()
     page.get_by_label("remove walls").check()
-    box = page.locator("#plan").bounding_box()
-    assert box is not None
+    box = box_of(page, "#plan")
     for share in (0.2, 0.35, 0.5, 0.65, 0.8):
         for other in range(12):
             page.mouse.click(box["x"] + (0.1 + 0.066 * other) * box["width"], box["y"] + share * box["height"])
@@ -181,16 +175,9 @@ def test_where_a_map_will_fail(page: Page) -> None:
     page.get_by_role("button", name="Analyze").click()
     expect(page.locator("#analyzed")).to_contain_text("Localization succeeds at", timeout=60_000)
     expect(page.locator("#legend")).to_contain_text("ambiguous")
-    box = page.locator("#plan").bounding_box()
-    assert box is not None
-    scale = 0.88 * box["width"] / 13.6
-    # As in `test_a_robot_is_dragged`; in the upper part of the right room.
-    page.mouse.move(
-        box["x"] + box["width"] / 2 + (9.3 - 5.8) * scale, box["y"] + box["height"] / 2 - (4.3 - 2.575) * scale
-    )
+    page.mouse.move(*Plan(page, ROOMS).at(9.3, 4.3))  # the upper part of the right room
     expect(page.locator("#hover")).to_contain_text("similar place at (")
-    told = page.locator("#hover").bounding_box()
-    assert told is not None
+    told, box = box_of(page, "#hover"), box_of(page, "#plan")
     assert told["x"] + told["width"] < box["x"] + box["width"]
     page.get_by_role("button", name="Clear").click()
     expect(page.locator("#analyzed")).to_be_empty()
@@ -210,13 +197,10 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     page.get_by_label("simulate the scan").check()
     verdict(page, "ambiguous")
     page.get_by_label("add a box").check()
-    box = page.locator("#plan").bounding_box()
-    assert box is not None
-    scale = 0.88 * box["width"] / 8
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.mouse.click(middle[0] + 2.0 * scale, middle[1] - 1.0 * scale)
+    plan = Plan(page, (0.0, 0.0, 8.0, 5.0))
+    page.mouse.click(*plan.at(6.0, 3.5))
     verdict(page, "usable")
-    page.mouse.move(middle[0] + 2.5 * scale, middle[1] - 1.0 * scale)
+    page.mouse.move(*plan.at(6.5, 3.5))
     expect(page.locator("#hover")).to_have_text("wall 6, added")  # 4 are the map's
     page.locator("#analysis summary").click()
     page.get_by_label("Spacing").fill("2")

@@ -187,10 +187,3 @@ def test_alternatives_are_counted_as_in_the_message_and_have_their_own_numbers(p
     page.get_by_role("button", name="Next pose").click()
     expect(other).to_have_text("2 alternatives")
     assert sum(one["probability"] for one in answer["alternatives"]) + answer["probability"] <= 1.0
-
-
-def test_no_renamed_word_is_left() -> None:
-    """Codes and fields that were renamed are in no source of the page."""
-    text = "".join(path.read_text() for path in WEB.iterdir()) + (WEB.parent / "index.html").read_text()
-    for old in ("twin", "look-alike", "Look-alike", "hinges_on", "too_little", "elsewhere", "put up", "rival"):
-        assert old not in text, old

@@ -62,7 +62,6 @@ def test_stored_maps(page: Page, client: httpx.Client) -> None:
     assert client.get("/v1/maps/page-flat").status_code == 200
     page.get_by_role("button", name="Open page-flat").click()
     expect(page.locator("#about")).to_have_text("The stored map page-flat.")
-    expect(page.locator("#about")).to_have_text("The stored map page-flat.")
     page.get_by_role("button", name="Check page-flat").click()
     expect(page.locator("#findings")).not_to_contain_text("Checking", timeout=30_000)
     page.once("dialog", lambda dialog: dialog.accept())
