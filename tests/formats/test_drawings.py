@@ -13,14 +13,11 @@ from ezdxf.document import Drawing as Document
 from ezdxf.filemanagement import new
 
 from formats import (
-    FormatError,
     ImportedMap,
     ImportOptions,
     IncompleteFileError,
     InvalidOptionError,
-    MalformedFileError,
     TooLargeError,
-    UnsupportedFormatError,
     read_map,
 )
 
@@ -230,61 +227,6 @@ def test_directions_mean_what_the_caller_says(tmp_path: Path) -> None:
     own = read_map(path).map
     assert (own.oriented, own.sigma, own.frame_id, own.meta) == (True, 0.03, "hq", {"a": "b"})
     assert not read_map(path, ImportOptions(directions="none")).map.oriented
-
-
-NESTED_SVG = "<g>" * 70 + "</g>" * 70
-LAUGHS = '<!DOCTYPE svg [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]>' + SVG.format("&b;")
-DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "kind", "message"),
-    [
-        ("a.dxf", "  \n", MalformedFileError, "is empty"),
-        ("a.dxf", "nothing of the kind", MalformedFileError, "is not a DXF"),
-        ("a.dxf", "AC1032\0\0\0", UnsupportedFormatError, "save it as DXF"),
-        ("a.svg", "<svg", MalformedFileError, "is not XML"),
-        ("a.svg", "<html/>", MalformedFileError, "expected an svg element"),
-        ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
-        ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
-        ("a.svg", SVG.format('<path d="' + "M0 0" * 1_100_000 + '"/>'), TooLargeError, "characters of paths"),
-        (
-            "a.svg",
-            SVG.format('<line x1="nan" y1="0" x2="1" y2="1"/>'),
-            MalformedFileError,
-            "is 'nan', expected a number",
-        ),
-        (
-            "a.svg",
-            SVG.format('<line x1="1e" y1="0" x2="1" y2="1"/>'),
-            MalformedFileError,
-            "line 1: x1 of a line element",
-        ),
-        ("a.svg", SVG.format("<text/>"), MalformedFileError, "has no lines"),
-        ("a.geojson", "[1, 2]", MalformedFileError, "is not GeoJSON"),
-        ("a.geojson", '{"type": "LineString", "coordinates": [["a", 1], [2, 3]]}', MalformedFileError, "not a number"),
-        ("a.geojson", '{"type": "LineString", "coordinates": [1, 2]}', MalformedFileError, "not [x, y]"),
-        ("a.geojson", DEEP, MalformedFileError, "nested collections"),
-        ("a.json", "[" * 5000, MalformedFileError, "is not JSON"),
-        ("a.json", '{"segments": [[0, 0, 1]]}', MalformedFileError, "[x1, y1, x2, y2]"),
-        ("a.json", '{"segments": [[0, 0, 1, true]]}', MalformedFileError, "[x1, y1, x2, y2]"),
-        ("a.json", '{"segments": [[0, 0, 1e10, 0]]}', MalformedFileError, "beyond 1e+09 m; check the unit"),
-        ("a.json", '{"segments": [[0, 0, 1, 0]], "sigma": -1}', MalformedFileError, "sigma"),
-        ("a.csv", "0,0,4\n", MalformedFileError, "expected rows"),
-        ("a.csv", "0,0,4,nan\n", MalformedFileError, "not a number up to 1e+13"),
-        ("a.csv", "\xff", MalformedFileError, "has no lines|UTF-8|expected rows"),
-        ("a.dwg", "", UnsupportedFormatError, "ends in one of"),
-    ],
-)
-def test_bad_files_are_refused_in_one_line_that_names_them(
-    tmp_path: Path, name: str, content: str, kind: type[FormatError], message: str
-) -> None:
-    path = text(tmp_path, name, content)
-    with pytest.raises(kind) as caught:
-        read_map(path, ImportOptions(local_metres=True, units="m"))
-    assert any(part in str(caught.value) for part in message.split("|"))
-    assert str(caught.value).startswith(f"{name}: ")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

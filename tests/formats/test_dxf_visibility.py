@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from ezdxf import units
 from ezdxf.document import Drawing as Document
 from ezdxf.filemanagement import new
 
-from formats import ImportOptions, read_map
+from formats import ImportedMap, ImportOptions, read_map
 
 ALL = ImportOptions(layers=("*",))
 ROOM = ((0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (0.0, 4.0))
@@ -24,19 +25,21 @@ def plan(*layers: str) -> Document:
     return document
 
 
+def read(tmp_path: Path, document: Document, options: ImportOptions | None = None) -> ImportedMap:
+    document.saveas(tmp_path / "plan.dxf")
+    return read_map(tmp_path / "plan.dxf", options or ImportOptions())
+
+
 def lengths(tmp_path: Path, document: Document) -> list[float]:
     """Lengths of the lines that are read next to the room, decimetres."""
-    path = tmp_path / "plan.dxf"
-    document.saveas(path)
-    found = sorted(round(10 * length) for length in read_map(path, ALL).map.segments.lengths)
+    found = sorted(round(10 * length) for length in read(tmp_path, document, ALL).map.segments.lengths)
     for length in (40, 40, 70, 70):
         found.remove(length)
     return found
 
 
 def dropped(tmp_path: Path, document: Document) -> dict[str, tuple[str, int]]:
-    document.saveas(tmp_path / "plan.dxf")
-    report = read_map(tmp_path / "plan.dxf", ALL).report
+    report = read(tmp_path, document, ALL).report
     return {note.code: (note.message, note.count) for note in report.dropped}
 
 
@@ -127,9 +130,34 @@ def test_a_wall_layer_is_asked_for_by_the_layer_of_the_reference(tmp_path: Path)
     document.blocks.new("THING").add_line((0, 0), (1, 0))
     document.modelspace().add_blockref("THING", (1, 1), dxfattribs={"layer": "WALLS"})
     document.modelspace().add_blockref("THING", (1, 2), dxfattribs={"layer": "DESKS"})
-    document.saveas(tmp_path / "plan.dxf")
-    assert len(read_map(tmp_path / "plan.dxf", ImportOptions(layers=("WALLS",))).map.segments) == 1
-    other = {
-        note.code: note for note in read_map(tmp_path / "plan.dxf", ImportOptions(layers=("WALLS",))).report.dropped
-    }
+    found = read(tmp_path, document, ImportOptions(layers=("WALLS",)))
+    assert len(found.map.segments) == 1
+    other = {note.code: note for note in found.report.dropped}
     assert "A (1), DESKS (1)" in other["other_layer"].message
+
+
+def closed(document: Document, points: Iterable[tuple[float, float]], layer: str) -> None:
+    document.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+
+
+def test_layers_whose_names_say_wall_are_taken_alone(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    closed(document, ROOM, "Außenwand")
+    closed(document, [(x + 9, y) for x, y in ROOM], "A-FURN")
+    imported = read(tmp_path, document)
+    assert len(imported.map.segments) == 4
+    (said,) = [note.message for note in imported.report.assumed if note.code == "layers"]
+    assert said.startswith("walls are on Außenwand, by their names, and not on A-FURN")
+    assert len(read(tmp_path, document, ImportOptions(layers=("*",))).map.segments) == 8
+    document.layers.add("A-FURN")
+    document.layers.get("A-FURN").off()
+    assert "layers" not in str(read(tmp_path, document).report.assumed)
+
+
+def test_all_layers_are_taken_and_named_where_none_says_wall(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    closed(document, ROOM, "1")
+    closed(document, [(x + 9, y) for x, y in ROOM], "2")
+    imported = read(tmp_path, document)
+    assert len(imported.map.segments) == 8
+    assert "lines of all layers are walls: 1, 2" in str(imported.report.assumed)

@@ -308,15 +308,6 @@ def test_a_file_to_which_something_has_to_be_done_first(tmp_path: Path, name: st
         read(tmp_path / name)
 
 
-@pytest.mark.parametrize("letter", ["%20", "#", "?x"])
-def test_a_path_that_sqlite_would_read_as_another_is_refused(tmp_path: Path, letter: str) -> None:
-    path = folder(tmp_path, plugin=StoragePlugin.SQLITE3)
-    file = tmp_path / f"a{letter}.db3"
-    shutil.copy(path / "drive_0.db3", file)
-    with pytest.raises(UnsupportedFormatError, match="rename it"):
-        read(file)
-
-
 def test_a_write_ahead_log_is_not_passed_over_in_silence(tmp_path: Path) -> None:
     path = folder(tmp_path, plugin=StoragePlugin.SQLITE3)
     (path / "drive_0.db3-wal").write_bytes(b"x" * 100)

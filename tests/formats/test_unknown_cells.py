@@ -17,6 +17,7 @@ Pixels = NDArray[np.uint8]
 
 FREE, UNKNOWN, WALL = 254, 205, 0
 TRINARY = {WALL: 0, UNKNOWN: 1, FREE: 2}
+LONG = pytest.mark.long
 
 
 def sheet() -> Pixels:
@@ -156,7 +157,7 @@ def test_a_transparent_grey_value(tmp_path: Path, kind: str) -> None:
     assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
 
 
-@pytest.mark.parametrize("quality", [50, 75, 95])
+@pytest.mark.parametrize("quality", [50, pytest.param(75, marks=LONG), 95])
 @pytest.mark.parametrize("name", ["map.png", "map.jpg"])
 def test_noise_of_a_compression(tmp_path: Path, quality: int, name: str) -> None:
     thick = sheet()
@@ -170,7 +171,7 @@ def test_noise_of_a_compression(tmp_path: Path, quality: int, name: str) -> None
     assert found.map.segments.lengths.sum() == pytest.approx(80.0, abs=1.0)
 
 
-@pytest.mark.parametrize("factor", [2, 3, 4])
+@pytest.mark.parametrize("factor", [2, pytest.param(3, marks=LONG), pytest.param(4, marks=LONG)])
 @pytest.mark.parametrize("filtered", [Image.Resampling.BILINEAR, Image.Resampling.LANCZOS])
 def test_blurred_edges_of_a_resized_picture(tmp_path: Path, factor: int, filtered: Image.Resampling) -> None:
     thick = sheet()

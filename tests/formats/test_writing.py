@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from formats import LineMap, UnsupportedFormatError, draw_map, read_map, write_map
+from formats import LineMap, StampedPose, UnsupportedFormatError, draw_map, read_map, write_map, write_tum
 from registration import RigidTransform, Segments
 
 
@@ -60,3 +61,11 @@ def test_a_picture_shows_walls_free_sides_and_poses(tmp_path: Path) -> None:
     assert not (strip[30] == (16, 20, 24)).all(axis=1)[180]
     draw_map(LineMap(room, oriented=False), tmp_path / "b.png")
     assert not (np.asarray(Image.open(tmp_path / "b.png")) == (42, 160, 224)).all(axis=2).any()
+
+
+def test_tum_has_a_line_a_pose_with_the_time_to_the_nanosecond(tmp_path: Path) -> None:
+    poses = [StampedPose(1_700_000_000_000_000_005, RigidTransform(1.5, -2.25, math.pi / 2))]
+    assert write_tum(poses, tmp_path / "a.tum") == 1
+    half = f"{math.sqrt(0.5):.12f}"
+    text = (tmp_path / "a.tum").read_text()
+    assert text == f"1700000000.000000005 1.500000000 -2.250000000 0 0 0 {half} {half}\n"

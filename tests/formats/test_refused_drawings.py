@@ -1,0 +1,117 @@
+"""Files that are no drawing, hold nothing, or would unpack from megabytes to gigabytes: one clear error, in bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from formats import FormatError, ImportOptions, MalformedFileError, TooLargeError, UnsupportedFormatError, read_map
+
+LONG = pytest.mark.long
+OPTIONS = ImportOptions(local_metres=True, units="m", drawn="faces")
+FEATURES = b'{"type": "FeatureCollection", "features": [%s]}'
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 10">{}</svg>'
+NESTED_SVG = "<g>" * 70 + "</g>" * 70
+LAUGHS = '<!DOCTYPE svg [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]>' + SVG.format("&b;")
+DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
+LINE = b'{"type": "LineString", "coordinates": %s}'
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "kind", "message"),
+    [
+        ("a.dxf", "  \n", MalformedFileError, "is empty"),
+        ("a.dxf", "nothing of the kind", MalformedFileError, "is not a DXF"),
+        ("a.dxf", "AC1032\0\0\0", UnsupportedFormatError, "save it as DXF"),
+        ("a.svg", "<svg", MalformedFileError, "is not XML"),
+        ("a.svg", "<html/>", MalformedFileError, "expected an svg element"),
+        ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
+        ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
+        ("a.svg", SVG.format('<path d="' + "M0 0" * 1_100_000 + '"/>'), TooLargeError, "characters of paths"),
+        (
+            "a.svg",
+            SVG.format('<line x1="nan" y1="0" x2="1" y2="1"/>'),
+            MalformedFileError,
+            "is 'nan', expected a number",
+        ),
+        (
+            "a.svg",
+            SVG.format('<line x1="1e" y1="0" x2="1" y2="1"/>'),
+            MalformedFileError,
+            "line 1: x1 of a line element",
+        ),
+        ("a.svg", SVG.format("<text/>"), MalformedFileError, "has no lines"),
+        ("a.geojson", "[1, 2]", MalformedFileError, "is not GeoJSON"),
+        ("a.geojson", '{"type": "LineString", "coordinates": [["a", 1], [2, 3]]}', MalformedFileError, "not a number"),
+        ("a.geojson", '{"type": "LineString", "coordinates": [1, 2]}', MalformedFileError, "not [x, y]"),
+        ("a.geojson", DEEP, MalformedFileError, "nested collections"),
+        ("a.json", "[" * 5000, MalformedFileError, "is not JSON"),
+        ("a.json", '{"segments": [[0, 0, 1]]}', MalformedFileError, "[x1, y1, x2, y2]"),
+        ("a.json", '{"segments": [[0, 0, 1, true]]}', MalformedFileError, "[x1, y1, x2, y2]"),
+        ("a.json", '{"segments": [[0, 0, 1e10, 0]]}', MalformedFileError, "beyond 1e+09 m; check the unit"),
+        ("a.json", '{"segments": [[0, 0, 1, 0]], "sigma": -1}', MalformedFileError, "sigma"),
+        ("a.csv", "0,0,4\n", MalformedFileError, "expected rows"),
+        ("a.csv", "0,0,4,nan\n", MalformedFileError, "not a number up to 1e+13"),
+        ("a.csv", "\xff", MalformedFileError, "has no lines|UTF-8|expected rows"),
+        ("a.dwg", "", UnsupportedFormatError, "ends in one of"),
+        pytest.param("a.geojson", FEATURES % (b"{}," * 8_000_000 + b"{}"), TooLargeError, "6000000 values", marks=LONG),
+        ("a.geojson", FEATURES % (b"{}," * 900_000 + b"{}"), TooLargeError, "500000 features"),
+        ("a.geojson", FEATURES % (b"{}," * 900 + b"{}"), MalformedFileError, "has no lines"),
+        ("a.geojson", FEATURES % b"", MalformedFileError, "has no lines"),
+        ("a.geojson", LINE % b"[]", MalformedFileError, "has no lines"),
+        ("a.geojson", LINE % b"[[0, 0]]", MalformedFileError, "has no lines"),
+        ("a.geojson", LINE % b"[[0, 0], [1e400, 0]]", MalformedFileError, "not a number|is not JSON"),
+        ("a.geojson", LINE % b"[[0, 0], [NaN, 0]]", MalformedFileError, "is not JSON"),
+        ("a.geojson", LINE % b"[[0, 0], [null, 0]]", MalformedFileError, "not a number"),
+        ("a.geojson", LINE % b"[[0, 0], []]", MalformedFileError, "not [x, y]"),
+        ("a.geojson", LINE % b'[[0, 0], "ab"]', MalformedFileError, "not a number"),
+        ("a.geojson", LINE % (b"[" * 900 + b"]" * 900), MalformedFileError, "not [x, y]|not a number"),
+        ("a.geojson", b'{"type": "Feature", "geometry": null}', MalformedFileError, "feature without geometry"),
+        ("a.geojson", b'{"type": "Point", "coordinates": [0, 0]}', MalformedFileError, "Point is not read (1)"),
+        pytest.param(
+            "a.json", b"[" + b"[0,0,1,1]," * 2_000_000 + b"[0,0,1,1]]", TooLargeError, "6000000 values", marks=LONG
+        ),
+        ("a.json", b"[" + b"0," * 7_000_000 + b"0]", TooLargeError, "6000000 values"),
+        ("a.json", b'{"segments": [[0, 0, 1e400, 1]]}', MalformedFileError, "not a number|is not JSON"),
+        ("a.csv", b"\n" * 3_000_000, TooLargeError, "1000000 lines"),
+        pytest.param("a.csv", b"\r" * 3_000_000, TooLargeError, "1000000 lines", marks=LONG),
+        ("a.csv", b"," * 3_000_000, TooLargeError, "10000 characters"),
+        pytest.param("a.csv", b"0,0,1,1\n" * 600_000, TooLargeError, "500000 lines", marks=LONG),
+        ("a.csv", b"0,0,1,inf\n", MalformedFileError, "not a number up to"),
+        ("a.csv", b"0,0,1,1e400\n", MalformedFileError, "not a number up to"),
+        ("a.csv", "0,0,1,1\n".encode("utf-16"), MalformedFileError, "UTF-8"),
+        ("a.csv", b"\xff\xfe0", MalformedFileError, "UTF-8"),
+        ("a.csv", b"", MalformedFileError, "expected rows|has no lines"),
+        ("a.csv", b"0,0,1,\x001\n", MalformedFileError, "expected rows"),
+        pytest.param("a.svg", b"<svg>" + b"<g/>" * 600_000 + b"</svg>", TooLargeError, "500000 elements", marks=LONG),
+    ],
+)
+def test_refused_in_one_line_that_names_the_file(
+    tmp_path: Path, name: str, content: str | bytes, kind: type[FormatError], message: str
+) -> None:
+    (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(kind) as caught:
+        read_map(tmp_path / name, OPTIONS)
+    assert any(part in str(caught.value) for part in message.split("|")), str(caught.value)
+    assert str(caught.value).startswith(f"{name}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.geojson", "a.csv"])
+def test_a_byte_order_mark(tmp_path: Path, name: str) -> None:
+    content = {
+        "a.json": b"[[0, 0, 4, 0]]",
+        "a.geojson": LINE % b"[[0, 0], [4, 0]]",
+        "a.csv": b"x1,y1,x2,y2\r\n0,0,4,0\r\n",
+    }[name]
+    (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + content)
+    assert read_map(tmp_path / name, OPTIONS).map.segments.endpoints.tolist() == [[0, 0, 4, 0]]
+
+
+def test_widths_that_are_no_lengths_are_none(tmp_path: Path) -> None:
+    feature = b'{"type": "Feature", "properties": {"width": %s}, "geometry": ' + LINE % b"[[0, 0], [4, 0]]" + b"}"
+    for width in (b"true", b"-1", b"1e300", b'"wide"', b"{}"):
+        (tmp_path / "a.geojson").write_bytes(feature % width)
+        found = read_map(tmp_path / "a.geojson", ImportOptions(local_metres=True, drawn="centres"))
+        assert "thickness_usual" in {note.code for note in found.report.assumed}
