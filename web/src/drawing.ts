@@ -5,10 +5,10 @@ import { arrow, element, sized } from "./dom";
 import { beamsOf, place, placed, pointsOf } from "./geometry";
 import { drawGrid, drawPicture } from "./ground";
 import { drawHeat, kindOf } from "./heat";
-import { answerHere, state, wallOf } from "./state";
+import { answerHere, boundsOf, state, wallOf } from "./state";
 import type { Answer, Pose, Scan, Segment } from "./types";
 import { FADED, passes } from "./timeline";
-import { toPixels, view } from "./view";
+import { fit, toPixels, view } from "./view";
 import { drawWalls } from "./walls";
 
 const canvas = element<HTMLCanvasElement>("#plan");
@@ -27,10 +27,16 @@ export function readColours(): void {
   colours = Object.fromEntries([...NAMES, ...KINDS, ...CODES.map(colourOf)].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
+/** Take the size of the canvas; a map that is fitted stays so. */
 export function resize(): void {
+  const [{ x, y, scale }, bounds] = [view, boundsOf(state.walls)];
+  fit(bounds);
+  const fitted = view.x === x && view.y === y && view.scale === scale;
+  Object.assign(view, { x, y, scale });
   const box = canvas.getBoundingClientRect();
   Object.assign(view, { width: box.width, height: box.height, ratio: window.devicePixelRatio || 1 });
   sized(canvas, box.width, box.height);
+  if (fitted) fit(bounds);
   redraw();
 }
 

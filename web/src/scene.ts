@@ -32,7 +32,7 @@ export function supersede(): number {
 export const isLatest = (number: number) => number === latest;
 
 export function showAll(about: string, example = ""): void {
-  chooser.value = state.example = example;
+  state.example = example;
   document.querySelector("#about")!.textContent = about;
   for (const [id, value] of Object.entries({ "#fov": degrees(state.laser.fov), "#beams": state.laser.beams, "#range": state.laser.range_max }))
     document.querySelector<HTMLInputElement>(id)!.value = String(Math.round(100 * value) / 100);
@@ -77,5 +77,6 @@ virtual.addEventListener("change", () => {
 
 onChange(() => {
   virtual.checked = state.virtual;
+  chooser.value = state.example;
   document.querySelector<HTMLElement>("#hint")!.hidden = state.map !== null || state.scan !== null || state.log.length > 0;
 });

@@ -10,7 +10,7 @@ from playwright.sync_api import FilePayload, Page, expect
 
 from linefix.documents import examples
 
-from .plan import box_of, shown, verdict
+from .plan import Plan, box_of, shown, verdict
 
 SIMILAR = [{"code": "similar_place", "message": "see `alternatives`"}]
 FAR = 2.0  # m from scan to scan
@@ -66,6 +66,13 @@ def test_a_log_is_played_and_the_verdict_follows(log: Page) -> None:
     told(log, "Scan 6 of 6: ok, usable")
     verdict(log, "usable")
     expect(log.get_by_role("button", name="Play")).to_be_enabled()
+
+
+def test_the_map_still_fits_next_to_the_log(log: Page) -> None:
+    """The map is opened before the log, which takes some of its height."""
+    plan = Plan(log, (-4.0, -3.0, 4.0, 3.0))
+    log.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert [plan.colour(-4.0, y)[3] > 0 for y in (-2.9, 0.0, 2.9)] == [True] * 3
 
 
 def test_a_scan_without_a_pose_keeps_the_last_one(log: Page) -> None:

@@ -109,6 +109,7 @@ def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
     room, scan = files(tmp_path, room={"segments": examples.WALLS}, scan=SCAN)
     page.set_input_files("#files", [scan])
     expect(page.locator("#about")).to_contain_text("Now open its map")
+    expect(page.get_by_label("Example")).to_have_value("")
     page.set_input_files("#files", [room])
     verdict(page, "usable")
     expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
