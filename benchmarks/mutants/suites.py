@@ -41,9 +41,16 @@ SUITES = {
     "simulation/": Suite(("tests/simulation",)),
     "map_quality/analyze/": Suite(("tests/map_quality/analyze",)),
     "map_quality/": Suite(("tests/map_quality",)),
-    "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),
+    "service/admission/": Suite(
+        (
+            "tests/service/admission",
+            *(f"tests/service/http/test_{name}.py" for name in ("busy", "roles", "pages_of_others")),
+        )
+    ),
     "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
-    "service/parsing/": Suite(("tests/service/parsing", "tests/service/http/test_bodies.py")),
+    "service/parsing/": Suite(
+        ("tests/service/parsing", "tests/service/http/test_bodies.py", "tests/service/http/test_refusals.py")
+    ),
     "service/telemetry/": Suite(("tests/service/telemetry",)),
     "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py")),
     "cli/": Suite(("tests/cli",)),

@@ -98,12 +98,11 @@ def test_times_are_finite(monkeypatch: pytest.MonkeyPatch, name: str, value: str
         read_settings([])
 
 
-@pytest.mark.parametrize("name", ["LINEFIX_KEYS", "LINEFIX_DATA_DIR", "LINEFIX_HOST", "LINEFIX_DATABASE_URL"])
-def test_what_is_not_utf_8_is_named(name: str) -> None:
-    environment = {**os.environb, name.encode(): b"/tmp/\xff\xfe"}
+def test_what_is_not_utf_8_is_named() -> None:
+    environment = {**os.environb, b"LINEFIX_DATA_DIR": b"/tmp/\xff\xfe"}
     command = [sys.executable, "-m", "service"]
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert (ended.returncode, ended.stderr) == (2, f"linefix: {name}: expected UTF-8\n")
+    assert (ended.returncode, ended.stderr) == (2, "linefix: LINEFIX_DATA_DIR: expected UTF-8\n")
 
 
 def test_the_help_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,16 +36,17 @@ def test_revisions_and_conditions(client: httpx.Client) -> None:
     first = client.put(url, json=examples.MAP, headers={"if-none-match": "*"})
     assert (first.status_code, first.headers["etag"], first.json()["revision"]) == (201, '"1"', 1)
     assert first.json()["bounds"] == [-4.0, -3.0, 4.0, 3.0]
-    assert client.put(url, json=examples.MAP, headers={"if-none-match": "*"}).status_code == 412
-    conflict = client.put(url, json=examples.MAP, headers={"if-match": '"7", "8"'})
-    assert (conflict.status_code, conflict.headers["etag"]) == (412, '"1"')
-    assert "present revision is 1" in conflict.json()["detail"]
-    assert client.put(url, json=examples.MAP, headers={"if-match": 'W/"1"'}).status_code == 412
-    for name, value in (("if-match", "1"), ("if-none-match", "1"), ("if-none-match", ""), ("if-match", '"1", x')):
-        # Taken for no demand it would write over a map that the caller wanted to keep.
-        wrong = client.put(url, json=examples.MAP, headers={name: value})
-        assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, f"/header/{name}")
-    second = client.put(url, json=examples.MAP, headers={"if-match": '"7", "1",'})
+    demands = [("if-match", tags) for tags in ('"7", "8"', 'W/"1"', '"x", "01", "0"')]
+    for name, value in [*demands, ("if-none-match", "*"), ("if-none-match", 'W/"1", "7"')]:
+        conflict = client.put(url, json=examples.MAP, headers={name: value})
+        assert (conflict.status_code, conflict.headers["etag"]) == (412, '"1"'), (name, value)
+        assert "present revision is 1" in conflict.json()["detail"]
+    # Taken for no demand it would write over a map that the caller wanted to keep.
+    for name in ("if-match", "if-none-match"):
+        for value in ("1", "", '"3', '"3" x', "**", "W/3", '"1", x'):
+            wrong = client.put(url, json=examples.MAP, headers={name: value})
+            assert (wrong.status_code, wrong.json()["errors"][0]["pointer"]) == (422, f"/header/{name}")
+    second = client.put(url, json=examples.MAP, headers=[("if-match", '"7"'), ("if-match", '"1",')])
     assert (second.status_code, second.headers["etag"]) == (200, '"2"')
 
     unchanged = client.get(url, headers={"if-none-match": 'W/"2"'})

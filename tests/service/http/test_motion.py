@@ -1,4 +1,4 @@
-"""Scans that take time: the motion of their sensor is sent, or the answer allows for it and states it."""
+"""What is not known of a scan: the motion of its sensor, and beams whose range is null."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ANGLES = np.linspace(-math.pi, math.pi, 720, endpoint=False)
 STEP = 0.1 / len(ANGLES)  # s from beam to beam
 STILL = {"vx": 0.0, "vy": 0.0, "omega": 0.0}
 MAP = {"segments": examples.WALLS, "sigma": 0.002}
-CODE = "motion_unknown"
+MOTION, NULLS = "motion_unknown", "nulls_for_no_return"
 
 
 def laser(at: RigidTransform = HERE, **more: Any) -> dict[str, Any]:
@@ -35,8 +35,8 @@ def found(client: httpx.Client, scan: dict[str, Any]) -> dict[str, Any]:
     return answer
 
 
-def warned(answer: dict[str, Any]) -> list[str]:
-    return [one["message"] for one in answer["warnings"] if one["code"] == CODE]
+def warned(answer: dict[str, Any], code: str = MOTION) -> list[str]:
+    return [one["message"] for one in answer["warnings"] if one["code"] == code]
 
 
 def deviations(answer: dict[str, Any]) -> list[float]:
@@ -104,3 +104,31 @@ def test_a_map_is_checked_by_samples_as_they_are(client: httpx.Client) -> None:
     )
     client.delete("/v1/maps/moving")
     assert {**timed, "timing_ms": None, "request_id": None} == {**still, "timing_ms": None, "request_id": None}
+
+
+def with_nulls(every: int, **more: Any) -> dict[str, Any]:
+    """Return a scan of which one beam in `every` is null."""
+    scan = laser(**more)
+    scan["ranges"] = [None if k % every == 0 else r for k, r in enumerate(scan["ranges"])]
+    return scan
+
+
+@pytest.mark.parametrize(
+    "scan",
+    [{"laser": with_nulls(2, range_max=30.0)}, {"views": [{"laser": with_nulls(2, range_max=30.0), "pose": EXACT}]}],
+    ids=["one sensor", "views"],
+)
+def test_many_nulls_and_no_beam_without_a_return_are_warned_of(client: httpx.Client, scan: dict[str, Any]) -> None:
+    """Infinity cannot be written as JSON; a bridge that writes null loses the free space as evidence."""
+    (message,) = warned(found(client, scan), NULLS)
+    assert message.startswith("360 of 720 ranges are null, and none exceeds range_max.")
+
+
+def test_few_nulls_are_usual(client: httpx.Client) -> None:
+    assert warned(found(client, {"laser": with_nulls(4, range_max=30.0)}), NULLS) == []
+
+
+def test_a_bridge_that_writes_beams_without_a_return_writes_all_of_them(client: httpx.Client) -> None:
+    scan = with_nulls(2, range_max=30.0)
+    scan["ranges"][1] = 31.0
+    assert warned(found(client, {"laser": scan}), NULLS) == []

@@ -144,7 +144,7 @@ def test_at_once_no_writer_is_waited_for(tmp_path: Path) -> None:
         writer.execute("BEGIN EXCLUSIVE")
         began = time.monotonic()
         assert store.record_at_once("m") is None
-        assert time.monotonic() - began < 1.0  # the store waits for five
+        assert time.monotonic() - began < 4.0  # the store waits for five
         writer.rollback()
         assert store.record_at_once("m") == record
         path.rename(tmp_path / "away")

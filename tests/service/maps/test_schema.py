@@ -22,7 +22,7 @@ def test_workers_that_start_together(database: str) -> None:
     )
     workers = [
         subprocess.Popen([sys.executable, "-c", program, database], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-        for _ in range(4)
+        for _ in range(2)
     ]
     with ThreadPoolExecutor(len(workers)) as threads:
         errors = list(threads.map(lambda worker: worker.communicate(b"x", timeout=60)[1], workers))
