@@ -152,17 +152,6 @@ def test_the_pose_is_the_least_squares_estimate() -> None:
     assert diagnostics_in(result).registration.chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
 
 
-def test_an_exact_scan_gives_the_exact_pose_and_every_pair() -> None:
-    ends, truth = seen(ROOM, INSIDE)
-    result = answer_of(index_of(ROOM), scan_of(ends))
-    assert (result.status, result.usable) == (Status.OK, True)
-    assert same_pose(pose_in(result), INSIDE, 1e-9, 1e-9)
-    assert [pair.map for pair in result.correspondences] == truth.tolist()
-    assert [pair.scan for pair in result.correspondences] == list(range(len(truth)))
-    assert all(abs(pair.offset) < 1e-9 and pair.overlap > 1.0 - 1e-9 for pair in result.correspondences)
-    assert result.unmatched_scan == ()
-
-
 def overlap_at(wall: Floats, segment: Floats, at: RigidTransform) -> float:
     """Return the fraction of a scan segment's length that lies along a wall's."""
     d = (wall[2:] - wall[:2]) / np.hypot(*(wall[2:] - wall[:2]))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationResult, Scan
-from registration import RegistrationOptions, RigidTransform, Segments, register
+from association import AssociationResult
+from registration import RigidTransform
 
 from .scenes import (
     INSIDE,
@@ -163,15 +163,6 @@ def test_without_a_rotation_none_is_reported(how: dict[str, Any]) -> None:
         assert "turned" not in warning_codes(one)
 
 
-def test_exact_maps_have_no_warning_and_no_correction_of_size() -> None:
-    for one in tried(count=30).answers:
-        assert not {"map_scale", "map_distorted", "common_offset"} & set(warning_codes(one))
-        corrections = diagnostics_in(one).corrections
-        if corrections is not None:
-            assert corrections.scale == pytest.approx(1.0, abs=0.002)
-            assert np.abs(corrections.strain).max() < 0.004
-
-
 def test_covariance_is_that_of_the_errors_of_segments() -> None:
     """Of lines through noisy points: the mean normalized squared error of 200 is 3 within four of its deviations."""
     rng, exact = np.random.default_rng(9), index_of(ROOM, 0.0)
@@ -193,38 +184,6 @@ def fitted(rng: np.random.Generator, begin: Floats, end: Floats, count: int) -> 
 
 
 # --- The pairs of an answer, and what they were corrected by ----------------------------------------------------------
-
-
-def registered_pose(result: AssociationResult, walls: Floats, scan: Scan) -> RigidTransform:
-    """Return the pose of `register` with the pairs and weights of an answer."""
-    pairs = [[one.scan, one.map] for one in result.correspondences]
-    how = RegistrationOptions(weights=np.array([one.weight for one in result.correspondences]))
-    found = register(Segments.from_array(walls), scan.measured, pairs, 0.0, how).pose
-    assert found is not None
-    return found
-
-
-@pytest.mark.parametrize("with_beams", [True, False])
-@pytest.mark.parametrize("sigma", [None, 0.0, 0.02])
-def test_the_pairs_of_an_answer_register_to_its_pose_unless_it_is_corrected(
-    sigma: float | None, with_beams: bool
-) -> None:
-    """In rooms as built, with walls that are off, with a strain, and with ranges that are too long."""
-    plain = 0
-    for k in range(32):
-        rng = np.random.default_rng([3, k])
-        room, at = drawn_room(rng)
-        walls = (AS_BUILT, OFF, LEANING, AS_BUILT)[k % 4].of(room, rng)
-        scan = ranges(room, at, k, bias=0.03 * (k % 4 == 3))
-        scan = scan if with_beams else without_beams(scan)
-        result = answer_of(index_of(walls, sigma), scan)
-        diagnostics = result.diagnostics
-        if diagnostics is None or result.covariance is None:
-            continue
-        if diagnostics.corrections is None and diagnostics.turn_rate is None:
-            plain += 1
-            assert same_pose(registered_pose(result, walls, scan), pose_in(result), 1e-6, 1e-6)
-    assert plain >= 3
 
 
 # --- Maps to another scale --------------------------------------------------------------------------------------------

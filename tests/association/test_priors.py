@@ -177,16 +177,6 @@ def test_nothing_within_a_window_is_no_match() -> None:
     assert result.unmatched_scan == tuple(range(8))
 
 
-def test_a_window_chooses_among_equal_rooms() -> None:
-    index, scan = index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE, noise=0.01, seed=2)[0])
-    for k in range(3):
-        at = pose(INSIDE.x + 12.0 * k, INSIDE.y, INSIDE.theta)
-        result = answer_of(index, scan, HardPrior(at, 1.0, 0.5))
-        assert result.usable
-        assert same_pose(pose_in(result), at)
-        assert all(HardPrior(at, 1.0, 0.5).contains(one.pose) for one in result.alternatives if one.probability)
-
-
 def test_a_usable_answer_lies_within_its_window() -> None:
     """A pose may leave a window that is narrower than the noise: it is returned, and not usable."""
     usable = outside = 0

@@ -82,17 +82,6 @@ def test_an_exact_view_is_the_scan_in_the_frame_of_the_robot() -> None:
     np.testing.assert_allclose(found.beams.origins, expected.beams.origins, atol=1e-12)
 
 
-def test_the_answer_is_the_pose_of_the_frame_that_views_share() -> None:
-    """Whatever the mount is, upside down too."""
-    mount = pose(0.4, -0.3, 2.0)
-    ends = carried(ENDS, mount.inverse())
-    here, there = answer_of(INDEX, scan_of(ENDS)), answer_of(INDEX, assemble([View(scan_of(ends), mount)]))
-    assert same_pose(pose_in(there), pose_in(here), 1e-6, 1e-7)
-    upside_down = mirrored(scan_of(ends))  # what a sensor on its head measures
-    turned = answer_of(INDEX, assemble([View(mirrored(upside_down), mount)]))
-    assert same_pose(pose_in(turned), pose_in(here), 1e-6, 1e-7)
-
-
 def test_a_scan_split_into_two_views_answers_as_one() -> None:
     whole = answer_of(INDEX, scan_of(ENDS, viewpoint=(0.0, 0.0)))
     halves = [View(scan_of(part, viewpoint=(0.0, 0.0))) for part in (ENDS[::2], ENDS[1::2])]

@@ -225,12 +225,6 @@ def test_order_does_not_matter(estimator: Estimator, seed: int) -> None:
     np.testing.assert_allclose(a.offsets[order], b.offsets, atol=1e-12)
 
 
-def test_pairs_say_which_segment_belongs_to_which() -> None:
-    map_segments, scan = room()
-    order = np.array([4, 2, 0, 5, 1, 3])
-    shuffled = map_segments.take(order)
-    pairs = np.stack([order, np.arange(6)], axis=1)
-    np.testing.assert_allclose(difference(pose_of(register(shuffled, scan, pairs)), POSE), 0.0, atol=1e-12)
 
 
 def test_a_pair_of_weight_0_has_a_residual_and_no_say() -> None:
