@@ -225,8 +225,6 @@ def test_order_does_not_matter(estimator: Estimator, seed: int) -> None:
     np.testing.assert_allclose(a.offsets[order], b.offsets, atol=1e-12)
 
 
-
-
 def test_a_pair_of_weight_0_has_a_residual_and_no_say() -> None:
     map_segments, scan = room()
     pairs = [*diagonal(6).tolist(), [0, 2]]

@@ -83,6 +83,16 @@ def test_a_corridor_leaves_one_direction_free() -> None:
         assert abs(one.unobservable[0]) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_places_outside_and_near_walls_are_not_looked_from() -> None:
+    analysis = analyzed(Segments.from_array(outline(L)), 0.35)
+    standing = analysis.standing
+    assert standing.poses[:, 1].min() == pytest.approx(0.175)
+    for k in range(len(standing.poses)):
+        pose = standing.pose(k)
+        inside = 0.2 < pose.x < 7.8 and 0.2 < pose.y < (2.8 if pose.x > 4.8 else 5.8)
+        assert (analysis.look(k) is not None) == inside, pose
+
+
 def test_a_sure_answer_that_is_another_place_is_a_look_alike() -> None:
     """As in a building of which another part was mapped."""
     room = l_room().segments

@@ -7,7 +7,8 @@ import pytest
 
 import map_quality
 from association import MapIndex
-from map_quality import MapUpdate, VisitScan
+from map_quality import Change, Evidence, MapUpdate, VisitScan, apply_changes
+from map_quality.update.applying import kept_indices
 from map_quality.update.evidence import are_enough
 from registration import Segments
 
@@ -165,3 +166,19 @@ def test_a_map_without_directions_is_updated_too() -> None:
     found = map_quality.update(MapIndex.build(hall, 0.005, oriented=False), scans)
     assert [(one.code, one.segments) for one in found.changes] == [("removed", (12, 13, 14, 15))]
     assert found.segments.endpoints.tolist() == today.endpoints.tolist()
+
+
+def test_changes_are_applied_in_the_order_of_the_segments() -> None:
+    """The first piece of a shortened wall stands where the wall stood; what is new comes last."""
+    old = Segments.from_array(np.array([[k, 0.0, k + 1.0, 0.0] for k in range(5)]))
+    shorter, new = np.array([[1.0, 0.0, 1.3, 0.0], [1.6, 0.0, 2.0, 0.0]]), np.array([[0.0, 5.0, 1.0, 5.0]])
+    shown = Evidence(1, 0, 3, 2, "day 0", "day 1")
+    changes = [
+        Change("shortened", (1,), shorter, np.full(2, 0.01), shown, 0.99),
+        Change("moved", (3,), new, np.full(1, 0.01), shown, 0.99),
+    ]
+    expected = [old.endpoints[0], shorter[0], old.endpoints[2], old.endpoints[4], shorter[1], new[0]]
+    applied, sigma = apply_changes(old, 0.02, changes)
+    assert applied.endpoints.tolist() == np.array(expected).tolist()
+    assert sigma == 0.02
+    assert kept_indices(5, changes).tolist() == [0, -1, 2, 4, -1, -1]

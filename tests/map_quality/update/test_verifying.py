@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from association import Deadline, MapIndex, Reason, ReasonCode
-from map_quality import Evidence, VisitScan
+from map_quality import VisitScan
+from map_quality.update.beams import Chunks, sees
 from map_quality.update.changes import Draft
 from map_quality.update.evidence import Gatherer
 from map_quality.update.scans import Localized, is_vouched, on_map, search
@@ -22,7 +23,6 @@ from .hall import PILLAR, RACK, segments, visit
 
 HALL, EMPTY = segments(RACK, PILLAR), segments(PILLAR)
 NOTHING = np.zeros((0, 4))
-SHOWN = Evidence(1, 0, 3, 2, "day 0", "day 1")
 T = TypeVar("T")
 
 
@@ -67,6 +67,18 @@ def test_the_changes_that_lost_scans_see_are_blamed_and_no_others() -> None:
     assert blamed(seen, 1.0) == [2]
     assert blamed(seen, 4.0) == []
     assert blamed(seen[1:2], 0.0) == []  # no change is to blame
+
+
+def test_a_scan_sees_a_wall_if_a_beam_meets_it() -> None:
+    (one, *_) = localized(HALL, HALL)
+    assert one.usable
+    outline, rack = (Chunks.of(Segments.derived(HALL.endpoints[rows])) for rows in (slice(0, 12), [12]))
+    behind = Chunks.of(Segments.from_array(np.array([[13.5, 2.0, 13.5, 3.0]])))
+    assert sees(outline, one, 0.005, Deadline())
+    assert sees(rack, one, 0.005, Deadline())
+    assert not sees(behind, one, 0.005, Deadline())
+    lost = replace(one, result=replace(one.result, covariance=None))
+    assert sees(behind, lost, 0.005, Deadline()), "it may be anywhere"
 
 
 @pytest.mark.parametrize(
