@@ -84,9 +84,9 @@ def test_a_corridor_leaves_one_direction_free() -> None:
 
 
 def test_places_outside_and_near_walls_are_not_looked_from() -> None:
-    analysis = analyzed(Segments.from_array(outline(L)), 0.35)
+    analysis = analyzed(Segments.from_array(outline(L)), 0.3)
     standing = analysis.standing
-    assert standing.poses[:, 1].min() == pytest.approx(0.175)
+    assert standing.poses[:, 1].min() == pytest.approx(0.15)
     for k in range(len(standing.poses)):
         pose = standing.pose(k)
         inside = 0.2 < pose.x < 7.8 and 0.2 < pose.y < (2.8 if pose.x > 4.8 else 5.8)
