@@ -6,14 +6,15 @@ in C, and only a bad one is gone through, for its first `MAX_FAULTS` rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, ValidationInfo, WithJsonSchema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from .errors import TooManyError
 from .limits import MAX_FAULTS, Limits
@@ -106,79 +107,79 @@ def _column(value: list[Any], types: frozenset[type], low: float, high: float) -
     raise _refuse((i, fault) for i, item in enumerate(value) if (fault := _number_fault(item, types, low, high)))
 
 
-def _rows_validator(
-    width: int, types: frozenset[type], low: float, high: float, counted: tuple[str, str]
-) -> Callable[[Any, ValidationInfo], Floats]:
-    def validate(value: Any, info: ValidationInfo) -> Floats:
-        return _rows(_listed(value, info, counted), width, types, low, high)
-
-    return validate
-
-
-def _column_validator(
-    types: frozenset[type], low: float, high: float, counted: tuple[str, str]
-) -> Callable[[Any, ValidationInfo], Floats]:
-    def validate(value: Any, info: ValidationInfo) -> Floats:
-        return _column(_listed(value, info, counted), types, low, high)
-
-    return validate
-
-
-def _rows_schema(width: int, item: dict[str, Any]) -> WithJsonSchema:
-    row = {"type": "array", "items": item, "minItems": width, "maxItems": width}
-    return WithJsonSchema({"type": "array", "items": row})
-
-
 def _number(low: float = -MAX_MAGNITUDE, high: float = MAX_MAGNITUDE) -> dict[str, Any]:
     return {"type": "number", "minimum": low, "maximum": high}
 
 
-_M = MAX_MAGNITUDE
+@dataclass(frozen=True, slots=True)
+class _Array:
+    """An array of numbers, or of rows of so many: how it is checked, and its JSON schema.
+
+    Attributes
+    ----------
+    counted : (str, str)
+        The name of its limit in `Limits`, and what that counts.
+    width : int, or None
+        Numbers in a row.
+    types : frozenset of type
+        That a number may have.
+    low, high : float
+        Bounds of a number.
+    least : float, or None
+        Of a number that is not 0.
+    """
+
+    counted: tuple[str, str]
+    width: int | None = None
+    types: frozenset[type] = NUMBERS
+    low: float = -MAX_MAGNITUDE
+    high: float = MAX_MAGNITUDE
+    least: float | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check by `validate` alone."""
+        return core_schema.with_info_plain_validator_function(self.validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema of the array."""
+        item = _number(self.low if self.least is None else self.least, self.high)
+        if self.types is INTEGERS:
+            item["type"] = "integer"
+        elif self.types is not NUMBERS or self.least is not None:
+            item = {"anyOf": [item, {"type": "null"}] if self.least is None else [{"const": 0}, item]}
+        if self.width is not None:
+            item = {"type": "array", "items": item, "minItems": self.width, "maxItems": self.width}
+        return {"type": "array", "items": item}
+
+    def validate(self, value: Any, info: ValidationInfo) -> Floats:
+        """Return the numbers."""
+        rows = _listed(value, info, self.counted)
+        if self.width is None:
+            return _column(rows, self.types, self.low, self.high)
+        return _rows(rows, self.width, self.types, self.low, self.high)
+
+
+_M, SIGMA_MAX = MAX_MAGNITUDE, 1e3
 _MAP, _SCAN = ("map_segments", "map segments"), ("scan_segments", "scan segments")
 _BEAMS = ("beams", "ranges or points")
+_SIGMAS = _Array(_SCAN, low=0, high=SIGMA_MAX)
 
-MapSegmentRows = Annotated[
-    Floats, PlainValidator(_rows_validator(4, NUMBERS, -_M, _M, _MAP)), _rows_schema(4, _number())
-]
-ScanSegmentRows = Annotated[
-    Floats, PlainValidator(_rows_validator(4, NUMBERS, -_M, _M, _SCAN)), _rows_schema(4, _number())
-]
-MapPointRows = Annotated[
-    Floats,
-    PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, ("map_segments", "map points"))),
-    _rows_schema(2, _number()),
-]
-PointRows = Annotated[Floats, PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, _BEAMS)), _rows_schema(2, _number())]
-CentroidRows = Annotated[
-    Floats, PlainValidator(_rows_validator(2, NUMBERS, -_M, _M, _SCAN)), _rows_schema(2, _number())
-]
-PairRows = Annotated[
-    Floats,
-    PlainValidator(_rows_validator(2, INTEGERS, 0, _M, ("pairs", "correspondences"))),
-    _rows_schema(2, {"type": "integer", "minimum": 0, "maximum": _M}),
-]
-Ranges = Annotated[
-    Floats,
-    PlainValidator(_column_validator(NUMBERS_OR_NULL, -_M, _M, _BEAMS)),
-    WithJsonSchema({"type": "array", "items": {"anyOf": [_number(), {"type": "null"}]}}),
-]
-PointCounts = Annotated[
-    Floats,
-    PlainValidator(_column_validator(NUMBERS, 1, _M, _SCAN)),
-    WithJsonSchema({"type": "array", "items": _number(1)}),
-]
-Spreads = Annotated[
-    Floats,
-    PlainValidator(_column_validator(NUMBERS, 0, 1e8, _SCAN)),
-    WithJsonSchema({"type": "array", "items": _number(0, 1e8)}),
-]
-SIGMA_MAX = 1e3
-_sigma_column = _column_validator(NUMBERS, 0, SIGMA_MAX, _SCAN)
+MapSegmentRows = Annotated[Floats, _Array(_MAP, 4)]
+ScanSegmentRows = Annotated[Floats, _Array(_SCAN, 4)]
+MapPointRows = Annotated[Floats, _Array(("map_segments", "map points"), 2)]
+PointRows = Annotated[Floats, _Array(_BEAMS, 2)]
+CentroidRows = Annotated[Floats, _Array(_SCAN, 2)]
+PairRows = Annotated[Floats, _Array(("pairs", "correspondences"), 2, INTEGERS, 0)]
+Ranges = Annotated[Floats, _Array(_BEAMS, types=NUMBERS_OR_NULL)]
+PointCounts = Annotated[Floats, _Array(_SCAN, low=1)]
+Spreads = Annotated[Floats, _Array(_SCAN, low=0, high=1e8)]
+# The library refuses values next to 0 that are not 0: their squares would be 0.
+Weights = Annotated[Floats, _Array(("pairs", "weights"), low=0, high=1e100, least=1e-100)]
 
 
 def _sigma(value: Any, info: ValidationInfo) -> Floats | float:
     if type(value) is list:
-        return _sigma_column(value, info)
+        return _SIGMAS.validate(value, info)
     if fault := _number_fault(value, NUMBERS, 0, SIGMA_MAX):
         raise PydanticCustomError("sigma", fault)
     return float(value)
@@ -190,13 +191,6 @@ SigmaOrSigmas = Annotated[
     WithJsonSchema({"anyOf": [_number(0, SIGMA_MAX), {"type": "array", "items": _number(0, SIGMA_MAX)}]}),
 ]
 """One standard deviation for all segments of a scan, or one each."""
-
-Weights = Annotated[
-    Floats,
-    PlainValidator(_column_validator(NUMBERS, 0, 1e100, ("pairs", "weights"))),
-    # The library refuses values next to 0 that are not 0: their squares would be 0.
-    WithJsonSchema({"type": "array", "items": {"anyOf": [{"const": 0}, _number(1e-100, 1e100)]}}),
-]
 
 
 def _symmetric(value: Any) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
@@ -217,11 +217,32 @@ def require_times(laser: Laser, twist: Twist | None) -> None:
         )
 
 
-class LaserScan(_Scan):
-    """A scan as ranges."""
+class RangeFields(Strict):
+    """Ranges of a sensor, measured where it stood."""
 
     laser: Laser
     sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
+    twist: Twist | None = Field(
+        None, description="velocity of the sensor during the scan, in its own frame; 0: at rest"
+    )
+
+    @model_validator(mode="after")
+    def _from_the_sensor(self) -> Self:
+        require_at_the_sensor(getattr(self, "viewpoint", None))
+        require_times(self.laser, self.twist)
+        return self
+
+
+class PointFields(Strict):
+    """Points of a sensor, in scanning order."""
+
+    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
+
+
+class LaserScan(_Scan, RangeFields):
+    """A scan as ranges."""
+
     twist: Twist | None = Field(
         None,
         description="velocity of the sensor during the scan, in its own frame; 0: at rest; the pose of the answer is "
@@ -242,18 +263,9 @@ class LaserScan(_Scan):
             return self.frame_id
         return header.frame_id or self.frame_id
 
-    @model_validator(mode="after")
-    def _from_the_sensor(self) -> LaserScan:
-        require_at_the_sensor(self.viewpoint)
-        require_times(self.laser, self.twist)
-        return self
 
-
-class PointScan(_Scan):
+class PointScan(_Scan, PointFields):
     """A scan as points in scanning order."""
-
-    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
-    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
 
 
 def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None:

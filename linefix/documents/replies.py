@@ -17,28 +17,6 @@ Matrix = Annotated[list[Row3], Field(min_length=3, max_length=3)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Index = Annotated[int, Field(ge=0)]
 Milliseconds = Annotated[float, Field(ge=0.0)]
-ProblemCode = Literal[
-    "invalid_json",
-    "invalid_http",
-    "unauthorized",
-    "forbidden",
-    "not_found",
-    "unknown_map",
-    "method_not_allowed",
-    "request_timeout",
-    "map_corrupt",
-    "revision_conflict",
-    "too_large",
-    "unsupported_media_type",
-    "invalid_request",
-    "rate_limited",
-    "internal",
-    "not_ready",
-    "overloaded",
-    "read_only",
-    "deadline_exceeded",
-    "storage_full",
-]
 
 
 class TimingAnswer(Answer):
@@ -294,44 +272,6 @@ class AssociateAnswer(FoundAnswer):
     timing_ms: TimingAnswer
 
 
-class Place(Answer):
-    """One fault of a request."""
-
-    pointer: str = Field(description="JSON pointer")
-    message: str
-
-
-class Problem(Answer):
-    """An error, RFC 9457."""
-
-    type: str
-    title: str
-    status: Annotated[int, Field(ge=400, le=599)]
-    detail: str = Field(description="the fault; with `errors` the pointer and message of the first")
-    code: ProblemCode = Field(description="stable, for programs; later versions may add codes")
-    request_id: str
-    errors: Annotated[list[Place], Field(max_length=20)] = Field([])
-
-
-class BatchResult(Answer):
-    """One scan's answer, or its problem."""
-
-    index: Index
-    status_code: int
-    result: FoundAnswer | None = Field(None, description="answer of /v1/associate, if `status_code` is 200")
-    problem: Problem | None = Field(None, description="otherwise")
-
-
-class BatchAnswer(Answer):
-    """The answers in the order of the scans."""
-
-    results: list[BatchResult]
-    map: MapReference | None
-    client_ref: Any = Field(description="returned as it was sent")
-    request_id: str
-    timing_ms: TimingAnswer
-
-
 class VectorizeAnswer(Answer):
     """Segments, with the fields that a scan of segments takes."""
 
@@ -347,64 +287,3 @@ class VectorizeAnswer(Answer):
     warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, `motion_unknown`, as of /v1/associate")
     request_id: str
     timing_ms: TimingAnswer
-
-
-class MapSummaryAnswer(Answer):
-    """A stored map without its content."""
-
-    map_id: str
-    revision: Annotated[int, Field(ge=1)]
-    segment_count: Index = Field(description="number of segments")
-    bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
-    sigma: float | None = Field(description="standard deviation of the lines, metres; null: not stated")
-    oriented: bool | None = Field(description="whether free space lies on the left of its segments; null: not stated")
-
-
-class MapList(Answer):
-    """One page of maps, by id."""
-
-    maps: list[MapSummaryAnswer]
-    corrupt: list[str] = Field(
-        description="ids of damaged maps on this page; each is rejected until it is stored again with PUT"
-    )
-    next: str | None = Field(description="`cursor` of the next page")
-
-
-class Live(Answer):
-    """A probe's answer."""
-
-    status: Literal["ok"]
-
-
-class Version(Answer):
-    """Name and version of the service."""
-
-    name: str
-    version: str
-    api: str
-
-
-class Limits(Answer):
-    """Limits of requests; a request beyond one is rejected."""
-
-    max_body_bytes: int = Field(description="bytes of a request, uncompressed")
-    max_values: int = Field(description="numbers, strings, arrays and objects in a request")
-    max_bodies_bytes: int = Field(description="bytes of all requests that one worker reads at once")
-    max_answers_bytes: int = Field(description="bytes of large answers of one worker that wait to be read")
-    max_connections: int = Field(description="open at once")
-    request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
-    max_map_segments: int = Field(description="segments of one map")
-    max_scan_segments: int = Field(description="segments of one scan")
-    max_beams: int = Field(description="ranges or points of one scan, or view")
-    max_views: int = Field(description="views of one scan")
-    max_beams_together: int = Field(description="ranges or points of all views of one scan")
-    max_segments_together: int = Field(description="segments of all views of one scan")
-    max_correspondences: int = Field(description="correspondences of one registration")
-    max_batch: int = Field(description="scans of one batch")
-    max_deadline_ms: float = Field(description="largest deadline, and the default, milliseconds")
-    searches: int = Field(description="searches that run at once")
-    queue: int = Field(description="requests that may wait for a search")
-    max_magnitude: float = Field(description="magnitude of any number")
-    min_segment_length: float = Field(description="metres")
-    max_segment_length: float = Field(description="metres")
-    max_map_extent: float = Field(description="metres")

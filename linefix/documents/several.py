@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
 
 from .errors import Fault, InvalidRequestError
 from .parts import INLINE, STORED, InlineMap, StoredMap
@@ -48,7 +49,20 @@ SeveralMaps = Annotated[
     | Annotated[MapPrefix, Tag(PREFIX)],
     Discriminator(_several_kind),
 ]
-MapWeights = Annotated[dict[MapId, Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=1, max_length=MOST_MAPS)]
+
+
+def _few_weights(value: Any) -> Any:
+    """Refuse more weights than maps before any of them is looked at: each wrong one would become an error."""
+    if isinstance(value, dict) and len(value) > MOST_MAPS:
+        raise PydanticCustomError("weights", f"expected at most {MOST_MAPS} items, found {len(value)}")
+    return value
+
+
+MapWeights = Annotated[
+    dict[MapId, Annotated[float, Field(ge=0.0, le=1.0)]],
+    Field(min_length=1, max_length=MOST_MAPS),
+    BeforeValidator(_few_weights),
+]
 
 
 def require_one_kind(map: object, maps: list[NamedMap | StoredMap] | MapPrefix | None, weights: object) -> None:

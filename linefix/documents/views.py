@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 
-from .arrays import PointRows, StepCovariance
+from .arrays import StepCovariance
 from .errors import TooManyError
 from .limits import Limits
 from .parts import (
@@ -14,15 +14,12 @@ from .parts import (
     BY_POINTS,
     BY_SEGMENTS,
     BY_VIEWS,
-    Laser,
     LaserScan,
     MeasuredFields,
+    PointFields,
     PointScan,
-    RaySigma,
+    RangeFields,
     SegmentScan,
-    Twist,
-    require_at_the_sensor,
-    require_times,
     scan_kind,
 )
 from .strict import FrameId, FreeJson, Point, Pose, Strict
@@ -55,27 +52,12 @@ class SegmentView(_View, MeasuredFields):
     """A view as segments."""
 
 
-class LaserView(_View):
+class LaserView(RangeFields, _View):
     """A view as ranges."""
 
-    laser: Laser
-    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
-    twist: Twist | None = Field(
-        None, description="velocity of the sensor during the scan, in its own frame; 0: at rest"
-    )
 
-    @model_validator(mode="after")
-    def _from_the_sensor(self) -> LaserView:
-        require_at_the_sensor(self.viewpoint)
-        require_times(self.laser, self.twist)
-        return self
-
-
-class PointView(_View):
+class PointView(PointFields, _View):
     """A view as points in scanning order."""
-
-    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
-    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
 
 
 def _view_kind(value: Any) -> str | None:

@@ -10,11 +10,12 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from linefix.documents import analysis, parts, replies, requests, updates
+from linefix.documents import analysis, parts, requests, updates
 from linefix.documents.encoding import encode
 
 from ..admission.entrance import GUARDED
 from ..thread_pool import Threads
+from .answers import Problem
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
@@ -47,7 +48,7 @@ def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
         title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
     )
     _, asked = models_json_schema([(model, "validation") for model in _REQUESTS], ref_template=_REF)
-    _, failed = models_json_schema([(replies.Problem, "serialization")], ref_template=_REF)
+    _, failed = models_json_schema([(Problem, "serialization")], ref_template=_REF)
     components = document.setdefault("components", {})
     schemas = components.setdefault("schemas", {})
     schemas |= asked["$defs"] | failed["$defs"]

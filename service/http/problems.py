@@ -30,7 +30,6 @@ from linefix.documents.errors import (
 from linefix.documents.faults import faults_of
 from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
-from linefix.documents.replies import ProblemCode
 from registration import InputError
 
 from ..admission import errors as admission
@@ -57,7 +56,7 @@ CLOSE = {"Connection": "close"}
 class Kind:
     """A row of the table: a stable code, on which programs branch, and the exceptions that become this problem."""
 
-    code: ProblemCode
+    code: str
     status: int
     title: str
     raised_as: tuple[type[Exception], ...] = ()

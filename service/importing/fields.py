@@ -29,14 +29,16 @@ def options_of(fields: Fields) -> ImportOptions:
     from formats import ImportOptions, InvalidOptionError
 
     unknown = [
-        Fault(f"/{name}", f"unknown field; expected one of {', '.join(KNOWN)}") for name in fields if name not in KNOWN
+        Fault(f"/{name}", f"unknown field; expected one of {', '.join(FIELDS)}")
+        for name in fields
+        if name not in FIELDS
     ]
     if unknown:
         raise InvalidRequestError(unknown)
     said: dict[str, Any] = {}
     for name, values in fields.items():
         try:
-            said["inside" if name == POINT else name] = KNOWN[name](values)
+            said["inside" if name == POINT else name] = FIELDS[name][0](values)
         except ValueError as error:
             raise InvalidRequestError([Fault(f"/{name}", str(error))]) from None
     try:
@@ -99,17 +101,67 @@ def _numbers(text: str, count: int) -> list[float]:
     return numbers
 
 
-KNOWN: dict[str, Callable[[Sequence[str]], Any]] = {
-    "units": _units,
-    "layers": _patterns,
-    POINT: _places,
-    "drawn": _text,
-    "thickness": _number,
-    "directions": _text,
-    "local_metres": _truth,
-    "topic": _text,
-    "unknown": _unknown,
-    "where": tuple,
-    "level": _text,
-    "surface": _number,
+def _said(what: str) -> dict[str, Any]:
+    return {"type": "string", "description": what}
+
+
+FIELDS: dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]] = {
+    "units": (_units, _said("of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit")),
+    "layers": (_patterns, _said("patterns such as *WALL*, comma separated")),
+    POINT: (_places, _said("a free place, `x y` in metres; may be repeated")),
+    "drawn": (
+        _text,
+        {
+            "enum": ["faces", "centres"],
+            "description": "whether lines of a drawing are faces or centre lines of walls",
+        },
+    ),
+    "thickness": (_number, _said("of walls drawn as centre lines, metres")),
+    "directions": (
+        _text,
+        {"enum": ["drawn", "none"], "description": "whether free space lies on the left of the lines"},
+    ),
+    "local_metres": (_truth, {"enum": ["true", "false"], "description": "whether a GeoJSON is in metres"}),
+    "topic": (_text, _said("of the grid in a bag")),
+    "unknown": (
+        _unknown,
+        _said("of a grid: the grey value of unknown cells, 0 to 255, or none; left out: recognized"),
+    ),
+    "where": (
+        tuple,
+        _said("entities of a drawing to read, as property=value, the value a pattern; may be repeated"),
+    ),
+    "level": (_text, _said("floor of a drawing that has several levels")),
+    "surface": (
+        _number,
+        _said(
+            "of a grid: cells from the front of occupied cells to the surface of walls, 0 to 10; left out: found from "
+            "the grid"
+        ),
+    ),
 }
+"""How the fields of the form of a map are read, and their schemas; everything in a form is text."""
+
+
+def form_of(files: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a form with files, which are described, and fields."""
+    content = {"type": "array", "minItems": 1, "items": {"type": "string", "format": "binary"}, "description": files}
+    return {
+        "type": "object",
+        "required": ["file"],
+        "additionalProperties": False,
+        "properties": {"file": content, **fields},
+    }
+
+
+MAP_FORM = form_of(
+    "the map and the files that it names, such as a yaml and its picture; a part with a filename is a file",
+    {name: schema for name, (_, schema) in FIELDS.items()},
+)
+SCANS_FORM = form_of(
+    "a log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file",
+    {
+        "topic": _said("of the scans; left out: the one with most of them"),
+        "max_scans": _said("greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread"),
+    },
+)

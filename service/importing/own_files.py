@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from linefix.documents.errors import Fault, InvalidRequestError
 
-from .fields import KNOWN, pointer_of
+from .fields import FIELDS, pointer_of
 
 if TYPE_CHECKING:
     from formats import FormatError
@@ -128,9 +128,9 @@ def fault_of(error: FormatError, files: OwnFiles) -> Fault:
     from formats import IncompleteFileError
 
     pointer, number = pointer_of(error.argument), files.number_of(error.argument)
-    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in KNOWN:
+    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in FIELDS:
         return Fault("/files", "the map names a file that was not sent, such as its picture; send it, too")
-    if pointer[1:] not in KNOWN:
+    if pointer[1:] not in FIELDS:
         pointer = "/files" if number is None else f"/files/{number}"
     elif error.index is not None:
         pointer += f"/{error.index}"

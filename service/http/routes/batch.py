@@ -10,12 +10,12 @@ from fastapi import APIRouter, Response
 from linefix.documents import examples
 from linefix.documents.encoding import encode
 from linefix.documents.reading import read_batch
-from linefix.documents.replies import BatchAnswer
 from linefix.documents.requests import BatchItem, BatchRequest
 
 from ...admission.errors import ShareHeldError, TooMuchHeldError
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
+from ..answers import BatchAnswer
 from ..body_stage import read
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps

@@ -8,16 +8,16 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
-from linefix.documents.imports import FORM as MAP_FORM
-from linefix.documents.imports import SCANS_FORM, ImportAnswer, ScansAnswer
 from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
 
 from ...admission.errors import DeadlinePassedError
 from ...importing.bounded import ReadScans, read_apart, read_scans_apart
 from ...importing.errors import TooLateError
+from ...importing.fields import MAP_FORM, SCANS_FORM
 from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
+from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM
 from ..body_stage import parse, receive
 from ..exchange import Exchange, Searching

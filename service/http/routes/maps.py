@@ -11,9 +11,9 @@ from linefix.documents import examples
 from linefix.documents.encoding import encode
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map
-from linefix.documents.replies import MapList, MapSummaryAnswer
 
 from ...maps.lookup import outline_of
+from ..answers import MapList, MapSummaryAnswer
 from ..body_stage import read
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import Admitted

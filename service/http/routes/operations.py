@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from linefix.documents.encoding import encode
-from linefix.documents.replies import Limits, Live, Version
 
 from ...version import VERSION
+from ..answers import Limits, Live, Version
 from ..exchange import Admitted
 from ..sending import json_response
 from .declaring import EVERYWHERE, problems

@@ -1,0 +1,200 @@
+"""Answers that only HTTP has, for OpenAPI: problems, batches, stored maps, imports, operations; never built."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from linefix.documents.checks import MapCheckAnswer
+from linefix.documents.replies import (
+    FoundAnswer,
+    Index,
+    MapReference,
+    Milliseconds,
+    PoseAnswer,
+    Row2,
+    Row4,
+    TimingAnswer,
+)
+from linefix.documents.strict import Answer
+
+from .problems import KINDS
+
+
+class Place(Answer):
+    """One fault of a request."""
+
+    pointer: str = Field(description="JSON pointer")
+    message: str
+
+
+class Problem(Answer):
+    """An error, RFC 9457."""
+
+    type: str
+    title: str
+    status: Annotated[int, Field(ge=400, le=599)]
+    detail: str = Field(description="the fault; with `errors` the pointer and message of the first")
+    code: Annotated[str, Field(json_schema_extra={"enum": list(KINDS)})] = Field(
+        description="stable, for programs; later versions may add codes"
+    )
+    request_id: str
+    errors: Annotated[list[Place], Field(max_length=20)] = Field([])
+
+
+class BatchResult(Answer):
+    """One scan's answer, or its problem."""
+
+    index: Index
+    status_code: int
+    result: FoundAnswer | None = Field(None, description="answer of /v1/associate, if `status_code` is 200")
+    problem: Problem | None = Field(None, description="otherwise")
+
+
+class BatchAnswer(Answer):
+    """The answers in the order of the scans."""
+
+    results: list[BatchResult]
+    map: MapReference | None
+    client_ref: Any = Field(description="returned as it was sent")
+    request_id: str
+    timing_ms: TimingAnswer
+
+
+class MapSummaryAnswer(Answer):
+    """A stored map without its content."""
+
+    map_id: str
+    revision: Annotated[int, Field(ge=1)]
+    segment_count: Index = Field(description="number of segments")
+    bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
+    sigma: float | None = Field(description="standard deviation of the lines, metres; null: not stated")
+    oriented: bool | None = Field(description="whether free space lies on the left of its segments; null: not stated")
+
+
+class MapList(Answer):
+    """One page of maps, by id."""
+
+    maps: list[MapSummaryAnswer]
+    corrupt: list[str] = Field(
+        description="ids of damaged maps on this page; each is rejected until it is stored again with PUT"
+    )
+    next: str | None = Field(description="`cursor` of the next page")
+
+
+class Live(Answer):
+    """A probe's answer."""
+
+    status: Literal["ok"]
+
+
+class Version(Answer):
+    """Name and version of the service."""
+
+    name: str
+    version: str
+    api: str
+
+
+class Limits(Answer):
+    """Limits of requests; a request beyond one is rejected."""
+
+    max_body_bytes: int = Field(description="bytes of a request, uncompressed")
+    max_values: int = Field(description="numbers, strings, arrays and objects in a request")
+    max_bodies_bytes: int = Field(description="bytes of all requests that one worker reads at once")
+    max_answers_bytes: int = Field(description="bytes of large answers of one worker that wait to be read")
+    max_connections: int = Field(description="open at once")
+    request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
+    max_map_segments: int = Field(description="segments of one map")
+    max_scan_segments: int = Field(description="segments of one scan")
+    max_beams: int = Field(description="ranges or points of one scan, or view")
+    max_views: int = Field(description="views of one scan")
+    max_beams_together: int = Field(description="ranges or points of all views of one scan")
+    max_segments_together: int = Field(description="segments of all views of one scan")
+    max_correspondences: int = Field(description="correspondences of one registration")
+    max_batch: int = Field(description="scans of one batch")
+    max_deadline_ms: float = Field(description="largest deadline, and the default, milliseconds")
+    searches: int = Field(description="searches that run at once")
+    queue: int = Field(description="requests that may wait for a search")
+    max_magnitude: float = Field(description="magnitude of any number")
+    min_segment_length: float = Field(description="metres")
+    max_segment_length: float = Field(description="metres")
+    max_map_extent: float = Field(description="metres")
+
+
+class NoteAnswer(Answer):
+    """One thing that an import did."""
+
+    code: str = Field(description="stable; part of it may name an entity of the file, as in `entity_hatch`")
+    message: str
+    count: Index = Field(description="cells, entities, segments that it is about; 0 where nothing is counted")
+
+
+class ReportAnswer(Answer):
+    """Report of an import."""
+
+    format: str = Field(description="such as map_server, dxf, rosbag2")
+    files: list[str]
+    read: list[NoteAnswer]
+    merged: list[NoteAnswer] = Field(description="parts that were merged")
+    dropped: list[NoteAnswer] = Field(description="parts that were omitted, and why")
+    assumed: list[NoteAnswer] = Field(description="assumptions, where the files state nothing")
+
+
+class ImportedMapAnswer(Answer):
+    """A map, as it may be stored or sent with a request."""
+
+    segments: list[Row4] = Field(description="metres; free space on the left where `oriented`")
+    sigma: float | None
+    oriented: bool
+    frame_id: str
+    points: list[Row2] = Field([], description="`[x, y]` each, metres; absent if the map has none")
+    points_sigma: float | None = Field(None, description="metres; absent if the map has no points")
+    meta: Any
+
+
+class GridPictureAnswer(Answer):
+    """The grid that a map comes from, as a picture."""
+
+    png: str = Field(
+        description="PNG in base64: occupied cells are black, free ones white; at most 2048 pixels each way"
+    )
+    pose: PoseAnswer = Field(description="of the lower left corner, in the frame of the map")
+    resolution: float = Field(description="edge of a pixel, metres")
+
+
+class ImportTimingAnswer(Answer):
+    """Duration of an import, milliseconds."""
+
+    read: Milliseconds = Field(description="reading the files, waiting for that included")
+    check: Milliseconds = Field(description="indexing and checking the map")
+    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+
+
+class ImportAnswer(Answer):
+    """A map of another tool."""
+
+    map: ImportedMapAnswer
+    report: ReportAnswer
+    picture: GridPictureAnswer | None = Field(description="of a grid; null for a drawing")
+    check: MapCheckAnswer
+    request_id: str
+    timing_ms: ImportTimingAnswer
+
+
+class ScansTimingAnswer(Answer):
+    """Duration of reading a log, milliseconds."""
+
+    read: Milliseconds = Field(description="reading the files, waiting for that included")
+    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+
+
+class ScansAnswer(Answer):
+    """Scans of a log."""
+
+    scans: list[Any] = Field(description="each as the `scan` of a request, in the frame of the robot where it is known")
+    count: Index = Field(description="scans in the log that can be used")
+    report: ReportAnswer
+    request_id: str
+    timing_ms: ScansTimingAnswer
