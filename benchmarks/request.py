@@ -27,6 +27,7 @@ from examples.running import free_port, running_service
 from linefix.documents.encoding import encode
 from linefix.documents.reading import read_model
 from linefix.documents.requests import AssociateRequest
+from linefix.operations import Stopwatch
 from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore
 from service.maps.lookup import FoundMap, MapLookup
@@ -185,12 +186,12 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
         stored = store.load("m")
         target = associator.target(wanted, FoundMap(stored.record, stored.document), deadline)
-        answer = associator.find(target, wanted, wanted.options, deadline)
+        answer = associator.find(target, wanted, wanted.options, deadline, Stopwatch())
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),
             "look-up of the map": partial(store.record_at_once, "m"),
             "encoding": partial(encode, answer),
-            "an empty search": partial(associator.find, target, empty, empty.options, deadline),
+            "an empty search": partial(associator.find, target, empty, empty.options, deadline, Stopwatch()),
         }
         store.close()
 

@@ -125,9 +125,10 @@ def error_of(status: int, code: str, detail: str, faults: Sequence[Mapping[str, 
 @contextmanager
 def refusing(asked: Asked = NOTHING) -> Iterator[None]:
     """Raise errors of the command line in place of those about a request."""
-    from linefix.answering import NotStoredError, TooLateError
+    from linefix.answering import NotStoredError
     from linefix.documents.errors import InvalidRequestError, TooManyError
     from linefix.documents.inputs import fault_of
+    from linefix.operations import TooLateError
     from registration import InputError
 
     try:

@@ -171,10 +171,11 @@ def locating(target: Json, usable: UsableOptions, server: str | None) -> Iterato
             yield lambda sought: remote.ask("associate", {**target, **sought, "options": options})
         return
     with answering() as within:
-        from linefix.answering import Stopwatch, locate, target_of
+        from linefix.answering import locate, target_of
         from linefix.documents.parts import SearchOptions
         from linefix.documents.reading import validate
         from linefix.documents.requests import BatchItem, OnMaps
+        from linefix.operations import Stopwatch
 
         how = validate(SearchOptions, options, within.limits)
         maps = target_of(validate(OnMaps, target, within.limits), None, within)

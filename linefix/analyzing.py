@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ ALONE = 64  # places up to which starting others takes longer than it saves
 
 Progress = Callable[[int, int], None]
 Looks = dict[int, PlaceVerdict | None]
+T = TypeVar("T")
 _analysis: Analysis | None = None  # of a process that was started for it
 _deadline = Deadline()
 
@@ -70,7 +72,7 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
     found: Looks = {}
     if cores == 1 or len(order) <= ALONE:
         for portion in portions:
-            found |= _look(analysis, portion, deadline)
+            found |= finished(looks(analysis, portion, deadline))
             progress(len(found), len(order))
         return found
     # Spawned, never forked: this process has threads.
@@ -92,16 +94,31 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
             progress(len(found), len(order))
 
 
-def _look(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Looks:
+def looks(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Generator[None, None, Looks]:
+    """Try some places, a scan at a step, and return the results of those for which there was time."""
     found: Looks = {}
     for number in portion:
-        if deadline.passed:
-            break
-        verdict = analysis.look(number, deadline)
-        if deadline.passed:
-            break  # an unfinished result is no answer: the search was cut
+        steps, verdict, ended = analysis.looking(number, deadline), None, False
+        while not ended:
+            try:
+                next(steps)
+            except StopIteration as done:
+                verdict, ended = done.value, True
+            if deadline.passed:
+                return found  # an unfinished result is no answer: the search was cut
+            yield
         found[number] = verdict
     return found
+
+
+def finished(steps: Generator[None, None, T]) -> T:
+    """Take all steps, and return their result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: T = done.value
+            return result
 
 
 def _begin(task: Task) -> None:
@@ -117,4 +134,4 @@ def _begin(task: Task) -> None:
 
 def _look_here(portion: Sequence[int]) -> Looks:
     assert _analysis is not None
-    return _look(_analysis, portion, _deadline)
+    return finished(looks(_analysis, portion, _deadline))

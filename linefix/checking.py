@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex, Scan
 from map_quality import Advice, MapCheck, Sample, SampleReport, check_map, conclude, try_sample
 from registration import RigidTransform
+
+from .analyzing import finished
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +81,31 @@ def check(
     >>> [finding.code for finding in linefix.check(index).all.findings]
     ['looks_alike']
     """
-    until = deadline or Deadline()
-    found, said = check_map(index, until, oriented=oriented), poses or [None] * len(scans)
-    samples = [
-        try_in_time(index, scan, until, oriented=oriented, said=at) for scan, at in zip(scans, said, strict=True)
-    ]
-    return concluded(index, scans, found, samples, until, oriented=oriented)
+    return finished(checking(index, scans, poses, deadline or Deadline(), oriented=oriented))
 
 
-def try_in_time(
+def checking(
+    index: MapIndex,
+    scans: Sequence[Scan],
+    poses: Sequence[RigidTransform | None] | None,
+    deadline: Deadline,
+    *,
+    oriented: bool,
+) -> Generator[None, None, CheckedMap]:
+    """Do what `check` does, one part at a step, and return the same."""
+    found, samples = check_map(index, deadline, oriented=oriented), list[Sample | None]()
+    for scan, said in zip(scans, poses or [None] * len(scans), strict=True):
+        yield
+        samples.append(_try_in_time(index, scan, deadline, oriented=oriented, said=said))
+    if not samples:
+        return CheckedMap(found, complete=found.complete)
+    yield
+    report = conclude(index, scans, samples, deadline, oriented=oriented)
+    complete = found.complete and None not in samples and not deadline.passed
+    return CheckedMap(found, tuple(samples), report, complete)
+
+
+def _try_in_time(
     index: MapIndex, scan: Scan, deadline: Deadline, *, oriented: bool, said: RigidTransform | None
 ) -> Sample | None:
     """Try a sample scan, see `map_quality.try_sample`; return None when no time is left for it.
@@ -105,26 +123,3 @@ def try_in_time(
         if deadline.cancelled:
             raise CancelledError from None
         return None
-
-
-def concluded(
-    index: MapIndex,
-    scans: Sequence[Scan],
-    found: MapCheck,
-    samples: Sequence[Sample | None],
-    deadline: Deadline,
-    *,
-    oriented: bool,
-) -> CheckedMap:
-    """Put a check and its samples together; parameters as of `check`.
-
-    Raises
-    ------
-    CancelledError
-        When the deadline was cancelled.
-    """
-    if not samples:
-        return CheckedMap(found, complete=found.complete)
-    report = conclude(index, scans, samples, deadline, oriented=oriented)
-    complete = found.complete and None not in samples and not deadline.passed
-    return CheckedMap(found, tuple(samples), report, complete)

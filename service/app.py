@@ -28,19 +28,7 @@ from .http.middleware import RequestMiddleware
 from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.problems import handle_errors
-from .http.routes import (
-    analyze,
-    associate,
-    batch,
-    check,
-    importing,
-    maps,
-    operations,
-    pages,
-    register,
-    update,
-    vectorize,
-)
+from .http.routes import batch, importing, maps, operations, pages, quality, scans
 from .http.services import Services
 from .importing.folders import remove_abandoned
 from .importing.reader import Bounds
@@ -88,7 +76,7 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
     # In the order in which they are tried: robots come most often, and the paths of what is done with a map are also
     # those of a map. An included router would be one more layer for each of them.
-    for module in (associate, register, batch, vectorize, check, analyze, update, importing, maps, operations, pages):
+    for module in (scans, batch, quality, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     for route in app.router.routes:
         if isinstance(route, APIRoute):

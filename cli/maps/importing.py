@@ -202,7 +202,8 @@ def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
             return remote.import_map(_with_what_it_names(file), said.fields)
     with needing_formats(f"reading {file.name}"), asking.answering(Asked(files=(file.name,))) as within:
         from formats import read_map
-        from linefix.answering import Stopwatch, check_import
+        from linefix.answering import check_import
+        from linefix.operations import Stopwatch
 
         options, watch = said.options, Stopwatch()
         with needing_formats(f"reading {file.name}"):

@@ -7,9 +7,12 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import TypeVar
 
+from pydantic import BaseModel
+
 from association import Deadline
-from linefix.answering import Stopwatch
 from linefix.documents.limits import Limits
+from linefix.documents.reading import read_model
+from linefix.operations import Stopwatch
 
 from ..parsing.child import LARGE
 from ..parsing.unpacking import unpack
@@ -18,8 +21,14 @@ from .exchange import Exchange
 from .search_stage import in_slot_of, unless_hung_up
 
 T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
 Reader = Callable[[bytes | bytearray, Limits], T]
 """A function from JSON to a checked request; a module's function, so that another process can call it."""
+
+
+async def read_request(exchange: Exchange, model: type[M]) -> M:
+    """Receive the body and check it against a model, as `read`."""
+    return await read(exchange, partial(read_model, model))
 
 
 async def read(exchange: Exchange, reader: Reader[T]) -> T:

@@ -12,7 +12,7 @@ from fastapi import Depends
 from starlette.requests import Request
 from starlette.types import Scope
 
-from linefix.answering import Stopwatch
+from linefix.operations import Stopwatch
 
 from ..admission.gate import Ticket
 from ..work.job import Job

@@ -1,4 +1,4 @@
-"""The contract as OpenAPI: what FastAPI derives, and the bodies that the routes read by themselves."""
+"""The contract as OpenAPI: what FastAPI derives, and errors, bodies and headers that the routes declare by this."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from linefix.documents import analysis, parts, requests, updates
 from linefix.documents.encoding import encode
 
 from ..admission.entrance import GUARDED
 from ..thread_pool import Threads
 from .answers import Problem
+from .problems import KINDS, MEDIA_TYPE, Kind
+from .sending import JSON
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
@@ -28,18 +30,75 @@ has the causes.
 * A scan without a usable pose is 200 with a `status`; 4xx states that the request is not valid.
 """
 _REF = "#/components/schemas/{model}"
-_REQUESTS = (
-    requests.RegisterRequest,
-    requests.AssociateRequest,
-    requests.BatchRequest,
-    requests.VectorizeRequest,
-    requests.CheckRequest,
-    analysis.AnalyzeRequest,
-    analysis.MapAnalyzeRequest,
-    updates.UpdateRequest,
-    updates.ApplyRequest,
-    parts.MapDocument,
-)
+EVERYWHERE = ("invalid_http", "unauthorized", "forbidden", "internal")
+READS_BODY = ("invalid_json", "request_timeout", "too_large", "unsupported_media_type", "invalid_request")
+SEARCHES = ("not_ready", "overloaded", "rate_limited", "deadline_exceeded")
+
+REQUEST_ID: dict[str, Any] = {
+    "X-Request-Id": {"description": "Taken over from the request or made", "schema": {"type": "string"}}
+}
+_RETRY: dict[str, Any] = {"Retry-After": {"description": "seconds", "schema": {"type": "string"}}}
+_TAKEN: dict[str, type[BaseModel]] = {}  # models of the bodies that the routes read by themselves
+
+
+def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
+    """Return the documentation of a route's errors."""
+    by_status: dict[int | str, list[Kind]] = {}
+    for code in codes:
+        by_status.setdefault(KINDS[code].status, []).append(KINDS[code])
+    return {
+        status: {
+            "description": "; ".join(f"`{kind.code}`: {kind.title}" for kind in kinds),
+            "headers": REQUEST_ID | (_RETRY if status in (429, 503) else {}),
+            "content": {
+                MEDIA_TYPE: {
+                    "schema": {"$ref": _REF.format(model="Problem")},
+                    "examples": {kind.code: {"value": _example(kind)} for kind in kinds},
+                }
+            },
+        }
+        for status, kinds in by_status.items()
+    }
+
+
+def searches(model: type[BaseModel], examples: dict[str, Any], *codes: str) -> dict[str, Any]:
+    """Return the documentation of a route that reads a body and searches; `codes` are of further errors."""
+    return {
+        "responses": problems(*EVERYWHERE, *SEARCHES, *codes, *READS_BODY),
+        "openapi_extra": takes(model, examples),
+    }
+
+
+def takes(model: type[BaseModel], examples: dict[str, Any]) -> dict[str, Any]:
+    """Return the documentation of a body that the route itself reads."""
+    _TAKEN[model.__name__] = model
+    return {
+        "requestBody": {
+            "required": True,
+            "description": "May be gzip (Content-Encoding). Metres and radians.",
+            "content": {
+                JSON: {
+                    "schema": {"$ref": _REF.format(model=model.__name__)},
+                    "examples": {name: {"value": value} for name, value in examples.items()},
+                }
+            },
+        }
+    }
+
+
+def _example(kind: Kind) -> dict[str, Any]:
+    example: dict[str, Any] = {
+        "type": f"urn:linefix:problem:{kind.code}",
+        "title": kind.title,
+        "status": kind.status,
+        "detail": kind.title,
+        "code": kind.code,
+        "request_id": "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
+    }
+    if kind.code == "invalid_request":
+        example["detail"] = "/scan/segments/3: expected 4 numbers, found 3"
+        example["errors"] = [{"pointer": "/scan/segments/3", "message": "expected 4 numbers, found 3"}]
+    return example
 
 
 def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
@@ -47,7 +106,7 @@ def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
     document = get_openapi(
         title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
     )
-    _, asked = models_json_schema([(model, "validation") for model in _REQUESTS], ref_template=_REF)
+    _, asked = models_json_schema([(model, "validation") for model in _TAKEN.values()], ref_template=_REF)
     _, failed = models_json_schema([(Problem, "serialization")], ref_template=_REF)
     components = document.setdefault("components", {})
     schemas = components.setdefault("schemas", {})

@@ -30,6 +30,7 @@ from linefix.documents.errors import (
 from linefix.documents.faults import faults_of
 from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
+from linefix.operations import TooLateError
 from registration import InputError
 
 from ..admission import errors as admission
@@ -66,7 +67,7 @@ NOT_HTTP = (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError)
 STRANGE = (admission.UnknownKeyError, admission.ForeignHostError, admission.ForeignOriginError)
 WRONG_KIND = (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError)
 BUSY = (admission.QueueFullError, admission.TooMuchHeldError, maps.BusyStoreError)
-LATE = (admission.DeadlinePassedError, maps.IndexNotReadyError, importing.TooLateError)
+LATE = (admission.DeadlinePassedError, TooLateError, maps.IndexNotReadyError, importing.TooLateError)
 TOO_LARGE = (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),

@@ -7,7 +7,8 @@ by piece. The bytes that they hold until then are counted: of all together, and 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping
+from functools import partial
 from typing import Any
 
 from starlette.responses import Response
@@ -15,9 +16,9 @@ from starlette.types import Receive, Scope, Send
 
 from association import Deadline
 
-from ..work.job import Done
+from ..work.job import Done, Job
 from .exchange import Exchange, exchange_of
-from .search_stage import unless_hung_up
+from .search_stage import in_search_slot, unless_hung_up
 
 PIECE = 32_768  # bytes; the server holds a few
 LARGE = 65_536  # bytes; smaller answers are handed over in one piece
@@ -74,3 +75,9 @@ async def answer(exchange: Exchange, work: Coroutine[Any, Any, Done], deadline: 
     done = await unless_hung_up(exchange.request.receive, work, deadline)
     exchange.note(**done.noted)
     return json_response(done.body)
+
+
+async def answer_in_slot(exchange: Exchange, work: Callable[[Job], Done]) -> Response:
+    """Do the whole work of a request in one slot of the gate, and return its result as a response."""
+    job = exchange.job()
+    return await answer(exchange, in_search_slot(exchange, partial(work, job), job.deadline), job.deadline)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import orjson
 
-from association import CancelledError, Deadline, IndexingEndedError
-from linefix.answering import Json, Target, found_json, registered, search, vectorized
+from association import Deadline
 from linefix.documents.encoding import encode, encode_list
-from linefix.documents.inputs import scanned_of
 from linefix.documents.parts import InlineMap, SearchOptions
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
+from linefix.documents.updates import ApplyRequest
+from linefix.operations import Json, Stopwatch, Target, applied, find, registered, vectorized
 
-from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap, CachedMaps
 from ..maps.lookup import FoundMap, FoundMaps, MapLookup
 from ..telemetry.metrics import Metrics
@@ -63,10 +61,8 @@ class Associator:
     ) -> Done:
         """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
         target = self.target(asked, source, job.deadline, ready)
-        job.watch.lap("decode")
         job.searching.set()
-        found = self.find(target, asked, asked.options, job.deadline)
-        job.watch.lap("search")
+        found = self.find(target, asked, asked.options, job.deadline, job.watch)
         noted = {"map": found["map"], "verdict": found["status"], "usable": found["usable"]}
         return job.done({**found, "client_ref": asked.client_ref}, **noted)
 
@@ -94,8 +90,10 @@ class Associator:
                 together = ready or self.lookup.indexed_together(source, oriented=oriented, deadline=deadline)
                 assert isinstance(together, CachedMaps)  # several maps are ready as several
                 names = together.maps.ids
-                frames: dict[str | None, str] = dict(zip(names, together.frame_ids, strict=True))
-                frames[None] = together.frame_ids[0]
+                frames: dict[str | None, str] = {
+                    None: together.frame_ids[0],
+                    **dict(zip(names, together.frame_ids, strict=True)),
+                }
                 references: dict[str | None, Json | None] = {name: source.reference_to(name) for name in names}
                 return Target(together.maps, frames, references, asked.map_weights)
             cached = ready or self.lookup.indexed(source, oriented=oriented, deadline=deadline)
@@ -103,33 +101,19 @@ class Associator:
         return Target(cached.index, {None: cached.frame_id}, {None: reference_to(source)})
 
     def find(
-        self, target: Target, sought: AssociateRequest | BatchItem, options: SearchOptions, deadline: Deadline
+        self,
+        target: Target,
+        sought: AssociateRequest | BatchItem,
+        options: SearchOptions,
+        deadline: Deadline,
+        watch: Stopwatch,
     ) -> Json:
-        """Find a scan in a map.
-
-        Raises
-        ------
-        InputError, InvalidRequestError
-            When the libraries reject the scan.
-        DeadlinePassedError
-            When the deadline has passed before the search starts.
-        CancelledError
-            When the client has gone.
-        """
-        scanned = scanned_of(sought.scan)
-        if deadline.cancelled:
-            raise CancelledError
-        if deadline.passed:
-            raise DeadlinePassedError
-        begun = time.perf_counter()
+        """Find a scan in a map; raises as `linefix.operations.find`."""
         with stage("search"):
-            try:
-                result = search(target, scanned.scan, sought.prior, options, deadline)
-            except IndexingEndedError:
-                raise DeadlinePassedError from None
-        seconds = time.perf_counter() - begun
+            result, answer = find(target, sought, options, deadline, watch)
+        seconds = 1e-3 * watch.milliseconds("search")
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
-        return found_json(target, result, sought, scanned, options)
+        return answer
 
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
@@ -140,7 +124,7 @@ class Associator:
         """
         if isinstance(sought, Exception):
             raise sought
-        found = self.find(target, sought, options, deadline)
+        found = self.find(target, sought, options, deadline, Stopwatch())
         if None in target.references:  # the map stands in the batch
             del found["map"]
         return BatchResult(found["status"], encode({"index": index, "status_code": 200, "result": found}))
@@ -163,6 +147,12 @@ def answer_registration(asked: RegisterRequest, job: Job) -> Done:
 def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
     """Cut a scan into directed segments; raises `InvalidRequestError` where the library refuses it."""
     return job.done(vectorized(asked, job.watch))
+
+
+def answer_apply(asked: ApplyRequest, job: Job) -> Done:
+    """Return a map with the changes that are accepted; raises `InputError` where it could not be put."""
+    accepted = sum(one.accepted for one in asked.changes)
+    return job.done({**applied(asked, job.watch), "client_ref": asked.client_ref}, changes=accepted)
 
 
 def reference_to(source: InlineMap | FoundMap) -> Json | None:

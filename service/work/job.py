@@ -7,8 +7,8 @@ from threading import Event
 from typing import Any
 
 from association import Deadline
-from linefix.answering import Stopwatch
 from linefix.documents.encoding import encode
+from linefix.operations import Stopwatch
 
 from ..admission.errors import DeadlinePassedError
 

@@ -19,10 +19,10 @@ from ..answers import BatchAnswer
 from ..body_stage import read
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps
+from ..openapi import searches
 from ..problems import problem_or_defect
 from ..search_stage import in_search_slot, in_search_slots
 from ..sending import answer
-from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
 router = APIRouter(tags=["associate"])
 
@@ -31,9 +31,8 @@ router = APIRouter(tags=["associate"])
     "/v1/associate:batch",
     operation_id="associate_batch",
     response_model=BatchAnswer,
-    responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt"),
-    openapi_extra=takes(BatchRequest, {"two scans": examples.BATCH}),
     summary="Find several scans in one map",
+    **searches(BatchRequest, {"two scans": examples.BATCH}, "unknown_map", "map_corrupt"),
 )
 async def post_batch(exchange: Searching) -> Response:
     """Estimate the poses of several scans in one map, or on several; an invalid scan yields one problem item."""

@@ -21,9 +21,9 @@ from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM
 from ..body_stage import parse, receive
 from ..exchange import Exchange, Searching
+from ..openapi import EVERYWHERE, READS_BODY, SEARCHES, problems
 from ..search_stage import in_search_slot, in_slot_of
 from ..sending import answer
-from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
 
 router = APIRouter(tags=["maps"])
 _PROBLEMS = problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES)

@@ -18,8 +18,8 @@ from ..body_stage import read
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import Admitted
 from ..map_stage import ask_store
+from ..openapi import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 from ..sending import json_response
-from .declaring import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 
 router = APIRouter(tags=["maps"])
 MapIdPath = Annotated[

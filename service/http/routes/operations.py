@@ -9,8 +9,8 @@ from linefix.documents.encoding import encode
 from ...version import VERSION
 from ..answers import Limits, Live, Version
 from ..exchange import Admitted
+from ..openapi import EVERYWHERE, problems
 from ..sending import json_response
-from .declaring import EVERYWHERE, problems
 
 router = APIRouter(tags=["operations"])
 

@@ -1,0 +1,252 @@
+"""Operations: checked requests to answers as documents, for the service and for programs without it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from association import (
+    AssociationResult,
+    CancelledError,
+    Deadline,
+    IndexingEndedError,
+    InvalidSearchError,
+    KnownOfMaps,
+    MapIndex,
+    MapSet,
+    Scan,
+)
+from map_quality import apply_changes, updating
+from registration import InputError, Segments, register, register_estimating
+
+from .analyzing import looks
+from .checking import checking
+from .documents import inputs, results
+from .documents.analysis import AnalyzeRequest
+from .documents.errors import Fault, InvalidRequestError
+from .documents.parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields
+from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
+from .documents.scans import Scanned, vectorization_of
+from .documents.updates import ApplyRequest, UpdateRequest
+from .driving import associate, associate_on_maps
+
+Json = dict[str, Any]
+Steps = Generator[None, None, Json]
+"""Work on an answer; between steps others may have their turn."""
+
+
+class TooLateError(Exception):
+    """The deadline passed before the search started."""
+
+    def __str__(self) -> str:
+        """Name the remedy."""
+        return "the deadline passed before the search started; extend deadline_ms, or send the request again later"
+
+
+class Stopwatch:
+    """Milliseconds since the request's body had arrived, in parts."""
+
+    def __init__(self) -> None:
+        self._begun = time.monotonic()
+        self._last = self._begun
+        self._parts: dict[str, float] = {}
+
+    def lap(self, name: str) -> None:
+        """Note the milliseconds since the last lap under a name."""
+        now = time.monotonic()
+        self._parts[name] = round(1e3 * (now - self._last), 3)
+        self._last = now
+
+    def timing_ms(self) -> dict[str, float]:
+        """Return the parts and the total so far."""
+        return {**self._parts, "total": round(1e3 * (time.monotonic() - self._begun), 3)}
+
+    def milliseconds(self, name: str) -> float:
+        """Return a part."""
+        return self._parts[name]
+
+    def deadline(self, asked_ms: float | None, most_ms: float) -> Deadline:
+        """Return when to end: so many milliseconds after the body had arrived, waiting for a slot included."""
+        allowed = most_ms if asked_ms is None else min(asked_ms, most_ms)
+        return Deadline(at=self._begun + allowed / 1e3)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A map, or several, ready to be searched.
+
+    Attributes
+    ----------
+    maps : MapIndex or MapSet
+    frames : mapping
+        Frame of each of several maps by name; of the first, or of the single map, by None.
+    references : mapping
+        Id and revision of each, likewise; None of a map that came with the request.
+    weights : mapping, or None
+        Of several maps, as sent.
+    """
+
+    maps: MapIndex | MapSet
+    frames: Mapping[str | None, str]
+    references: Mapping[str | None, Json | None]
+    weights: Mapping[str, float] | None = None
+
+    @property
+    def oriented(self) -> bool:
+        """Return whether directions of segments mean anything on all of the maps."""
+        if isinstance(self.maps, MapSet):
+            return self.maps.oriented
+        return len(self.maps.segments) == self.maps.directed
+
+
+def require_time(deadline: Deadline) -> None:
+    """Raise `TooLateError` when the deadline has passed, `CancelledError` when it was cancelled."""
+    if deadline.cancelled:
+        raise CancelledError
+    if deadline.passed:
+        raise TooLateError
+
+
+def search(
+    target: Target,
+    scan: Scan,
+    sent: SoftPriorFields | HardPriorFields | None,
+    options: SearchOptions,
+    deadline: Deadline,
+) -> AssociationResult:
+    """Find a scan in a map, or on several.
+
+    Raises
+    ------
+    InputError
+        When the search rejects the prior or an option.
+    IndexingEndedError
+        When the deadline passes before the search.
+    """
+    prior, prior_map = inputs.prior_of(sent), None if sent is None else sent.map_id
+    how = inputs.association_options_of(options, oriented=target.oriented)
+    if isinstance(target.maps, MapSet):
+        return associate_on_maps(target.maps, scan, KnownOfMaps(prior, prior_map, target.weights), how, deadline)
+    if prior_map is not None:
+        raise InvalidSearchError(
+            "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
+        )
+    return associate(target.maps, scan, prior, how, deadline)
+
+
+def find(
+    target: Target, sought: AssociateRequest | BatchItem, how: SearchOptions, deadline: Deadline, watch: Stopwatch
+) -> tuple[AssociationResult, Json]:
+    """Find a scan in a map, or on several; return also the answer.
+
+    Raises
+    ------
+    InputError, InvalidRequestError
+        When the libraries reject the scan, the prior or an option.
+    TooLateError
+        When the deadline passes before the search starts.
+    CancelledError
+        When the deadline was cancelled.
+    """
+    scanned = inputs.scanned_of(sought.scan)
+    watch.lap("decode")
+    require_time(deadline)
+    try:
+        result = search(target, scanned.scan, sought.prior, how, deadline)
+    except IndexingEndedError:
+        raise TooLateError from None
+    watch.lap("search")
+    return result, found_json(target, result, sought, scanned, how)
+
+
+def found_json(
+    target: Target,
+    result: AssociationResult,
+    sought: AssociateRequest | BatchItem,
+    scanned: Scanned,
+    how: SearchOptions,
+) -> Json:
+    """Return the answer of a search."""
+    references = {name: one for name, one in target.references.items() if name is not None and one is not None}
+    included = inputs.included_of(sought.scan, how, scanned, target.frames[result.map_id])
+    answer = results.association_json(result, included, references)
+    return answer if references else {**answer, "map": target.references[None]}
+
+
+def registered(asked: RegisterRequest, watch: Stopwatch, listed: Callable[[Iterable[Json]], Any] = list) -> Json:
+    """Return the answer of a registration; `listed` makes a list of its residuals, which are many."""
+    segments, scan = Segments.from_array(asked.map.segments, argument="map.segments"), inputs.measured_of(asked.scan)
+    pairs, how = inputs.pairs_of(asked, len(segments), len(scan)), inputs.registration_options_of(asked)
+    watch.lap("decode")
+    sigma = asked.map.sigma
+    if sigma is None:
+        result = register_estimating(segments, scan, pairs, how)
+    else:
+        result = register(segments, scan, pairs, sigma, how)
+    watch.lap("search")
+    return results.registration_json(result, pairs, listed)
+
+
+def vectorized(asked: VectorizeRequest, watch: Stopwatch) -> Json:
+    """Return the answer of a vectorization."""
+    watch.lap("decode")
+    found = vectorization_of(asked)
+    watch.lap("search")
+    return results.vectorization_json(*found)
+
+
+def analysis_steps(index: MapIndex, asked: AnalyzeRequest, deadline: Deadline) -> Steps:
+    """Analyze a map; of this and the following the first step reads the request, and the others look at the deadline.
+
+    Raises
+    ------
+    AnalysisError, InputError
+        When the requested places cannot be had, or the landmark is none.
+    """
+    analysis = inputs.analysis_of(index, asked)
+    yield
+    found = yield from looks(analysis, analysis.standing.order.tolist(), deadline)
+    return results.analysis_json(analysis, found)
+
+
+def check_steps(index: MapIndex, asked: CheckRequest | None, deadline: Deadline, *, oriented: bool) -> Steps:
+    """Check a map, and with sample scans whether these fit better otherwise; raises `InvalidRequestError` for one."""
+    scans = [] if asked is None else inputs.scans_of(asked)
+    poses = None
+    if asked is not None and asked.poses is not None:
+        poses = [None if one is None else inputs.transform_of(one) for one in asked.poses]
+    yield
+    checked = yield from checking(index, scans, poses, deadline, oriented=oriented)
+    return results.checked_json(checked)
+
+
+def update_steps(index: MapIndex, old: MapDocument, asked: UpdateRequest, deadline: Deadline) -> Steps:
+    """Propose changes of a map; raises `InvalidRequestError` for a scan that the libraries reject."""
+    scans = inputs.visit_scans(asked)
+    yield
+    proposal = yield from updating(index, scans, deadline, accept=asked.accept, refuse=asked.refuse)
+    return results.update_json(proposal, old)
+
+
+def applied(asked: ApplyRequest, watch: Stopwatch) -> Json:
+    """Return a map with the accepted changes.
+
+    Raises
+    ------
+    InputError, InvalidRequestError
+        When the map could not be put, or a change is not one of this map.
+    """
+    inputs.require_map(asked.map)
+    old, known = asked.map, Segments.from_array(asked.map.segments, argument="map.segments")
+    changes = inputs.replacements_of(asked)
+    watch.lap("decode")
+    try:
+        new, sigma = apply_changes(known, old.sigma, list(changes.values()), inputs.sharpened_of(asked.sharpened))
+    except InputError as error:
+        if error.index is None:
+            raise
+        raise InvalidRequestError([Fault(f"/changes/{list(changes)[error.index]}", error.message)]) from error
+    watch.lap("search")
+    return {"map": {"segments": new.endpoints.tolist(), "sigma": sigma, **results.kept_fields(old)}}

@@ -1,0 +1,174 @@
+"""The quality of a map: /v1/maps/{map_id}:check, :analyze and :update, /v1/analyze, /v1/maps:apply."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+
+from linefix.documents import examples
+from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
+from linefix.documents.checks import CheckAnswer
+from linefix.documents.parts import InlineMap, StoredMap
+from linefix.documents.requests import CheckRequest
+from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
+from linefix.operations import Json
+
+from ...work.association import answer_apply, reference_to
+from ...work.job import Done, Job
+from ...work.steps import Begin, analysis_of, begin, check_of, update_of
+from ..body_stage import read_request
+from ..exchange import Exchange, Searching
+from ..map_stage import index_map, looking_up_map
+from ..openapi import EVERYWHERE, SEARCHES, problems, searches
+from ..search_stage import in_search_slot, in_short_slots
+from ..sending import answer, answer_in_slot
+from .maps import MapIdPath
+
+router = APIRouter()
+_STORED = ("unknown_map", "map_corrupt", "read_only")
+
+
+@router.post(
+    "/v1/maps/{map_id}:analyze",
+    operation_id="analyze_map",
+    tags=["maps"],
+    response_model=AnalyzeAnswer,
+    summary="Analyze a stored map",
+    **searches(AnalyzeRequest, {"a robot": examples.ANALYZE}, *_STORED),
+)
+async def post_analyze(exchange: Searching, map_id: MapIdPath) -> Response:
+    """Simulate scans on a grid of poses and report where localization succeeds."""
+    asked = await read_request(exchange, AnalyzeRequest)
+    return await _analyze(exchange, StoredMap(map_id=map_id), asked)
+
+
+@router.post(
+    "/v1/analyze",
+    operation_id="analyze",
+    response_model=AnalyzeAnswer,
+    summary="Analyze a map that comes with the request",
+    **searches(MapAnalyzeRequest, {"a room": examples.ANALYZE_ROOM}, *_STORED),
+)
+async def post_analyze_inline(exchange: Searching) -> Response:
+    """Simulate scans on a grid of poses of a map in the request."""
+    asked = await read_request(exchange, MapAnalyzeRequest)
+    return await _analyze(exchange, asked.map, asked)
+
+
+async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
+    def noted(found: Json) -> Json:
+        return {"places": found["summary"]["places"]}
+
+    job = exchange.job(asked.deadline_ms)
+    return await _in_turns(exchange, on, analysis_of(asked), job, noted, client_ref=asked.client_ref)
+
+
+@router.get(
+    "/v1/maps/{map_id}:check",
+    operation_id="check_map",
+    tags=["maps"],
+    response_model=CheckAnswer,
+    responses=problems(*EVERYWHERE, *SEARCHES, *_STORED, "invalid_request"),
+    summary="Check a map",
+)
+async def get_check(
+    exchange: Searching,
+    map_id: MapIdPath,
+    deadline_ms: Annotated[
+        float | None,
+        Query(ge=0.0, le=600_000.0, description="milliseconds; parts that it leaves no time for are omitted"),
+    ] = None,
+) -> Response:
+    """Check a map: its directions, its drawing, its size, and its similar places."""
+    exchange.services.gate.enter(exchange.ticket)
+    return await _check(exchange, map_id, None, exchange.job(deadline_ms))
+
+
+@router.post(
+    "/v1/maps/{map_id}:check",
+    operation_id="check_map_with_scans",
+    tags=["maps"],
+    response_model=CheckAnswer,
+    summary="Check a map with sample scans",
+    **searches(CheckRequest, {"two scans": examples.CHECK}, *_STORED),
+)
+async def post_check(exchange: Searching, map_id: MapIdPath) -> Response:
+    """Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved."""
+    asked = await read_request(exchange, CheckRequest)
+    return await _check(exchange, map_id, asked, exchange.job(asked.deadline_ms))
+
+
+async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Response:
+    def noted(found: Json) -> Json:
+        return {"findings": [one["code"] for one in found["findings"]]}
+
+    on, client_ref = StoredMap(map_id=map_id), None if asked is None else asked.client_ref
+    return await _in_turns(exchange, on, check_of(asked), job, noted, oriented=True, client_ref=client_ref)
+
+
+@router.post(
+    "/v1/maps/{map_id}:update",
+    operation_id="update_map",
+    tags=["maps"],
+    response_model=UpdateAnswer,
+    summary="Propose changes of a stored map",
+    **searches(UpdateRequest, {"two visits": examples.UPDATE}, *_STORED),
+)
+async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
+    """Propose changes of a map that scans of several visits show; nothing is stored."""
+
+    def noted(found: Json) -> Json:
+        return {"changes": len(found["changes"])}
+
+    asked = await read_request(exchange, UpdateRequest)
+    on, job = StoredMap(map_id=map_id), exchange.job(asked.deadline_ms)
+    return await _in_turns(exchange, on, update_of(asked), job, noted, name="based_on", client_ref=asked.client_ref)
+
+
+@router.post(
+    "/v1/maps:apply",
+    operation_id="apply_changes",
+    tags=["maps"],
+    response_model=ApplyAnswer,
+    summary="Apply the accepted changes of an update",
+    **searches(ApplyRequest, {"a rack is gone": examples.APPLY}),
+)
+async def post_apply(exchange: Searching) -> Response:
+    """Return a map with those changes of an update that are accepted; nothing is searched or stored."""
+    asked = await read_request(exchange, ApplyRequest)
+    return await answer_in_slot(exchange, partial(answer_apply, asked))
+
+
+async def _in_turns(
+    exchange: Exchange,
+    on: InlineMap | StoredMap,
+    operation: Begin,
+    job: Job,
+    noted: Callable[[Json], Json],
+    *,
+    oriented: bool | None = None,
+    name: str = "map",
+    client_ref: Any,
+) -> Response:
+    """Answer with an operation on a map; `noted` returns fields for the log, `name` is that of the map's reference."""
+
+    async def work() -> Done:
+        lookup, run = exchange.services.lookup, exchange.services.parse_threads.run
+        async with looking_up_map(exchange, on, job.deadline, oriented=oriented) as source:
+            await index_map(exchange, source, job.deadline, oriented=oriented)
+            beginning, reference = partial(begin, operation, lookup, source, job), reference_to(source)
+            begun = await in_search_slot(exchange, beginning, job.deadline, job.searching.is_set)
+        if not await in_short_slots(exchange, begun.take_turn, job.deadline):  # the rest then searches nothing
+            while await run(begun.take_turn):
+                await asyncio.sleep(0)
+        found = begun.answer
+        assert found is not None  # every step is taken
+        job.watch.lap("search")
+        sealed = {**found, name: reference, "client_ref": client_ref}
+        return await run(lambda: job.done(sealed, map=reference, **noted(found)))
+
+    return await answer(exchange, work(), job.deadline)

@@ -1,0 +1,69 @@
+"""An analysis in turns at the gate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from association import CancelledError, Deadline, MapIndex
+from linefix.documents.analysis import AnalyzeRequest
+from linefix.operations import analysis_steps
+from service.work import steps
+from service.work.steps import Work
+from simulation import rectangle_room
+
+BOX = [[-2.5, -1.5, -2.5, 0.0], [-2.5, 0.0, -1.0, 0.0], [-1.0, 0.0, -1.0, -1.5], [-1.0, -1.5, -2.5, -1.5]]
+ASKED = AnalyzeRequest.model_validate({"spacing": 2.5, "drive": 2.0, "landmark": BOX, "laser": {"beams": 180}})
+
+
+@pytest.fixture
+def short_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """End each turn after one step."""
+    monkeypatch.setattr(steps, "TURN_SECONDS", 0.0)
+
+
+def analysis(deadline: Deadline) -> Work:
+    """Analyze a room in which no drive helps, and with a box that does."""
+    index = MapIndex.build(rectangle_room().segments, 0.0)
+    return Work(analysis_steps(index, ASKED, deadline), deadline)
+
+
+def places(found: dict[str, Any] | None) -> list[dict[str, Any]]:
+    assert found is not None
+    assert found["complete"]
+    listed: list[dict[str, Any]] = found["places"]
+    return listed
+
+
+@pytest.mark.usefixtures("short_turns")
+def test_others_have_their_turn_within_a_drive() -> None:
+    work, turns = analysis(Deadline()), 1
+    while work.take_turn():
+        turns += 1
+    free = places(work.answer)
+    assert len(free) > 2
+    assert turns > 4 * len(free)
+    assert any(one["with_landmark"] is not None and one["with_landmark"]["usable"] for one in free)
+
+
+def test_turns_do_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = []
+    for seconds in (0.0, 600.0):
+        monkeypatch.setattr(steps, "TURN_SECONDS", seconds)
+        work = analysis(Deadline())
+        while work.take_turn():
+            pass
+        answers.append(places(work.answer))
+    assert answers[0] == answers[1]
+
+
+@pytest.mark.usefixtures("short_turns")
+def test_who_hangs_up_within_a_drive_ends_it() -> None:
+    deadline = Deadline()
+    work = analysis(deadline)
+    assert work.take_turn()
+    deadline.cancel()
+    with pytest.raises(CancelledError):
+        work.take_turn()
+    assert work.answer is None
