@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from association import (
     AssociationResult,
@@ -32,6 +32,7 @@ from .documents.scans import Scanned, vectorization_of
 from .documents.updates import ApplyRequest, UpdateRequest
 from .driving import associate, associate_on_maps
 
+T = TypeVar("T")
 Json = dict[str, Any]
 Steps = Generator[None, None, Json]
 """Work on an answer; between steps others may have their turn."""
@@ -213,7 +214,7 @@ def analysis_steps(index: MapIndex, asked: AnalyzeRequest, deadline: Deadline) -
 
 def check_steps(index: MapIndex, asked: CheckRequest | None, deadline: Deadline, *, oriented: bool) -> Steps:
     """Check a map, and with sample scans whether these fit better otherwise; raises `InvalidRequestError` for one."""
-    scans = [] if asked is None else inputs.scans_of(asked)
+    scans = [] if asked is None else _in_time(inputs.scans_of(asked), deadline)
     poses = None
     if asked is not None and asked.poses is not None:
         poses = [None if one is None else inputs.transform_of(one) for one in asked.poses]
@@ -224,10 +225,19 @@ def check_steps(index: MapIndex, asked: CheckRequest | None, deadline: Deadline,
 
 def update_steps(index: MapIndex, old: MapDocument, asked: UpdateRequest, deadline: Deadline) -> Steps:
     """Propose changes of a map; raises `InvalidRequestError` for a scan that the libraries reject."""
-    scans = inputs.visit_scans(asked)
+    scans = _in_time(inputs.visit_scans(asked), deadline)
     yield
     proposal = yield from updating(index, scans, deadline, accept=asked.accept, refuse=asked.refuse)
     return results.update_json(proposal, old)
+
+
+def _in_time(scans: Iterable[T], deadline: Deadline) -> list[T]:
+    """Return all scans, which are cut into segments one by one, while there is time."""
+    found = []
+    for one in scans:
+        require_time(deadline)
+        found.append(one)
+    return found
 
 
 def applied(asked: ApplyRequest, watch: Stopwatch) -> Json:

@@ -17,39 +17,22 @@ from compiled import compiled_fraction, is_complete
 from linefix.compiling import start_compiler
 from linefix.warmup import warm_up
 
-from .admission.budget import ByteBudget
-from .admission.entrance import Entrance
-from .admission.gate import Gate
-from .admission.keys import Keyring
-from .admission.origins import Origins
-from .admission.readiness import Readiness
-from .http.bodies import BodyReceiver
 from .http.middleware import RequestMiddleware
 from .http.openapi import Contract, describe
-from .http.probe import StoreProbe
 from .http.problems import handle_errors
 from .http.routes import batch, importing, maps, operations, pages, quality, scans
 from .http.services import Services
 from .importing.folders import remove_abandoned
-from .importing.reader import Bounds
-from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
-from .maps.lookup import MapLookup
 from .memory import return_free_pages
-from .parsing.child import Child
 from .settings import Settings
-from .telemetry.metrics import Metrics, RefusalTally
-from .telemetry.traces import traces_of_environment
 from .thread_pool import Threads
 from .version import VERSION
-from .work.association import Associator
 
 logger = logging.getLogger("linefix")
 Started = Callable[[Services], None]
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
-LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
 PROGRESS_SECONDS = 2.0  # between two counts of the compiled kernels
-INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
 def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
@@ -61,7 +44,7 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
     started : callable, optional
         Called with the application's parts, in its event loop, when it starts.
     """
-    services = _services(settings)
+    services = Services(settings)
     app = FastAPI(
         title="Linefix",
         version=VERSION,
@@ -100,65 +83,6 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
             expose_headers=("ETag", "Retry-After", "X-Request-Id"),
         )
     return app
-
-
-def _services(settings: Settings) -> Services:
-    """Put the parts together; of several workers each has its share."""
-    metrics = Metrics()
-    searches = settings.share(settings.searches)
-    gate = Gate(searches, searches + settings.share(settings.queue))
-    indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0)
-    budget = _budget(settings, settings.max_bodies_bytes)
-    store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
-    cache = IndexCache(settings.share(settings.cache_bytes), metrics)
-    parser = Child()
-    lookup = MapLookup(cache, store, parser)
-    readiness = Readiness()
-    keyring = Keyring(settings.keys, settings.keys_file)
-    origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
-    metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
-    metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
-    metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
-    metrics.watch("linefix_indexing_running", "Large maps that are indexed", lambda: indexing.running)
-    metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: budget.held)
-    metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
-    metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(cache))
-    return Services(
-        settings=settings,
-        metrics=metrics,
-        refusals=RefusalTally(metrics),
-        readiness=readiness,
-        entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
-        gate=gate,
-        # The number that waits there is bounded by their bytes.
-        parsing=Gate(1, None, "parsing", long_per_slot=0),
-        indexing=indexing,
-        keyring=keyring,
-        answers=_budget(settings, settings.max_answers_bytes),
-        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout_s, guarded=settings.guarded),
-        parser=parser,
-        store=store,
-        probe=StoreProbe(store),
-        lookup=lookup,
-        documents=_budget(settings, settings.max_answers_bytes),
-        associator=Associator(lookup, metrics),
-        # A second one when the first takes long, and not for the same key: each takes memory.
-        importing=Gate(1, None, "importing", long_per_slot=1),
-        import_bounds=Bounds(
-            max(LEAST_IMPORT_BYTES, settings.share(settings.max_import_bytes)),
-            settings.max_body_bytes,
-            settings.max_map_segments,
-        ),
-        parse_threads=Threads(2, "parse"),
-        store_threads=Threads(4, "store"),
-        key_threads=Threads(1, "keys"),
-        traces=traces_of_environment(),
-    )
-
-
-def _budget(settings: Settings, most: int) -> ByteBudget:
-    """Return what one of several workers may hold; the largest body always fits."""
-    return ByteBudget(max(settings.max_body_bytes, settings.share(most)), least_share=settings.max_body_bytes)
 
 
 @asynccontextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from association import (
     INCLUDED,
     AssociationOptions,
+    Deadline,
     HardPrior,
     MapIndex,
     MapPart,
@@ -55,6 +56,8 @@ from .strict import Pose
 from .updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest, UpdateScan
 from .views import LaserView, PointView, SegmentView, ViewsScan
 
+# Options of a search that have the same names and values in a request.
+_AS_SENT = [one.name for one in fields(AssociationOptions) if one.name not in ("oriented", "include")]
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
 
@@ -142,22 +145,8 @@ def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:
 
 def association_options_of(options: SearchOptions, *, oriented: bool) -> AssociationOptions:
     """Return how to search a map whose directions count, or do not."""
-    return AssociationOptions(
-        max_alternatives=options.max_alternatives,
-        confidence=options.confidence,
-        exhaustive=options.exhaustive,
-        seed=options.seed,
-        sampling=options.sampling,
-        oriented=oriented,
-        offset_tolerance=options.offset_tolerance,
-        angle_tolerance=options.angle_tolerance,
-        min_overlap=options.min_overlap,
-        include=tuple(part for part in INCLUDED if part in options.include),
-        on_map=options.on_map,
-        usable_from=options.usable_from,
-        estimator=options.estimator,
-        rotation=options.rotation,
-    )
+    include = tuple(part for part in INCLUDED if part in options.include)
+    return AssociationOptions(oriented=oriented, include=include, **{name: getattr(options, name) for name in _AS_SENT})
 
 
 def included_of(
@@ -202,32 +191,28 @@ def pairs_of(asked: RegisterRequest, map_count: int, scan_count: int) -> NDArray
     return np.repeat(np.arange(map_count, dtype=np.intp)[:, None], 2, axis=1)
 
 
-def scans_of(asked: CheckRequest) -> list[Scan]:
-    """Return the sample scans of a request.
+def scans_of(asked: CheckRequest) -> Iterator[Scan]:
+    """Yield the sample scans of a request.
 
     Raises
     ------
     InvalidRequestError
         When the libraries reject one.
     """
-    found = []
     for number, one in enumerate(asked.scans):
         with naming_scan(f"/scans/{number}"):
             # A motion that is not known would only loosen the fit.
-            found.append(scanned_of(one, timed=False).scan)
-    return found
+            yield scanned_of(one, timed=False).scan
 
 
-def visit_scans(asked: UpdateRequest) -> list[VisitScan]:
-    """Return the scans of all visits; an error names the place of a scan in the request."""
-    found = []
+def visit_scans(asked: UpdateRequest) -> Iterator[VisitScan]:
+    """Yield the scans of all visits; an error names the place of a scan in the request."""
     for number, visit in enumerate(asked.visits):
         for place, one in enumerate(visit.scans):
             with naming_scan(f"/visits/{number}/scans/{place}"):
                 pose = None if one.pose is None else transform_of(one.pose)
                 odometry = None if one.odometry is None else transform_of(one.odometry)
-                found.append(VisitScan(scanned_of(one).scan, visit.visit, pose, one.covariance, odometry))
-    return found
+                yield VisitScan(scanned_of(one).scan, visit.visit, pose, one.covariance, odometry)
 
 
 def analysis_of(index: MapIndex, asked: AnalyzeRequest) -> Analysis:
@@ -267,10 +252,10 @@ def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float
     return MapIndex.require(part.segments, part.sigma, path)
 
 
-def index_of(document: MapDocument, *, oriented: bool) -> MapIndex:
-    """Return the index of a map."""
+def index_of(document: MapDocument, *, oriented: bool, deadline: Deadline | None = None) -> MapIndex:
+    """Return the index of a map; raises `IndexingEndedError` when the deadline passes."""
     part = part_of(document, oriented=oriented)
-    return MapIndex.build(part.segments, part.sigma, oriented=oriented, points=part.points)
+    return MapIndex.build(part.segments, part.sigma, oriented=oriented, points=part.points, deadline=deadline)
 
 
 def replacements_of(asked: ApplyRequest) -> dict[int, Replacement]:

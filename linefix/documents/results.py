@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
-from operator import attrgetter
+from functools import cache, partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,25 +42,6 @@ MOST_INDICES = 1000  # of one finding
 SEAL = frozenset(("client_ref", "request_id", "timing_ms"))  # of the request, not of its result
 
 
-@dataclass(frozen=True, slots=True)
-class _Field:
-    """A field of an answer: its name there, its attribute in a result, the model of what it holds, and its default."""
-
-    name: str
-    attribute: str
-    inner: type[Answer] | None
-    default: Any
-
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """The conversion of results to an answer; `all_at_once` if no field needs one."""
-
-    fields: tuple[_Field, ...]
-    names: tuple[str, ...]
-    all_at_once: Callable[[Any], tuple[Any, ...]] | None
-
-
 def _models_in(annotation: Any) -> Iterator[type[Answer]]:
     if isinstance(annotation, type) and issubclass(annotation, Answer):
         yield annotation
@@ -69,22 +49,21 @@ def _models_in(annotation: Any) -> Iterator[type[Answer]]:
         yield from _models_in(part)
 
 
+def _holds_lists(annotation: Any) -> bool:
+    return annotation is Any or get_origin(annotation) is list or any(map(_holds_lists, get_args(annotation)))
+
+
 @cache
-def _plan(model: type[Answer], given: frozenset[str]) -> _Plan:
-    fields = tuple(
-        _Field(
-            one.alias or name, name, next(_models_in(one.annotation), None), one.get_default(call_default_factory=True)
-        )
-        for name, one in model.model_fields.items()
-        if name not in SEAL
-    )
-    own = [one for one in fields if one.name not in given]
-    plain = len(own) > 1 and all(one.inner is None and one.default is PydanticUndefined for one in own)
-    getter = attrgetter(*(one.attribute for one in own)) if plain else None
-    return _Plan(fields, tuple(one.name for one in own), getter)
-
-
-NOTHING: frozenset[str] = frozenset()
+def _plan(model: type[Answer]) -> tuple[tuple[str, str, Callable[[Any], Any] | None, Any], ...]:
+    """Return of each field its name in the answer, its attribute in a result, its conversion, and its default."""
+    plan = []
+    for name, one in model.model_fields.items():
+        inner = next(_models_in(one.annotation), None)
+        convert = _plain if _holds_lists(one.annotation) else None
+        if inner is not None:
+            convert = partial(_inner, inner)
+        plan.append((one.alias or name, name, convert, one.get_default(call_default_factory=True)))
+    return tuple(one for one in plan if one[0] not in SEAL)
 
 
 def answer_of(model: type[Answer], result: object, /, **given: Any) -> Json:
@@ -92,17 +71,18 @@ def answer_of(model: type[Answer], result: object, /, **given: Any) -> Json:
 
     Each field of the model is the attribute of its name, unless it is given. One with a default may be missing.
     """
-    plan = _plan(model, frozenset(given) if given else NOTHING)
-    if plan.all_at_once is not None:
-        return {**given, **dict(zip(plan.names, map(_plain, plan.all_at_once(result)), strict=True))}
     answer: Json = {}
-    for one in plan.fields:
-        if one.name in given:
-            answer[one.name] = given[one.name]
+    for name, attribute, convert, default in _plan(model):
+        if name in given:
+            answer[name] = given[name]
             continue
-        value = getattr(result, one.attribute) if one.default is PydanticUndefined else _or_default(result, one)
-        if value is not PydanticUndefined:
-            answer[one.name] = _plain(value) if one.inner is None else _inner(one.inner, value)
+        if default is PydanticUndefined:
+            value = getattr(result, attribute)
+        else:
+            value = getattr(result, attribute, default)
+            if value == default or value == ():
+                continue  # left out
+        answer[name] = value if convert is None else convert(value)
     return answer
 
 
@@ -114,12 +94,6 @@ def _inner(model: type[Answer], value: Any) -> Any:
     if value is None:
         return None
     return answers_of(model, value) if isinstance(value, tuple | list) else answer_of(model, value)
-
-
-def _or_default(result: object, one: _Field) -> Any:
-    """Return an attribute; undefined where it is the default, and so left out."""
-    value = getattr(result, one.attribute, one.default)
-    return PydanticUndefined if value == one.default or value == () else value
 
 
 def answers_of(model: type[Answer], results: Iterable[object]) -> list[Json]:

@@ -1,85 +1,98 @@
-"""The services that the routes use: the parts of one application, made by `create_app`."""
+"""The services that the routes use: the parts of one application."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 from ..admission.budget import ByteBudget
 from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
+from ..admission.origins import Origins
 from ..admission.readiness import Readiness
 from ..importing.reader import Bounds
-from ..maps import MapStore
+from ..maps import IndexCache, MapStore
 from ..maps.lookup import MapLookup
 from ..parsing.child import Child
 from ..settings import Settings
 from ..telemetry.metrics import Metrics, RefusalTally
-from ..telemetry.traces import Traces
+from ..telemetry.traces import traces_of_environment
 from ..thread_pool import Threads
 from ..work.association import Associator
 from .bodies import BodyReceiver
 from .probe import StoreProbe
 
+LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
+INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
-@dataclass(frozen=True, slots=True)
+
 class Services:
-    """The parts of one application; all belong to one event loop.
+    """The parts of one application; of several workers each has its share. All belong to one event loop.
 
     Attributes
     ----------
-    settings : Settings
-    metrics : Metrics
-    refusals : RefusalTally
-    readiness : Readiness
-    entrance : Entrance
     gate : Gate
-    parsing, indexing : Gate
-        Slots to parse large bodies, in another process, and to index large maps.
-    keyring : Keyring
+        Slots of searches.
+    parsing, indexing, importing : Gate
+        Slots to parse large bodies, in another process; to index large maps; to read maps of other tools.
     bodies : BodyReceiver
-    answers : ByteBudget
-        Bytes of large answers that are being read.
+    answers, documents : ByteBudget
+        Bytes of large answers that are being read, and of stored maps that wait to be indexed.
     parser : Child
         For large bodies.
-    store : MapStore
-    probe : StoreProbe
-    lookup : MapLookup
-    documents : ByteBudget
-        Bytes of stored maps that wait to be indexed.
-    associator : Associator
-    importing : Gate
-        Slot in which maps of other tools are read, one at a time: each may take much memory.
     import_bounds : Bounds
-        That reading one is held to.
-    parse_threads, store_threads, key_threads : Threads
+        That reading a map of another tool is held to.
     traces : Traces, or None
         None where no traces are requested.
     """
 
-    settings: Settings
-    metrics: Metrics
-    refusals: RefusalTally
-    readiness: Readiness
-    entrance: Entrance
-    gate: Gate
-    parsing: Gate
-    indexing: Gate
-    keyring: Keyring
-    bodies: BodyReceiver
-    answers: ByteBudget
-    parser: Child
-    store: MapStore
-    probe: StoreProbe
-    lookup: MapLookup
-    documents: ByteBudget
-    associator: Associator
-    importing: Gate
-    import_bounds: Bounds
-    parse_threads: Threads
-    store_threads: Threads
-    key_threads: Threads
-    traces: Traces | None = None
+    def __init__(self, settings: Settings) -> None:
+        searches = settings.share(settings.searches)
+        self.settings = settings
+        self.metrics = Metrics()
+        self.refusals = RefusalTally(self.metrics)
+        self.readiness = Readiness()
+        self.gate = Gate(searches, searches + settings.share(settings.queue))
+        # The number that waits there is bounded by their bytes.
+        self.parsing = Gate(1, None, "parsing", long_per_slot=0)
+        self.indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0)
+        # A second one when the first takes long, and not for the same key: each takes memory.
+        self.importing = Gate(1, None, "importing", long_per_slot=1)
+        self.import_bounds = Bounds(
+            max(LEAST_IMPORT_BYTES, settings.share(settings.max_import_bytes)),
+            settings.max_body_bytes,
+            settings.max_map_segments,
+        )
+        self.keyring = Keyring(settings.keys, settings.keys_file)
+        origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
+        self.entrance = Entrance(self.gate, self.keyring, origins, settings.max_body_bytes)
+        held = self._budget(settings.max_bodies_bytes)
+        self.bodies = BodyReceiver(settings.max_body_bytes, held, settings.request_timeout_s, guarded=settings.guarded)
+        self.answers = self._budget(settings.max_answers_bytes)
+        self.documents = self._budget(settings.max_answers_bytes)
+        self.parser = Child()
+        self.store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
+        self.probe = StoreProbe(self.store)
+        cache = IndexCache(settings.share(settings.cache_bytes), self.metrics)
+        self.lookup = MapLookup(cache, self.store, self.parser)
+        self.associator = Associator(self.lookup, self.metrics)
+        self.parse_threads, self.store_threads, self.key_threads = (
+            Threads(count, name) for count, name in ((2, "parse"), (4, "store"), (1, "keys"))
+        )
+        self.traces = traces_of_environment()
+        for name, what, read in (
+            ("workers_ready", "Processes that take requests", lambda: self.readiness.takes_requests),
+            ("searches_running", "Searches that run", lambda: self.gate.running),
+            ("searches_waiting", "Searches that wait", lambda: self.gate.waiting),
+            ("indexing_running", "Large maps that are indexed", lambda: self.indexing.running),
+            ("bodies_bytes", "Bytes of requests held", lambda: held.held),
+            ("map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes),
+            ("map_cache_maps", "Indexed maps held", lambda: len(cache)),
+        ):
+            self.metrics.watch(f"linefix_{name}", what, read)
+
+    def _budget(self, most: int) -> ByteBudget:
+        """Return what this worker may hold; the largest body always fits."""
+        least = self.settings.max_body_bytes
+        return ByteBudget(max(least, self.settings.share(most)), least_share=least)
 
     @property
     def _gates(self) -> tuple[Gate, ...]:

@@ -42,15 +42,6 @@ class CachedMaps:
     frame_ids: tuple[str, ...]
     bytes: int
 
-    @property
-    def oriented(self) -> bool:
-        """Return whether directions of segments mean anything on all of the maps."""
-        return self.maps.oriented
-
-    def frame_of(self, map_id: str | None) -> str:
-        """Return the frame of a map; of the first where there is none."""
-        return self.frame_ids[0 if map_id is None else self.maps.ids.index(map_id)]
-
 
 Cached = CachedMap | CachedMaps
 C = TypeVar("C", CachedMap, CachedMaps)

@@ -7,12 +7,12 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapPoints, MapSet
+from association import Deadline, IndexingEndedError, MapIndex, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
+from linefix.documents.inputs import index_of, part_of, require_map
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
 from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
-from registration import Segments
 
 from ..parsing.child import LARGE, Child
 from .cache import CachedMap, CachedMaps, IndexCache
@@ -153,8 +153,7 @@ class MapLookup:
             When the deadline passes, or is cancelled, first.
         """
         self._cache.make_room(INDEXED_BYTES * (len(asked.segments) + len(asked.points)))
-        segments = Segments.from_array(asked.segments, argument="map.segments")
-        return MapIndex.build(segments, asked.sigma, points=_points_of(asked, "map."), deadline=deadline)
+        return index_of(asked, oriented=True, deadline=deadline)
 
     def document(self, found: FoundMap) -> MapDocument:
         """Return the document of a stored map; runs off the event loop.
@@ -197,9 +196,8 @@ class MapLookup:
             if deadline.passed:
                 raise IndexNotReadyError
             document = one if isinstance(one, InlineMap) else self.document(FoundMap(one, None))
-            segments = Segments.from_array(document.segments, argument=f"maps.{number}.segments")
-            directed, points = is_oriented(oriented, document.oriented), _points_of(document, f"maps.{number}.")
-            parts[name] = MapPart(segments, document.sigma, directed, points)
+            directed = is_oriented(oriented, document.oriented)
+            parts[name] = part_of(document, oriented=directed, path=f"maps.{number}.")
             frame_ids.append(document.frame_id)
         count = sum(len(part.segments) + len(part.points) for part in parts.values())
         self._cache.make_room(2 * INDEXED_BYTES * count)
@@ -212,8 +210,7 @@ class MapLookup:
     def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
         # The old goes before the new comes: two of the largest at once would take too much.
         self._cache.make_room(INDEXED_BYTES * (len(asked.segments) * (1 if oriented else 2) + len(asked.points)))
-        segments = Segments.from_array(asked.segments, argument="map.segments")
-        index = MapIndex.build(segments, asked.sigma, oriented=oriented, points=_points_of(asked, "map."))
+        index = index_of(asked, oriented=oriented)
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
 
 
@@ -236,10 +233,6 @@ def _content(asked: InlineMap) -> tuple[Hashable, ...]:
     return segments, asked.sigma, points, asked.points_sigma, asked.frame_id
 
 
-def _points_of(document: MapDocument, path: str) -> MapPoints:
-    return MapPoints.of(document.points, document.points_sigma, path=path)
-
-
 def outline_of(document: MapDocument) -> MapOutline:
     """Return the outline of a map that is to be stored.
 
@@ -248,8 +241,7 @@ def outline_of(document: MapDocument) -> MapOutline:
     InvalidSegmentsError, InvalidMapError
         When it could not be searched.
     """
-    segments, points = Segments.from_array(document.segments, argument="segments"), _points_of(document, "")
-    corners = MapIndex.require(segments, document.sigma, "")
     # No negative zeros: not every database keeps them.
-    (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in corners)
-    return MapOutline(len(segments), len(points), (left, bottom, right, top), document.sigma, document.oriented)
+    (left, bottom), (right, top) = ((corner + 0.0).tolist() for corner in require_map(document))
+    counts = len(document.segments), len(document.points)
+    return MapOutline(*counts, (left, bottom, right, top), document.sigma, document.oriented)

@@ -18,6 +18,7 @@ from typing import Any
 
 STDERR = 2
 WAITING_LINES = 4096  # that are buffered for a late reader
+GATHER_SECONDS = 0.01  # between two writes: to wake the thread for each line would cost a request a twentieth more
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
@@ -55,7 +56,7 @@ class PatientHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Format a record and hand it over; called by one thread at a time, as `logging` does."""
         try:
-            if self._lines.qsize() >= WAITING_LINES:
+            if self._handed - self._written >= WAITING_LINES:
                 self._lost += 1
                 return
             self._lines.put(self.format(record))
@@ -76,15 +77,24 @@ class PatientHandler(logging.Handler):
         super().close()
 
     def _write_all(self) -> None:
-        while (line := self._lines.get()) is not None:
-            lost, self._lost = self._lost, 0
+        line = self._lines.get()
+        while line is not None:
+            lines = [line]
+            for _ in range(self._lines.qsize()):
+                line = self._lines.get()
+                if line is not None:
+                    lines.append(line)
+            count, lost, self._lost = len(lines), self._lost, 0
             if lost:
                 record = logging.LogRecord("linefix", logging.WARNING, "", 0, "lines of the log were lost", None, None)
                 record.count = lost
-                line = self.format(record) + "\n" + line
+                lines.append(self.format(record))
             with suppress(OSError):  # the reader has gone
-                _write(line.encode("utf-8", "backslashreplace") + b"\n")
-            self._written += 1
+                _write("".join(f"{one}\n" for one in lines).encode("utf-8", "backslashreplace"))
+            self._written += count
+            if line is not None:
+                time.sleep(GATHER_SECONDS)
+                line = self._lines.get()
 
 
 def _write(data: bytes) -> None:
