@@ -22,7 +22,18 @@ from .database_location import database_url
 
 Finite = Annotated[float, AllowInfNan(False)]
 HELP = "Start the service. Each option may also be set in the environment, as LINEFIX_ and its name: LINEFIX_PORT=8001."
-# For the help, defaults that are found when the service starts.
+# Value names in the help for settings that are no numbers, and for defaults that are found when the service starts.
+_METAVARS = {
+    "host": "ADDRESS",
+    "data_dir": "DIRECTORY",
+    "database_url": "URL",
+    "keys_file": "PATH",
+    "hosts": "NAME,...",
+    "cors_origins": "ORIGIN,...",
+    "tls_cert": "PATH",
+    "tls_key": "PATH",
+    "log_level": "LEVEL",
+}
 _DEFAULTS = {"data_dir": "~/.local/share/linefix", "searches": "the cores"}
 _ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:[0-9]+)?|https?://\[[0-9a-f:]+\](:[0-9]+)?")
 _PRINTABLE = re.compile(r"[!-~]+")
@@ -297,7 +308,7 @@ def _add_argument(parser: argparse.ArgumentParser, *names: str, **how: Any) -> N
     if name != "keys" and default not in (None, (), False):
         how["help"] += f" (default: {default})"
     if field.annotation is not bool:
-        how["metavar"] = {int: "N", float: "X", Finite: "X"}.get(field.annotation, name.rpartition("_")[2].upper())
+        how["metavar"] = _METAVARS.get(name, "N" if field.annotation is int else "X")
     parser.add_argument(*names, **how)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
@@ -12,8 +12,8 @@ from association import ReasonCode
 from .errors import TooManyError
 from .limits import Limits
 from .parts import AnyMap
-from .replies import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer
-from .strict import Answer, Coordinate, FreeJson, Point, Strict, in_radians
+from .replies import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer, Verdict
+from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Point, Strict, in_radians
 
 Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 MOST_LANDMARK = 100
@@ -55,7 +55,7 @@ class AnalyzeRequest(Strict):
         "building and on the map; the free side of a box is its outside",
     )
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of the scanner's noise")
-    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+    deadline_ms: DeadlineMs | None = Field(
         None, description="milliseconds; places that it leaves no time for are omitted"
     )
     client_ref: FreeJson = Field(None, description="returned as it was sent")
@@ -77,7 +77,7 @@ class MapAnalyzeRequest(AnalyzeRequest):
 class WithLandmarkAnswer(Answer):
     """Result at a place with the landmark."""
 
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    status: Verdict
     usable: bool
     probability: Share | None = Field(description="probability, as of /v1/associate; null for `degenerate`")
 
@@ -86,7 +86,7 @@ class AnalyzedPlaceAnswer(Answer):
     """Result at a place."""
 
     pose: PoseAnswer = Field(description="true pose of the robot")
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
+    status: Verdict = Field(
         description="status, as of /v1/associate; `ambiguous` also for a usable answer at a wrong place"
     )
     usable: bool = Field(description="whether the answer is usable and correct")

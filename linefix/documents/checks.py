@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
 from map_quality import FindingCode
 
-from .replies import Index, MapReference, PoseAnswer, TimingAnswer
+from .replies import Index, MapReference, PoseAnswer, TimingAnswer, Verdict
 from .strict import Answer
 
 
@@ -48,9 +48,7 @@ class SampleAnswer(Answer):
     """Result of one scan in the map as it is."""
 
     index: Index
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"] | None = Field(
-        description="null: the deadline left no time for it"
-    )
+    status: Verdict | None = Field(description="null: the deadline left no time for it")
     usable: bool
     pose: PoseAnswer | None
 

@@ -20,7 +20,7 @@ from .arrays import (
     SigmaOrSigmas,
     Spreads,
 )
-from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict, in_radians
+from .strict import Angle, DeadlineMs, FrameId, FreeJson, MapId, Point, Pose, Strict, in_radians
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
 PointSigma = Annotated[float, Field(gt=0.0, le=10.0)]
@@ -335,7 +335,7 @@ class SearchOptions(Strict):
     sampling: Literal["ordered", "random"] = Field(
         "ordered", description="order of the bases: informative and cheap ones first, or random by `seed`"
     )
-    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+    deadline_ms: DeadlineMs | None = Field(
         None, description="milliseconds; a longer one than `max_deadline_ms` of /v1/limits is shortened to it"
     )
     oriented: bool | None = Field(

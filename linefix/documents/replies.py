@@ -17,6 +17,7 @@ Matrix = Annotated[list[Row3], Field(min_length=3, max_length=3)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Index = Annotated[int, Field(ge=0)]
 Milliseconds = Annotated[float, Field(ge=0.0)]
+Verdict = Literal["ok", "ambiguous", "degenerate", "no_match"]
 
 
 class TimingAnswer(Answer):
@@ -210,7 +211,7 @@ class MapReference(Answer):
 class MapVerdictAnswer(MapReference):
     """The best pose on one of several maps."""
 
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
+    status: Verdict = Field(
         description="of the map of the answer its status; of another map `ambiguous` where its pose explains the scan "
         "about as well and the answer is not usable, else `no_match`"
     )
@@ -224,7 +225,7 @@ class MapVerdictAnswer(MapReference):
 class FoundAnswer(Answer):
     """Pose of a scan in a map, with the verdict."""
 
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    status: Verdict
     usable: bool = Field(description="whether a robot may use the pose")
     probability: Share | None = Field(
         description="calibrated probability that the pose is right, with the prior `options.on_map`; 0 for "

@@ -23,7 +23,7 @@ from .parts import (
     require_times,
 )
 from .several import MapWeights, SeveralMaps, require_one_kind
-from .strict import FreeJson, Point, Pose, Sigma, Strict
+from .strict import DeadlineMs, FreeJson, Point, Pose, Sigma, Strict
 from .views import AnyScan
 
 
@@ -147,7 +147,7 @@ class CheckRequest(Strict):
     poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
         None, description="one per scan, or null: the known or assumed pose of the scan's frame in the map frame"
     )
-    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+    deadline_ms: DeadlineMs | None = Field(
         None, description="milliseconds; parts that it leaves no time for are omitted"
     )
     client_ref: FreeJson = Field(None, description="returned as it was sent")

@@ -98,6 +98,7 @@ Angle = Annotated[
 ]
 Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
 FrameId = Annotated[str, Field(max_length=256)]
+DeadlineMs = Annotated[float, Field(ge=0.0, le=600_000.0)]
 MapId = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 

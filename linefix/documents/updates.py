@@ -14,7 +14,7 @@ from .errors import TooManyError
 from .limits import Limits
 from .parts import LaserScan, MapDocument, MapSigma
 from .replies import Index, MapReference, Row2, Row4, Share, TimingAnswer
-from .strict import Answer, Coordinate, FreeJson, Pose, Strict
+from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Pose, Strict
 
 MOST_VISITS = 100
 
@@ -63,7 +63,7 @@ class UpdateRequest(Strict):
     refuse: Annotated[list[Annotated[int, Field(ge=0)]], Field(max_length=10_000)] = Field(
         default=[], description="indices of changes that are not in the new map"
     )
-    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+    deadline_ms: DeadlineMs | None = Field(
         None, description="milliseconds; if it passes before the changes are verified, none is proposed"
     )
     client_ref: FreeJson = Field(None, description="returned as it was sent")

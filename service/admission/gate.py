@@ -98,7 +98,6 @@ class Gate:
         self._closed = False
         self._runs: set[_Run] = set()
         self._shares: dict[Holder, _Share] = {}
-        self._places = self._taken = self._long = 0
 
     @property
     def running(self) -> int:
@@ -109,6 +108,18 @@ class Gate:
     def waiting(self) -> int:
         """The number of functions that wait."""
         return sum(len(share.waiting) for share in self._shares.values())
+
+    @property
+    def _places(self) -> int:
+        return sum(share.places for share in self._shares.values())
+
+    @property
+    def _long(self) -> int:
+        return sum(share.long for share in self._shares.values())
+
+    @property
+    def _has_free_slot(self) -> bool:
+        return sum(share.running - share.long for share in self._shares.values()) < self.slots
 
     def require_place(self, holder: Holder) -> None:
         """Refuse a request when every place is taken, unless its holder has less than its share of them.
@@ -141,13 +152,11 @@ class Gate:
             self._evict(share.places + 1)
         ticket.has_place = True
         share.places += 1
-        self._places += 1
 
     def leave(self, ticket: Ticket) -> None:
         """Give a request's place back, where it has one."""
         if ticket.has_place:
             ticket.has_place = False
-            self._places -= 1
             self._shares[ticket.holder].places -= 1
             self._forget(ticket.holder)
 
@@ -178,8 +187,8 @@ class Gate:
         if deadline.passed:
             raise DeadlinePassedError
         share = self._share(ticket.holder)
-        if self._taken < self.slots and self._may_start(share):
-            self._take(share)
+        if self._has_free_slot and self._may_start(share):
+            share.running += 1
         else:
             await self._wait(share, deadline, ticket)
         ticket.had_slot = True
@@ -214,7 +223,7 @@ class Gate:
                 share.waiting.remove(one)
                 self._forget(ticket.holder)
             elif not one[1].cancelled() and one[1].exception() is None:  # a slot came as the caller left
-                self._free(ticket.holder, 0.0)
+                self._free(ticket.holder)
             raise
         finally:
             if timer is not None:
@@ -230,7 +239,7 @@ class Gate:
                 raise RuntimeError("this gate is closed")
             worker = self._idle.pop() if self._idle else _Worker(self._name, self._nice)
         except BaseException:
-            self._free(holder, 0.0)
+            self._free(holder)
             raise
         run = _Run(holder, deadline, loop.create_future(), time.monotonic(), worker)
         self._runs.add(run)
@@ -252,15 +261,7 @@ class Gate:
             run.worker.todo.put(None)
         else:
             self._idle.append(run.worker)
-        if run.long:
-            self._long -= 1
-            share = self._shares[run.holder]
-            share.long -= 1
-            share.running -= 1
-            self._forget(run.holder)
-            self._fill()
-        else:
-            self._free(run.holder, time.monotonic() - run.begun)
+        self._free(run.holder, 0.0 if run.long else time.monotonic() - run.begun, long=run.long)
         if error is not None:
             _fail(run.answer, error)
         elif not run.answer.done():
@@ -276,8 +277,6 @@ class Gate:
         _go_behind(run.worker.native_id, LONG_NICE)
         share.used += time.monotonic() - run.begun
         share.long += 1
-        self._long += 1
-        self._taken -= 1
         self._fill()
 
     def _share(self, holder: Holder) -> _Share:
@@ -297,28 +296,25 @@ class Gate:
         """Return whether a holder may start a search, or have one more long: not while it has its share of these."""
         return not self._most_long or share.long < self._most_long_of_one
 
-    def _take(self, share: _Share) -> None:
-        self._taken += 1
-        share.running += 1
-
-    def _free(self, holder: Holder, seconds: float) -> None:
-        self._taken -= 1
+    def _free(self, holder: Holder, seconds: float = 0.0, *, long: bool = False) -> None:
+        """Take a function that has ended off its holder's share, to which so many seconds more are charged."""
         share = self._shares[holder]
         share.running -= 1
+        share.long -= long
         share.used += seconds
         self._forget(holder)
         self._fill()
 
     def _fill(self) -> None:
         """Hand free slots to those that wait and may start; the holder that has used the least time is first."""
-        while self._taken < self.slots:
+        while self._has_free_slot:
             ready = [share for share in self._shares.values() if share.waiting and self._may_start(share)]
             if not ready:
                 return
             share = min(ready, key=lambda one: one.used)
             _, waiter = share.waiting.popleft()
             if not waiter.done():
-                self._take(share)
+                share.running += 1
                 waiter.set_result(None)
 
     def _evict(self, most: int) -> None:

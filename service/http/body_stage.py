@@ -18,7 +18,7 @@ from ..parsing.child import LARGE
 from ..parsing.unpacking import unpack
 from ..telemetry.traces import stage
 from .exchange import Exchange
-from .search_stage import in_slot_of, unless_hung_up
+from .search_stage import unless_hung_up
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
@@ -39,7 +39,7 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
     async with receive(exchange) as data:
         with stage("parse"):
             if len(data) <= LARGE:
-                return reader(data, exchange.services.settings.limits())
+                return reader(data, exchange.services.limits)
             deadline = exchange.job().deadline
             return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data, deadline), deadline)
 
@@ -56,7 +56,7 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
         if body.gzipped:
             packed, max_bytes = len(data), services.settings.max_body_bytes
             call = partial(unpack, data, max_bytes, body.account.take)
-            data = await in_slot_of(services.parsing, exchange, call, exchange.job().deadline)
+            data = await services.parsing.run(call, exchange.job().deadline, exchange.ticket)
             body.data.clear()
             body.account.take(-packed)
         yield data
@@ -68,8 +68,7 @@ async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray, 
     These slots are shared between callers, and are not those of the searches: no search waits for a large body.
     """
     services = exchange.services
-    limits = services.settings.limits()
     if len(data) <= LARGE:
-        return reader(data, limits)
-    call = partial(services.parser.call, reader, data, limits)
-    return await in_slot_of(services.parsing, exchange, call, deadline)
+        return reader(data, services.limits)
+    call = partial(services.parser.call, reader, data, services.limits)
+    return await services.parsing.run(call, deadline, exchange.ticket)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -21,6 +22,7 @@ from .exchange import Exchange
 from .services import Services
 
 T = TypeVar("T")
+NO_DEADLINE = Deadline()
 STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others for some seconds
 
 
@@ -54,13 +56,13 @@ async def looking_up_map(
     if record is not None and lookup.is_cached(record, oriented=oriented):
         yield FoundMap(record, None)
         return
-    record = await _ask_in_time(services, partial(store.record, asked.map_id), deadline)
+    record = await ask_store(services, partial(store.record, asked.map_id), deadline)
     if lookup.is_cached(record, oriented=oriented):
         yield FoundMap(record, None)
         return
     with services.documents.account(exchange.ticket.holder) as account:
         account.take(record.size)
-        stored = await _ask_in_time(services, partial(store.load, asked.map_id), deadline)
+        stored = await ask_store(services, partial(store.load, asked.map_id), deadline)
         account.take(stored.record.size - record.size)  # another revision may have come
         yield FoundMap(stored.record, stored.document)
 
@@ -80,7 +82,7 @@ async def looking_up_maps(
         isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked.maps
     ):
         raise ForeignMapError
-    yield await _ask_in_time(services, partial(services.lookup.find_together, asked.maps, prefix), deadline)
+    yield await ask_store(services, partial(services.lookup.find_together, asked.maps, prefix), deadline)
 
 
 async def index_map(
@@ -107,17 +109,7 @@ async def index_map(
         return await services.indexing.run(call, deadline, exchange.ticket, lambda: False)
 
 
-async def _ask_in_time(services: Services, call: Callable[[], T], deadline: Deadline) -> T:
-    """Return what the store returns, as `ask_store`; raise `DeadlinePassedError` when the deadline passes first."""
-    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
-    try:
-        async with asyncio.timeout(left):
-            return await ask_store(services, call)
-    except TimeoutError:
-        raise DeadlinePassedError from None
-
-
-async def ask_store(services: Services, call: Callable[[], T]) -> T:
+async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:
     """Return what the store returns, in one of its threads.
 
     Raises
@@ -125,9 +117,12 @@ async def ask_store(services: Services, call: Callable[[], T]) -> T:
     StoreError
         When it cannot complete the call, or does not answer in `STORE_SECONDS`. The data may have been written all
         the same.
+    DeadlinePassedError
+        When the deadline passes first.
     """
+    left = math.inf if deadline.at is None else max(0.0, deadline.at - time.monotonic())
     try:
-        async with asyncio.timeout(STORE_SECONDS):
+        async with asyncio.timeout(min(left, STORE_SECONDS)):
             return await services.store_threads.run(call)
     except TimeoutError:
-        raise StoreAwayError from None
+        raise (DeadlinePassedError if left < STORE_SECONDS else StoreAwayError) from None

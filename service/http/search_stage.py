@@ -11,7 +11,6 @@ from starlette.types import Receive
 from association import CancelledError, Deadline
 
 from ..admission.errors import DeadlinePassedError
-from ..admission.gate import Gate
 from ..telemetry.traces import queued
 from .exchange import Exchange
 
@@ -77,11 +76,6 @@ async def in_short_slots(exchange: Exchange, step: Callable[[], bool], deadline:
     except DeadlinePassedError:
         return False
     return True
-
-
-async def in_slot_of(gate: Gate, exchange: Exchange, call: Callable[[], T], deadline: Deadline) -> T:
-    """Run a part of this request, which is short or heeds the deadline, in a slot of another gate."""
-    return await gate.run(call, deadline, exchange.ticket)
 
 
 async def unless_hung_up(receive: Receive, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:

@@ -47,6 +47,7 @@ class Services:
     def __init__(self, settings: Settings) -> None:
         searches = settings.share(settings.searches)
         self.settings = settings
+        self.limits = settings.limits()
         self.metrics = Metrics()
         self.refusals = RefusalTally(self.metrics)
         self.readiness = Readiness()

@@ -14,7 +14,11 @@ if TYPE_CHECKING:
 Fields = Mapping[str, Sequence[str]]
 """Values as text; a field may be there several times."""
 
+Known = dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]]
+"""How fields are read, and their schemas; everything in a form is text."""
+
 POINT = "point"
+MAX_SCANS = 1000
 _TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
 
@@ -28,23 +32,32 @@ def options_of(fields: Fields) -> ImportOptions:
     """
     from formats import ImportOptions, InvalidOptionError
 
-    unknown = [
-        Fault(f"/{name}", f"unknown field; expected one of {', '.join(FIELDS)}")
-        for name in fields
-        if name not in FIELDS
-    ]
-    if unknown:
-        raise InvalidRequestError(unknown)
-    said: dict[str, Any] = {}
-    for name, values in fields.items():
-        try:
-            said["inside" if name == POINT else name] = FIELDS[name][0](values)
-        except ValueError as error:
-            raise InvalidRequestError([Fault(f"/{name}", str(error))]) from None
+    said = read_fields(fields, FIELDS)
     try:
-        return ImportOptions(**said)
+        return ImportOptions(**{"inside" if name == POINT else name: value for name, value in said.items()})
     except InvalidOptionError as error:
         raise InvalidRequestError([Fault(pointer_of(error.argument), error.message)]) from None
+
+
+def read_fields(fields: Fields, known: Known) -> dict[str, Any]:
+    """Return the values of the fields of a form, of which so many are known.
+
+    Raises
+    ------
+    InvalidRequestError
+        When one is not known, is there twice, or cannot be read.
+    """
+    told = f"unknown field; expected one of {', '.join(known)}"
+    unknown = [Fault(f"/{name}", told) for name in fields if name not in known]
+    if unknown:
+        raise InvalidRequestError(unknown)
+    said = {}
+    for name, values in fields.items():
+        try:
+            said[name] = known[name][0](values)
+        except ValueError as error:
+            raise InvalidRequestError([Fault(f"/{name}", str(error))]) from None
+    return said
 
 
 def pointer_of(option: str) -> str:
@@ -101,11 +114,19 @@ def _numbers(text: str, count: int) -> list[float]:
     return numbers
 
 
+def _count(values: Sequence[str]) -> int:
+    text = _text(values)
+    if not (text.isascii() and text.isdecimal() and len(text) < 5 and 1 <= int(text) <= MAX_SCANS):
+        found = "another integer" if text.removeprefix("-").isdecimal() else "text that is no integer"
+        raise ValueError(f"expected an integer from 1 to {MAX_SCANS}, found {found}")
+    return int(text)
+
+
 def _said(what: str) -> dict[str, Any]:
     return {"type": "string", "description": what}
 
 
-FIELDS: dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]] = {
+FIELDS: Known = {
     "units": (_units, _said("of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit")),
     "layers": (_patterns, _said("patterns such as *WALL*, comma separated")),
     POINT: (_places, _said("a free place, `x y` in metres; may be repeated")),
@@ -140,28 +161,29 @@ FIELDS: dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]] = {
         ),
     ),
 }
-"""How the fields of the form of a map are read, and their schemas; everything in a form is text."""
+SCANS_FIELDS: Known = {
+    "topic": (_text, _said("of the scans; left out: the one with most of them")),
+    "max_scans": (
+        _count,
+        _said("greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread"),
+    ),
+}
 
 
-def form_of(files: str, fields: dict[str, Any]) -> dict[str, Any]:
+def _form(files: str, fields: Known) -> dict[str, Any]:
     """Return the schema of a form with files, which are described, and fields."""
     content = {"type": "array", "minItems": 1, "items": {"type": "string", "format": "binary"}, "description": files}
     return {
         "type": "object",
         "required": ["file"],
         "additionalProperties": False,
-        "properties": {"file": content, **fields},
+        "properties": {"file": content, **{name: schema for name, (_, schema) in fields.items()}},
     }
 
 
-MAP_FORM = form_of(
-    "the map and the files that it names, such as a yaml and its picture; a part with a filename is a file",
-    {name: schema for name, (_, schema) in FIELDS.items()},
+MAP_FORM = _form(
+    "the map and the files that it names, such as a yaml and its picture; a part with a filename is a file", FIELDS
 )
-SCANS_FORM = form_of(
-    "a log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file",
-    {
-        "topic": _said("of the scans; left out: the one with most of them"),
-        "max_scans": _said("greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread"),
-    },
+SCANS_FORM = _form(
+    "a log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file", SCANS_FIELDS
 )

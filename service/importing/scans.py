@@ -7,17 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from linefix.documents.errors import Fault, InvalidRequestError
-
-from .fields import Fields
+from .fields import SCANS_FIELDS, read_fields
 from .own_files import Lines, OwnFiles, read_own
 
 if TYPE_CHECKING:
     from formats import LoggedScan
 
-MAX_SCANS = 1000
 DEFAULT_SCANS = 100
-KNOWN = ("topic", "max_scans")
 
 
 def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
@@ -33,11 +29,11 @@ def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
     from .form import read_form
 
     form = read_form(content, content_type)
-    topic, most = _options_of(form.fields)
+    options = read_fields(form.fields, SCANS_FIELDS)
 
     def read(files: OwnFiles) -> Lines:
-        log = read_log(files.map, LogOptions(topic=topic))
-        chosen, count = spread(log, most)
+        log = read_log(files.map, LogOptions(topic=options.get("topic")))
+        chosen, count = spread(log, options.get("max_scans", DEFAULT_SCANS))
         report = asdict(log.report)
         report["files"] = tuple(map(files.as_sent, report["files"]))
         return [{"report": report, "count": count}, {"scans": list(map(scan_json, chosen))}]
@@ -59,26 +55,3 @@ def spread(scans: Iterable[LoggedScan], most: int) -> tuple[list[LoggedScan], in
                 continue
         kept.append(one)
     return kept, count
-
-
-def _options_of(fields: Fields) -> tuple[str | None, int]:
-    """Return the topic and the greatest number of scans."""
-    unknown = [
-        Fault(f"/{name}", f"unknown field; expected one of {', '.join(KNOWN)}") for name in fields if name not in KNOWN
-    ]
-    if unknown:
-        raise InvalidRequestError(unknown)
-    twice = [
-        Fault(f"/{name}", f"expected this field once, found it {len(v)} times")
-        for name, v in fields.items()
-        if len(v) > 1
-    ]
-    if twice:
-        raise InvalidRequestError(twice)
-    topic, most = (next(iter(fields.get(name, ())), None) for name in KNOWN)
-    if most is None:
-        return topic, DEFAULT_SCANS
-    if not (most.isascii() and most.isdecimal() and len(most) < 5 and 1 <= int(most) <= MAX_SCANS):
-        found = "another integer" if most.removeprefix("-").isdecimal() else "text that is no integer"
-        raise InvalidRequestError([Fault("/max_scans", f"expected an integer from 1 to {MAX_SCANS}, found {found}")])
-    return topic, int(most)

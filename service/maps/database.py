@@ -39,8 +39,12 @@ def open_engine(url: URL, *, at_once: bool = False) -> Engine:
         path = file_of(url)
         if path is not None:
             url = url.set(database=path.as_uri()).update_query_dict({"mode": "rw", "uri": "true"})
+        if at_once:  # nothing to begin or to reset: half of the time of a read
+            engine = create_engine(url, connect_args=waits, max_overflow=-1, pool_reset_on_return=None)
+            event.listen(engine, "connect", _prepare_reader)
+            return engine
         engine = create_engine(url, connect_args=waits, max_overflow=-1)
-        event.listen(engine, "connect", _prepare_reader if at_once else _prepare_sqlite)
+        event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         return engine
     # A server that vanished from the network must not hold a thread for ever.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from sqlalchemy import (
@@ -62,6 +63,7 @@ documents = Table(
     Column("document", LargeBinary, nullable=False),
 )
 _SEALED = tuple(column.name for column in maps.columns if column.name not in ("seal", "quarantined"))
+_sealed_values = attrgetter(*_SEALED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +203,7 @@ def row_of(record: MapRecord) -> dict[str, Any]:
 
 def is_sealed(row: Row[Any]) -> bool:
     """Return whether a row of `maps` is as it was written."""
-    return bool(row.seal == _seal(tuple(getattr(row, name) for name in _SEALED)))
+    return bool(row.seal == _seal(_sealed_values(row)))
 
 
 def record_of(row: Row[Any]) -> MapRecord | None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from fastapi import APIRouter, Response
 
@@ -12,7 +12,7 @@ from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
 
 from ...admission.errors import DeadlinePassedError
-from ...importing.bounded import ReadScans, read_apart, read_scans_apart
+from ...importing.bounded import ReadMap, ReadScans, read_apart, read_scans_apart
 from ...importing.errors import TooLateError
 from ...importing.fields import MAP_FORM, SCANS_FORM
 from ...work.importing import answer_import, answer_scans, index_import
@@ -22,9 +22,10 @@ from ..bodies import FORM
 from ..body_stage import parse, receive
 from ..exchange import Exchange, Searching
 from ..openapi import EVERYWHERE, READS_BODY, SEARCHES, problems
-from ..search_stage import in_search_slot, in_slot_of
+from ..search_stage import in_search_slot
 from ..sending import answer
 
+R = TypeVar("R")
 router = APIRouter(tags=["maps"])
 _PROBLEMS = problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES)
 
@@ -44,32 +45,17 @@ def _takes(schema: dict[str, Any]) -> dict[str, Any]:
 )
 async def post_import(exchange: Searching) -> Response:
     """Convert files of another tool to a map, and report conversions and findings; nothing is stored."""
-    async with receive(exchange, form=True) as content:
-        job = exchange.job()
-        work = _work(exchange, content, exchange.request.headers.get("content-type", ""), job)
-        return await _in_time(exchange, work, job)
 
+    async def work(read: ReadMap, job: Job) -> Done:
+        """Index the map in a slot of its own, and check it in one of a search; searches go before both."""
+        job.watch.lap("read")
+        services, deadline = exchange.services, job.deadline
+        line_map = await parse(exchange, partial(read_model, InlineMap), read.map, deadline)
+        indexing = partial(index_import, services.lookup, line_map, deadline)
+        index = await services.indexing.run(indexing, deadline, exchange.ticket)
+        return await in_search_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
 
-async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
-    """Read the files and index the map in slots of their own, and check it in a slot of a search.
-
-    Meanwhile searches have all the slots at the gate.
-    """
-    services, deadline = exchange.services, job.deadline
-    reading = partial(read_apart, content, content_type, services.import_bounds, deadline)
-    read = await in_slot_of(services.importing, exchange, reading, deadline)
-    job.watch.lap("read")
-    line_map = await parse(exchange, partial(read_model, InlineMap), read.map, deadline)
-    indexing = partial(index_import, services.lookup, line_map, deadline)
-    index = await in_slot_of(services.indexing, exchange, indexing, deadline)
-    return await in_search_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
-
-
-async def _in_time(exchange: Exchange, work: Coroutine[Any, Any, Done], job: Job) -> Response:
-    try:
-        return await answer(exchange, work, job.deadline)
-    except DeadlinePassedError:  # it is no search that has not begun
-        raise TooLateError from None
+    return await _import(exchange, read_apart, work)
 
 
 @router.post(
@@ -82,15 +68,24 @@ async def _in_time(exchange: Exchange, work: Coroutine[Any, Any, Done], job: Job
 )
 async def post_scans(exchange: Searching) -> Response:
     """Read some scans of a bag or another log, evenly spread; nothing is stored."""
+
+    async def work(read: ReadScans, job: Job) -> Done:
+        return await in_search_slot(exchange, partial(answer_scans, read, job), job.deadline)
+
+    return await _import(exchange, read_scans_apart, work)
+
+
+async def _import(exchange: Exchange, reader: Callable[..., R], work: Callable[[R, Job], Awaitable[Done]]) -> Response:
+    """Have a form read in a slot of imports, and answer with what `work` makes of its files."""
+    services = exchange.services
+
+    async def whole(reading: Callable[[], R], job: Job) -> Done:
+        return await work(await services.importing.run(reading, job.deadline, exchange.ticket), job)
+
     async with receive(exchange, form=True) as content:
-        job = exchange.job()
-        content_type = exchange.request.headers.get("content-type", "")
-        reading = partial(read_scans_apart, content, content_type, exchange.services.import_bounds, job.deadline)
-        work = _scans(exchange, reading, job)
-        return await _in_time(exchange, work, job)
-
-
-async def _scans(exchange: Exchange, reading: Callable[[], ReadScans], job: Job) -> Done:
-    """Read scans in a slot of imports, and write them in one of searches."""
-    read = await in_slot_of(exchange.services.importing, exchange, reading, job.deadline)
-    return await in_search_slot(exchange, partial(answer_scans, read, job), job.deadline)
+        job, kind = exchange.job(), exchange.request.headers.get("content-type", "")
+        reading = partial(reader, content, kind, services.import_bounds, job.deadline)
+        try:
+            return await answer(exchange, whole(reading, job), job.deadline)
+        except DeadlinePassedError:  # it is no search that has not begun
+            raise TooLateError from None

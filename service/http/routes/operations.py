@@ -49,7 +49,7 @@ async def limits(exchange: Admitted) -> Response:
     settings = exchange.services.settings
     names = [name for name in Limits.model_fields if name in type(settings).model_fields]
     fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
-    held = settings.limits()
+    held = exchange.services.limits
     fixed |= {
         "max_views": held.views,
         "max_beams_together": held.beams_together,

@@ -13,7 +13,7 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
 from ..errors import NotFoundError
-from ..sending import PiecewiseResponse
+from ..sending import JSON, PiecewiseResponse
 
 router = APIRouter(include_in_schema=False)
 ASSETS = {
@@ -33,51 +33,49 @@ _PAGE_POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _PARTS = {"page.js": "text/javascript; charset=utf-8", "page.css": "text/css; charset=utf-8"}
-_REVALIDATED = {"Cache-Control": "no-cache"}  # a newer service has a newer page
+_REVALIDATED = "no-cache"  # a newer service has a newer page
+_OWN = "service.page"
 _EXAMPLE = re.compile(r"[a-z]{1,40}\.json")
 
 
 @cache
-def _content(name: str) -> bytes:
-    """Return a file of the page; once for all who read it, however slowly."""
-    return files("fastapi_offline").joinpath("static", name).read_bytes()
+def _content(package: str, *names: str) -> bytes:
+    """Return a file of a package; once for all who read it, however slowly."""
+    found = files(package).joinpath(*names)
+    if not found.is_file():
+        raise NotFoundError("no file of the page has this name; load the page again")
+    return found.read_bytes()
 
 
-@cache
-def _built(*names: str) -> bytes | None:
-    """Return a file of the package that holds the page; None where there is none."""
-    found = files("service.page").joinpath(*names)
-    return found.read_bytes() if found.is_file() else None
+def _file(kind: str | None, cached: str, package: str, *names: str) -> Response:
+    """Return a file; of `kind` None there is none."""
+    if kind is None:
+        raise NotFoundError("no file of the page has this name; load the page again")
+    return PiecewiseResponse(_content(package, *names), media_type=kind, headers={"Cache-Control": cached})
 
 
 @router.get("/", response_class=HTMLResponse)
 async def start() -> HTMLResponse:
     """Give the page, which shows what the service does."""
-    return _page((_built("built", "index.html") or b"").decode(), _PAGE_POLICY)
+    return _page(_content(_OWN, "built", "index.html").decode(), _PAGE_POLICY)
 
 
 @router.get("/page/{name}")
 async def part_of_page(name: str) -> Response:
     """Give a script or a style of the page."""
-    content = _built("built", name) if name in _PARTS else None
-    if content is None:
-        raise NotFoundError("no file of the page has this name; load the page again")
-    return PiecewiseResponse(content, media_type=_PARTS[name], headers=_REVALIDATED)
+    return _file(_PARTS.get(name), _REVALIDATED, _OWN, "built", name)
 
 
 @router.get("/page/examples/{name}")
 async def example(name: str) -> Response:
     """Give one of the page's examples."""
-    content = _built("examples", name) if _EXAMPLE.fullmatch(name) else None
-    if content is None:
-        raise NotFoundError("no example has this name; load the page again")
-    return PiecewiseResponse(content, media_type="application/json", headers=_REVALIDATED)
+    return _file(JSON if _EXAMPLE.fullmatch(name) else None, _REVALIDATED, _OWN, "examples", name)
 
 
 @router.get("/openapi.json")
 async def contract(request: Request) -> Response:
     """Give the contract; from bytes that all who read it share, however slowly."""
-    return PiecewiseResponse(await request.app.state.contract.body(), media_type="application/json")
+    return PiecewiseResponse(await request.app.state.contract.body(), media_type=JSON)
 
 
 @router.get("/docs", response_class=HTMLResponse)
@@ -105,8 +103,5 @@ def _page(text: str, policy: str) -> HTMLResponse:
 
 @router.get("/docs/assets/{name}")
 async def asset(name: str) -> Response:
-    """Give one of the page's files."""
-    media_type = ASSETS.get(name)
-    if media_type is None:
-        raise NotFoundError("no file of the documentation has this name; load /docs again")
-    return PiecewiseResponse(_content(name), media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})
+    """Give one of the files of Swagger UI."""
+    return _file(ASSETS.get(name), "public, max-age=86400", "fastapi_offline", "static", name)

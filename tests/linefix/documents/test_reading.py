@@ -84,6 +84,20 @@ def test_what_comes_with_each_segment_has_the_limit_of_the_segments(name: str) -
         read_model(AssociateRequest, data, replace(LIMITS, scan_segments=11))
 
 
+@pytest.mark.parametrize(
+    ("count", "key", "fault"), [(256, "m%d", None), (257, "m%d", "found 257"), (9999, "m %d", "9999")]
+)
+def test_weights_of_maps_are_counted_before_they_are_looked_at(count: int, key: str, fault: str | None) -> None:
+    """Class of attack: each malformed id of a map became an error."""
+    weights = {key % number: 0.0 for number in range(count)}
+    body = orjson.dumps({"maps": {"prefix": "m"}, "scan": {"segments": []}, "map_weights": weights})
+    if fault is None:
+        assert read_model(AssociateRequest, body, LIMITS).map_weights == weights
+        return
+    with pytest.raises(InvalidRequestError, match=f"^/map_weights: expected at most 256 items, .*{fault}$"):
+        read_model(AssociateRequest, body, LIMITS)
+
+
 def test_a_batch_is_read_scan_by_scan() -> None:
     scans: list[object] = [{"segments": [ROW]}, {"segments": [[1, 2, 3]]}, {"segments": [ROW] * 3}, 5]
     priors = [None, None, None, {"x": 1, "y": 1, "theta": 0, "radius": "far", "angle": 1}]
