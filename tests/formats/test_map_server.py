@@ -91,20 +91,9 @@ def test_what_borders_on_the_unknown_is_no_wall(tmp_path: Path) -> None:
     assert walls(read_map(write(tmp_path, grid))) == {wall for wall in L_ROOM if wall[0] != 0}
 
 
-def inverted(up: Pixels) -> Pixels:
-    return np.asarray(255 - up, dtype=np.uint8)
-
-
 def percent(up: Pixels) -> Pixels:
     """As map_saver writes mode raw: occupancy in percent, 255 unknown."""
     return np.choose(np.searchsorted([WALL, UNKNOWN, FREE], up), [np.uint8(100), np.uint8(255), np.uint8(0)])
-
-
-def coloured(up: Pixels) -> Pixels:
-    """Unknown is transparent; free and occupied are light and dark greens."""
-    rgba = np.stack([up // 2, up, up // 2, np.where(up == UNKNOWN, 0, 255)], axis=2)
-    rgba[up == FREE, :3] = [240, 255, 240]
-    return rgba.astype(np.uint8)
 
 
 def grey(up: Pixels) -> Pixels:
@@ -115,9 +104,7 @@ def grey(up: Pixels) -> Pixels:
 @pytest.mark.parametrize(
     ("drawn", "change"),
     [
-        (inverted, ("negate: 0", "negate: 1")),
         (percent, ("negate: 0", "negate: 0\nmode: raw")),
-        (coloured, ("negate: 0", "negate: 0\nmode: scale")),
         (grey, ("negate: 0", "negate: 0")),
     ],
 )
