@@ -60,8 +60,11 @@ canvas.addEventListener("pointerdown", (event) => {
 canvas.addEventListener("pointermove", (event) => {
   const [px, py] = [event.offsetX, event.offsetY];
   if (fingers.size > 1 && fingers.has(event.pointerId)) return pinch(event.pointerId, px, py);
+  const touch = event.pointerType === "touch";
+  const [x, y] = toMetres(px, py);
+  if (!touch) cursor.textContent = `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
   if (!drag) {
-    if (event.pointerType !== "touch") point(px, py);
+    if (!touch) point(px, py);
     return;
   }
   const [dx, dy] = [px - drag.x, py - drag.y];
@@ -69,17 +72,14 @@ canvas.addEventListener("pointermove", (event) => {
   if (!drag.moved) return;
   [drag.x, drag.y] = [px, py];
   if (drag.what === "plan") {
-    if (event.pointerType === "touch") return; // it scrolls
+    if (touch) return; // it scrolls
     view.x -= dx / view.scale;
     view.y += dy / view.scale;
     redraw();
     return;
   }
   if (drag.what === "robot") move(dx / view.scale, -dy / view.scale);
-  else {
-    const [x, y] = toMetres(px, py);
-    state.robot = { ...state.robot, theta: Math.atan2(y - state.robot.y, x - state.robot.x) };
-  }
+  else state.robot = { ...state.robot, theta: Math.atan2(y - state.robot.y, x - state.robot.x) };
   askSoon();
 });
 
@@ -87,7 +87,6 @@ canvas.addEventListener("pointermove", (event) => {
 function point(px: number, py: number): void {
   const text = describe(px, py);
   const [x, y] = toMetres(px, py);
-  cursor.textContent = `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
   const pointed = placeAt(x, y);
   if (pointed !== state.pointed) {
     state.pointed = pointed;

@@ -71,6 +71,7 @@ def test_a_robot_is_dragged(page: Page) -> None:
     page.mouse.move(*plan.at(6.75, 4.2))
     page.mouse.down()
     page.mouse.move(*plan.at(4.0, 1.0), steps=4)
+    expect(page.locator("#cursor")).to_have_text("x 4.00 m, y 1.00 m")
     page.mouse.up()
     verdict(page, "usable")
     expect(page.locator("#numbers")).to_contain_text("4.0")
