@@ -258,3 +258,5 @@ def test_an_upgrade_in_a_head_of_two_packets_keeps_its_body(service: RunningServ
     ):
         answer = ask(service, framed[:split], framed[split:] + LAST_LIVEZ)
         assert answer.count(b"HTTP/1.1 200") == 2, answer
+    request = head + b"Content-Length: %d\r\n\r\n" % len(LIVEZ) + LIVEZ  # a body that looks like a request
+    assert statuses(ask(service, request[:split], request[split:] + LAST_LIVEZ)) == [400, 200]
