@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -157,34 +157,33 @@ def cast(walls: ArrayLike, origin: Floats, headings: Floats) -> Floats:
     return np.asarray(np.where(met, along, math.inf).min(axis=1))
 
 
-def laser(
+@dataclass(frozen=True)
+class Turning:
+    """Rotation of a sensor during a scan, rad/s, which the scan states or does not."""
+
+    rate: float = 0.0
+    stated: bool = False
+
+
+def ranges(
     walls: ArrayLike,
     at: RigidTransform,
     seed: int = 0,
     *,
     sigma: float = NOISE,
     bias: float = 0.0,
-    rate: float = 0.0,
-    motion: bool = False,
+    turning: Turning = Turning(),
     reach: float = REACH,
     beams: int = BEAMS,
-) -> LaserScan:
-    """Return what a laser reads all around from `at`, where it is at the first beam; it rotates at `rate` rad/s.
-
-    With `motion` the scan states that rate.
-    """
+) -> Scan:
+    """Return the scan, with its beams, of a laser that reads all around from `at`, where it is at the first beam."""
     rng, step = np.random.default_rng(seed), math.tau / beams
     angles, times = -math.pi + step * np.arange(beams), PERIOD / beams * np.arange(beams)
-    found = cast(walls, np.array([at.x, at.y]), at.theta + rate * times + angles)
-    found = found + bias + rng.normal(0.0, sigma, beams)
-    found[found > reach] = math.inf
-    stated = Motion(PERIOD / beams, 0.0, 0.0, rate) if motion else None
-    return LaserScan(-math.pi, step, found, 0.05, reach, stated)
-
-
-def ranges(walls: ArrayLike, at: RigidTransform, seed: int = 0, **how: Any) -> Scan:
-    """Return the scan of a `laser`, with its beams."""
-    found = vectorize(laser(walls, at, seed, **how))
+    read = cast(walls, np.array([at.x, at.y]), at.theta + turning.rate * times + angles)
+    read = read + bias + rng.normal(0.0, sigma, beams)
+    read[read > reach] = math.inf
+    motion = Motion(PERIOD / beams, 0.0, 0.0, turning.rate) if turning.stated else None
+    found = vectorize(LaserScan(-math.pi, step, read, 0.05, reach, motion))
     return Scan(found.measured, found.viewpoint, found.beams)
 
 
@@ -291,7 +290,7 @@ def drawn(seed: int) -> tuple[Floats, Scan]:
     kind = seed % 6
     if kind < 4:
         room, at = drawn_room(rng)
-        found = ranges(room, at, seed, bias=0.02 * (kind == 1), rate=0.8 * (kind == 2))
+        found = ranges(room, at, seed, bias=0.02 * (kind == 1), turning=Turning(0.8 * (kind == 2)))
         walls = room + np.tile(rng.normal(0.0, 0.02, (len(room), 2)), 2) if kind == 3 else room
         return walls, found if seed % 12 < 6 else without_beams(found)
     return pieces_of(seed)

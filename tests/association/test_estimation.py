@@ -16,6 +16,7 @@ from .scenes import (
     INSIDE,
     ROOM,
     Floats,
+    Turning,
     answer_of,
     carried,
     covariance_in,
@@ -119,7 +120,7 @@ def tried(errors: MapErrors = AS_BUILT, sigma: float | None = None, count: int =
         pytest.param(AS_BUILT, None, {"bias": 0.02}, 0.03, 4.5, id="ranges too long by 2 cm"),
         pytest.param(AS_BUILT, None, {"bias": -0.02}, 0.03, 4.5, id="ranges too short by 2 cm"),
         pytest.param(LEANING, None, {}, 0.03, 4.5, id="map stretched and leaning"),
-        pytest.param(AS_BUILT, None, {"rate": QUARTER, "motion": True}, 0.03, 4.0, id="rotating, stated"),
+        pytest.param(AS_BUILT, None, {"turning": Turning(QUARTER, stated=True)}, 0.03, 4.0, id="rotating, stated"),
     ],
 )
 def test_the_covariance_is_that_of_the_errors(
@@ -139,7 +140,7 @@ def test_the_covariance_is_that_of_the_errors(
 @pytest.mark.parametrize("rate", [QUARTER, -QUARTER])
 def test_a_rotation_during_the_scan_is_estimated(rate: float) -> None:
     """At ten scans a second it is 9 degrees from first to last beam; the pose is that at the first one."""
-    trials = tried(rate=rate, count=20)
+    trials = tried(turning=Turning(rate), count=20)
     found = trials.squared_errors
     assert trials.usable >= 0.85
     assert trials.wrong == 0
@@ -153,10 +154,10 @@ def test_a_rotation_during_the_scan_is_estimated(rate: float) -> None:
 def test_a_rotation_that_is_not_estimated_is_not_usable() -> None:
     """Whatever the estimate is, its heading is not 3 degrees off in a usable answer, at slower rates neither."""
     for degrees in (20.0, 45.0):
-        assert tried(rate=math.radians(degrees), count=25).wrong == 0
+        assert tried(turning=Turning(math.radians(degrees)), count=25).wrong == 0
 
 
-@pytest.mark.parametrize("how", [{}, {"rate": QUARTER, "motion": True}], ids=["at rest", "stated"])
+@pytest.mark.parametrize("how", [{}, {"turning": Turning(QUARTER, stated=True)}], ids=["at rest", "stated"])
 def test_without_a_rotation_none_is_reported(how: dict[str, Any]) -> None:
     for one in tried(count=20, **how).answers:
         assert diagnostics_in(one).turn_rate is None
