@@ -178,9 +178,9 @@ class Child:
         if self._connection is not None:
             self._connection.close()
         if self._process is not None:
-            for _ in range(2):  # a process that ended by itself has its status soon
+            for patience in (END_SECONDS / 5, 10 * END_SECONDS):  # one that ended by itself has its status soon
                 with suppress(subprocess.TimeoutExpired):
-                    status = self._process.wait(END_SECONDS / 5)
+                    status = self._process.wait(patience)
                     break
                 self._kill()
         self._process = self._connection = None
