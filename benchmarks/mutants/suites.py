@@ -60,7 +60,6 @@ SUITES = {
     "service/": Suite(
         (
             "tests/service/test_settings.py",
-            "tests/service/test_database_url.py",
             "tests/service/maps/test_database_file.py",
             "tests/service/process",
             "tests/service/http/test_operations.py",

@@ -1,4 +1,4 @@
-"""Settings: from where, which are refused, and where kernels are kept."""
+"""Settings: from where, which are refused, and the database that a URL names."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from service.database_location import database_url
 from service.serving import unknown_settings
 from service.settings import Settings, SettingsError, read_settings
 
@@ -141,3 +142,15 @@ def test_a_key_is_no_argument(arguments: list[str]) -> None:
     with pytest.raises(SettingsError, match="LINEFIX_KEYS") as caught:
         read_settings(arguments)
     assert "sesame" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["mysql://u:sesame@h/d", "nothing", "postgresql+asyncpg://u:sesame@h/d", ""])
+def test_a_url_that_is_of_no_use(text: str) -> None:
+    with pytest.raises(ValueError, match="expected a URL") as caught:
+        database_url(text)
+    assert "sesame" not in str(caught.value)
+
+
+@pytest.mark.parametrize("begin", ["postgres", "postgresql", "postgresql+psycopg"])
+def test_postgresql_by_any_name(begin: str) -> None:
+    assert database_url(f"{begin}://u@h/d").drivername == "postgresql+psycopg"

@@ -1,4 +1,4 @@
-"""Modules that a start loads and does not load."""
+"""Starts: modules that one loads, and directories with which there is none."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+
+from examples.running import free_port
 
 # Loaded by the first request that needs them.
 LATER = ("cryptography", "ezdxf", "psycopg", "rosbags", "scipy.ndimage")
@@ -29,3 +31,24 @@ print(json.dumps(asyncio.run(start(create_app(Settings(data_dir=sys.argv[1])))))
 def test_a_start_loads_nothing_that_waits_and_then_collects_garbage(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM, str(tmp_path)], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) == {"loaded": [], "collects": True, "frozen": True}
+
+
+def start(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "service", "--port", str(free_port()), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_directory_that_cannot_be_made_ends_the_start(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    ended = start("--data-dir", str(tmp_path / "file" / "maps"), "--workers", "2", "--searches", "2")
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
+    assert str(tmp_path / "file" / "maps") in line
+    assert "--data-dir" in line
+
+
+def test_a_directory_in_which_nothing_can_be_made_ends_the_start() -> None:
+    ended = start("--data-dir", "/proc/self")
+    assert ended.returncode == 1
+    assert "/proc/self" in ended.stderr
+    assert "Traceback" not in ended.stderr
