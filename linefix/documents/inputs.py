@@ -162,14 +162,11 @@ def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:
     """Return how to register."""
     options = asked.options
     return RegistrationOptions(
-        estimator=options.estimator,
-        rotation=options.rotation,
-        k_translation=options.k_translation,
-        k_rotation=options.k_rotation,
         evaluate_at=None if options.evaluate_at is None else transform_of(options.evaluate_at),
         oriented=is_oriented(options.oriented, asked.map.oriented),
         weighting=asked.weighting,
         weights=asked.weights,
+        **{name: getattr(options, name) for name in ("estimator", "rotation", "k_translation", "k_rotation")},
     )
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from association import CancelledError, Deadline, MapIndex
+from association import CancelledError, Deadline
 from linefix.documents.analysis import AnalyzeRequest
 from linefix.documents.parts import InlineMap, is_oriented
 from linefix.documents.requests import CheckRequest
@@ -72,7 +72,12 @@ def begin(operation: Begin, lookup: MapLookup, source: InlineMap | FoundMap, job
 
 def analysis_of(asked: AnalyzeRequest) -> Begin:
     """Return the operation of an analysis."""
-    return lambda lookup, source, deadline: analysis_steps(_index(lookup, source, None, deadline), asked, deadline)
+
+    def begin_analysis(lookup: MapLookup, source: InlineMap | FoundMap, deadline: Deadline) -> Steps:
+        index = lookup.indexed(source, oriented=None, deadline=deadline).index
+        return analysis_steps(index, asked, deadline)
+
+    return begin_analysis
 
 
 def check_of(asked: CheckRequest | None) -> Begin:
@@ -82,7 +87,7 @@ def check_of(asked: CheckRequest | None) -> Begin:
         own = source.record.oriented if isinstance(source, FoundMap) else source.oriented
         # Of its own: an index without directions, which a check may add to it, goes with the check, for the cache does
         # not count it.
-        index = replace(_index(lookup, source, True, deadline))
+        index = replace(lookup.indexed(source, oriented=True, deadline=deadline).index)
         return check_steps(index, asked, deadline, oriented=is_oriented(None, own))
 
     return begin_check
@@ -92,12 +97,8 @@ def update_of(asked: UpdateRequest) -> Begin:
     """Return the operation of an update."""
 
     def begin_update(lookup: MapLookup, source: InlineMap | FoundMap, deadline: Deadline) -> Steps:
-        index = _index(lookup, source, None, deadline)
+        index = lookup.indexed(source, oriented=None, deadline=deadline).index
         old = lookup.document(source) if isinstance(source, FoundMap) else source
         return update_steps(index, old, asked, deadline)
 
     return begin_update
-
-
-def _index(lookup: MapLookup, source: InlineMap | FoundMap, oriented: bool | None, deadline: Deadline) -> MapIndex:
-    return lookup.indexed(source, oriented=oriented, deadline=deadline).index

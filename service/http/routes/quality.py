@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, Any
 
@@ -60,10 +60,7 @@ async def post_analyze_inline(exchange: Searching) -> Response:
 
 
 async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
-    def noted(found: Json) -> Json:
-        return {"places": found["summary"]["places"]}
-
-    job = exchange.job(asked.deadline_ms)
+    job, noted = exchange.job(asked.deadline_ms), {"places": lambda found: found["summary"]["places"]}
     return await _in_turns(exchange, on, analysis_of(asked), job, noted, client_ref=asked.client_ref)
 
 
@@ -103,9 +100,7 @@ async def post_check(exchange: Searching, map_id: MapIdPath) -> Response:
 
 
 async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Response:
-    def noted(found: Json) -> Json:
-        return {"findings": [one["code"] for one in found["findings"]]}
-
+    noted = {"findings": lambda found: [one["code"] for one in found["findings"]]}
     on, client_ref = StoredMap(map_id=map_id), None if asked is None else asked.client_ref
     return await _in_turns(exchange, on, check_of(asked), job, noted, oriented=True, client_ref=client_ref)
 
@@ -120,12 +115,9 @@ async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, jo
 )
 async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
     """Propose changes of a map that scans of several visits show; nothing is stored."""
-
-    def noted(found: Json) -> Json:
-        return {"changes": len(found["changes"])}
-
     asked = await read_request(exchange, UpdateRequest)
     on, job = StoredMap(map_id=map_id), exchange.job(asked.deadline_ms)
+    noted = {"changes": lambda found: len(found["changes"])}
     return await _in_turns(exchange, on, update_of(asked), job, noted, name="based_on", client_ref=asked.client_ref)
 
 
@@ -148,13 +140,13 @@ async def _in_turns(
     on: InlineMap | StoredMap,
     operation: Begin,
     job: Job,
-    noted: Callable[[Json], Json],
+    noted: Mapping[str, Callable[[Json], Any]],
     *,
     oriented: bool | None = None,
     name: str = "map",
     client_ref: Any,
 ) -> Response:
-    """Answer with an operation on a map; `noted` returns fields for the log, `name` is that of the map's reference."""
+    """Answer with an operation on a map; `noted` are fields of the log, `name` is that of the map's reference."""
 
     async def work() -> Done:
         lookup, run = exchange.services.lookup, exchange.services.parse_threads.run
@@ -169,6 +161,7 @@ async def _in_turns(
         assert found is not None  # every step is taken
         job.watch.lap("search")
         sealed = {**found, name: reference, "client_ref": client_ref}
-        return await run(lambda: job.done(sealed, map=reference, **noted(found)))
+        told = {field: read(found) for field, read in noted.items()}
+        return await run(lambda: job.done(sealed, map=reference, **told))
 
     return await answer(exchange, work(), job.deadline)
