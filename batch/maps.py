@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import linefix
-from formats.maps import DRAWINGS
+from formats.reading import DRAWINGS
 
 from .errors import UnreadableMapsError
 

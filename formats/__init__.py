@@ -12,13 +12,11 @@ from .errors import (
 )
 from .line_map import GridPicture, ImportedMap, LineMap
 from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions, scan_json
-from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
-from .poses import StampedPose, write_tum
-from .recordings import LOG_SUFFIXES, read_log
+from .reading import LOG_SUFFIXES, MAP_SUFFIXES, map_of_grid, read_log, read_map
 from .report import ImportReport, Note
-from .writing import write_map
+from .writing import StampedPose, write_map, write_tum
 
 __all__ = [
     "LOG_SUFFIXES",

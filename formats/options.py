@@ -82,24 +82,22 @@ class ImportOptions:
     surface: float | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.units, str) and self.units not in UNITS:
-            raise InvalidOptionError(
-                f"expected one of {', '.join(UNITS)}, or metres per unit, found another name", argument="units"
-            )
-        if isinstance(self.units, int | float) and not 1e-6 <= self.units <= 1e4:
-            raise InvalidOptionError(f"expected 1e-6 to 1e4 metres per unit, found {self.units!r}", argument="units")
-        if self.drawn not in (None, "faces", "centres"):
-            raise InvalidOptionError("expected faces or centres, found another word", argument="drawn")
-        if self.directions not in (None, "drawn", "none"):
-            raise InvalidOptionError("expected drawn or none, found another word", argument="directions")
-        if self.thickness is not None and not 0.0 <= self.thickness <= 10.0:
-            raise InvalidOptionError(f"expected from 0 to 10 m, found {self.thickness!r}", argument="thickness")
-        if self.unknown not in (None, "none") and not (type(self.unknown) is int and 0 <= self.unknown <= 255):
-            raise InvalidOptionError(
-                f"expected none, or a grey value from 0 to 255, found {self.unknown!r}", argument="unknown"
-            )
-        if self.surface is not None and not 0.0 <= self.surface <= 10.0:
-            raise InvalidOptionError(f"expected from 0 to 10 cells, found {self.surface!r}", argument="surface")
+        units = ", ".join(UNITS)
+        known = self.units in UNITS if isinstance(self.units, str) else self.units is None or 1e-6 <= self.units <= 1e4
+        grey = type(self.unknown) is int and 0 <= self.unknown <= 255
+        checks = [
+            ("units", known, f"one of {units}, or 1e-6 to 1e4 metres per unit"),
+            ("drawn", self.drawn in (None, "faces", "centres"), "faces or centres"),
+            ("directions", self.directions in (None, "drawn", "none"), "drawn or none"),
+            ("thickness", self.thickness is None or 0.0 <= self.thickness <= 10.0, "from 0 to 10 m"),
+            ("unknown", self.unknown in (None, "none") or grey, "none, or a grey value from 0 to 255"),
+            ("surface", self.surface is None or 0.0 <= self.surface <= 10.0, "from 0 to 10 cells"),
+        ]
+        for argument, good, what in checks:
+            if not good:
+                value = getattr(self, argument)
+                found = "another name" if isinstance(value, str) else repr(value)
+                raise InvalidOptionError(f"expected {what}, found {found}", argument=argument)
         for one in self.where:
             if not one.partition("=")[0].strip() or "=" not in one:
                 raise InvalidOptionError("expected property=value, found none", argument="where")

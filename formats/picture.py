@@ -88,49 +88,67 @@ def draw_map(
         raise UnsupportedFormatError(
             f"expected a name that ends in .png, found {ending_of(Path(path))}", argument="picture"
         )
-    corners = np.vstack([map.segments.endpoints.reshape(-1, 2), map.points])
-    corners = corners if len(corners) else np.zeros((1, 2))
-    half = DOT if map.points_sigma is None else map.points_sigma
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)
-    width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
-    picture = Image.new("RGB", (max(width, SIZE), height + STRIP), PAPER)
-    draw = ImageDraw.Draw(picture)
     marks, poses, doubtful, lines = list(marks), list(poses), list(doubtful), list(lines)
-
-    def place(x: float, y: float) -> tuple[float, float]:
-        return MARGIN + (x - float(low[0])) * scale, height - MARGIN - (y - float(low[1])) * scale
-
+    sheet = _Sheet.of(map)
     for mark in marks:
-        left, top = place(mark.x - 0.5 * mark.side, mark.y + 0.5 * mark.side)
-        right, bottom = place(mark.x + 0.5 * mark.side, mark.y - 0.5 * mark.side)
-        draw.rectangle([left, top, right - 1, bottom - 1], fill=mark.colour)
-    for (x1, y1, x2, y2), (mx, my), (nx, ny) in zip(
-        map.segments.endpoints, map.segments.midpoints, map.segments.normals, strict=True
-    ):
-        draw.line([place(x1, y1), place(x2, y2)], fill=rgb(WALL), width=2)
-        if map.oriented:
-            x, y = place(mx, my)
-            draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=rgb(MATCHED), width=2)
-    for x, y in map.points.tolist():
-        left, top = place(x - half, y + half)
-        right, bottom = place(x + half, y - half)
-        draw.rectangle([left, top, max(right, left + 1), max(bottom, top + 1)], fill=rgb(WALL))
+        left, top, right, bottom = sheet.square(mark.x, mark.y, 0.5 * mark.side)
+        sheet.draw.rectangle([left, top, right - 1, bottom - 1], fill=mark.colour)
+    _draw_walls(sheet, map)
     for one in lines:
         for x1, y1, x2, y2 in one.ends:
-            _draw_line(draw, place(x1, y1), place(x2, y2), one)
+            _draw_line(sheet.draw, sheet.place(x1, y1), sheet.place(x2, y2), one)
     for pose, colour in [*((pose, rgb(POINT)) for pose in doubtful), *((pose, rgb(USABLE)) for pose in poses)]:
-        x, y = place(pose.x, pose.y)
+        x, y = sheet.place(pose.x, pose.y)
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
-        draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
-        draw.line([(x, y), tip], fill=colour, width=1)
+        sheet.draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
+        sheet.draw.line([(x, y), tip], fill=colour, width=1)
     entries = [("wall", rgb(WALL))] + [("free side", rgb(MATCHED))] * map.oriented
     entries += [("usable pose", rgb(USABLE))] * bool(poses) + [("pose that is not usable", rgb(POINT))] * bool(doubtful)
     painted = {mark.colour for mark in marks}
     entries += [(name.replace("_", " "), rgb(one)) for name, one in VERDICTS.items() if rgb(one) in painted]
     entries += [(one.name, one.colour) for one in lines if len(one.ends)]
-    _annotate(draw, height, scale, entries)
-    picture.save(path, format="PNG")
+    _annotate(sheet.draw, sheet.height, sheet.scale, entries)
+    sheet.picture.save(path, format="PNG")
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """A picture of a map whose lower left corner is at `left` and `bottom`, metres; `scale` in pixels per metre."""
+
+    picture: Image.Image
+    draw: ImageDraw.ImageDraw
+    left: float
+    bottom: float
+    scale: float
+    height: int
+
+    @classmethod
+    def of(cls, map: LineMap) -> _Sheet:
+        corners = np.vstack([map.segments.endpoints.reshape(-1, 2), map.points])
+        corners = corners if len(corners) else np.zeros((1, 2))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)
+        width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
+        picture = Image.new("RGB", (max(width, SIZE), height + STRIP), PAPER)
+        return cls(picture, ImageDraw.Draw(picture), float(low[0]), float(low[1]), scale, height)
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        return MARGIN + (x - self.left) * self.scale, self.height - MARGIN - (y - self.bottom) * self.scale
+
+    def square(self, x: float, y: float, half: float) -> tuple[float, float, float, float]:
+        return *self.place(x - half, y + half), *self.place(x + half, y - half)
+
+
+def _draw_walls(sheet: _Sheet, map: LineMap) -> None:
+    walls = map.segments
+    for (x1, y1, x2, y2), (mx, my), (nx, ny) in zip(walls.endpoints, walls.midpoints, walls.normals, strict=True):
+        sheet.draw.line([sheet.place(x1, y1), sheet.place(x2, y2)], fill=rgb(WALL), width=2)
+        if map.oriented:
+            x, y = sheet.place(mx, my)
+            sheet.draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=rgb(MATCHED), width=2)
+    for x, y in map.points.tolist():
+        left, top, right, bottom = sheet.square(x, y, DOT if map.points_sigma is None else map.points_sigma)
+        sheet.draw.rectangle([left, top, max(right, left + 1), max(bottom, top + 1)], fill=rgb(WALL))
 
 
 def _draw_line(

@@ -1,10 +1,12 @@
-"""Maps out: JSON, GeoJSON, SVG, CSV and DXF, each so that reading it gives the same map."""
+"""Files out: maps as JSON, GeoJSON, SVG, CSV and DXF, each so that reading it gives the same map; poses as TUM."""
 
 from __future__ import annotations
 
 import io
+import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -12,6 +14,8 @@ import numpy as np
 import orjson
 from ezdxf import units
 from ezdxf.filemanagement import new
+
+from registration import RigidTransform
 
 from .drawings.csv_table import COLUMNS
 from .drawings.dxf import FREE_LEFT
@@ -21,6 +25,7 @@ from .errors import UnsupportedFormatError
 from .files import ending_of, name_of
 from .line_map import LineMap
 
+NS = 1_000_000_000
 UNDIRECTED = "WALLS"  # the layer of lines in a DXF whose directions mean nothing
 LINE_WIDTH = 0.03  # m, in an SVG
 MARGIN = 0.5  # m, around an SVG
@@ -102,3 +107,31 @@ WRITERS: dict[str, Callable[[LineMap], bytes]] = {
     ".csv": _csv,
     ".dxf": _dxf,
 }
+
+
+@dataclass(frozen=True, slots=True)
+class StampedPose:
+    """A pose of the robot with its time.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Nanoseconds.
+    pose : RigidTransform
+        map_from_scan.
+    """
+
+    stamp_ns: int
+    pose: RigidTransform
+
+
+def write_tum(poses: Iterable[StampedPose], path: str | os.PathLike[str]) -> int:
+    """Write poses as TUM has them: ``seconds x y z qx qy qz qw`` a line; return how many."""
+    count = 0
+    with Path(path).open("w", encoding="ascii", newline="\n") as file:
+        for one in poses:
+            seconds, rest = divmod(one.stamp_ns, NS)
+            z, w = math.sin(0.5 * one.pose.theta), math.cos(0.5 * one.pose.theta)
+            file.write(f"{seconds}.{rest:09d} {one.pose.x:.9f} {one.pose.y:.9f} 0 0 0 {z:.12f} {w:.12f}\n")
+            count += 1
+    return count

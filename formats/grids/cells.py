@@ -12,7 +12,7 @@ from registration import RigidTransform
 
 from ..line_map import GridPicture
 from ..report import Notes
-from .tuning import BELIEVED, EDGE_REACH, LEVELS
+from . import tuning
 from .unknown import Counts, Flags, UnknownLevels, find_unknown_levels, free_end, given_levels
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, -1
@@ -55,7 +55,7 @@ class Grid:
     def named(self, level: int) -> str:
         """Return what a report calls a level of occupancy."""
         if not self.greys:
-            return f"occupancy {level / (LEVELS - 1):.2f}"
+            return f"occupancy {level / (tuning.LEVELS - 1):.2f}"
         return f"grey value {abs(self.greys[0] - level)}"
 
 
@@ -88,20 +88,20 @@ def classify(grid: Grid, notes: Notes) -> Cells:
     """
     told = ~np.isnan(grid.occupancy)
     levels = np.full(grid.occupancy.shape, -1, dtype=np.int16)
-    levels[told] = np.rint(np.clip(grid.occupancy[told], 0.0, 1.0) * (LEVELS - 1)).astype(np.int16)
-    counts = np.bincount(levels[told].ravel(), minlength=LEVELS)
+    levels[told] = np.rint(np.clip(grid.occupancy[told], 0.0, 1.0) * (tuning.LEVELS - 1)).astype(np.int16)
+    counts = np.bincount(levels[told].ravel(), minlength=tuning.LEVELS)
     found = _unknown_levels(grid, counts)
     known = np.where(found.taken, 0, counts)
     parted = otsu(known)
     kept = told & ~found.taken[levels]  # where levels is -1, told is False
     free, occupied = _by_thresholds(grid, kept, levels, found, counts)
     dark, light = int(known[parted + 1 :].sum()), int(known[: parted + 1].sum())
-    few_occupied = int(occupied.sum()) < BELIEVED * dark
+    few_occupied = int(occupied.sum()) < tuning.BELIEVED * dark
     # Of a gradient few cells may be free; of one light level all are.
-    few_free = int(free.sum()) < BELIEVED * light < int(known[: parted + 1].max(initial=0))
+    few_free = int(free.sum()) < tuning.BELIEVED * light < int(known[: parted + 1].max(initial=0))
     if grid.unknown != () and (few_occupied or few_free):
         occupied, free = kept & (levels > parted), kept & (levels <= parted)
-        above = (parted + 0.5) / (LEVELS - 1)
+        above = (parted + 0.5) / (tuning.LEVELS - 1)
         notes.add_assumed(
             "thresholds",
             f"the thresholds of the file exclude most {'dark' if few_occupied else 'light'} cells; cells are "
@@ -118,7 +118,7 @@ def classify(grid: Grid, notes: Notes) -> Cells:
 def _unknown_levels(grid: Grid, counts: Counts) -> UnknownLevels:
     if grid.unknown is not None:
         return given_levels(grid.unknown)
-    first, last = np.ceil(grid.free_below * (LEVELS - 1)), np.floor(grid.occupied_above * (LEVELS - 1))
+    first, last = np.ceil(grid.free_below * (tuning.LEVELS - 1)), np.floor(grid.occupied_above * (tuning.LEVELS - 1))
     return find_unknown_levels(counts, grid.shades, (int(first), int(last)))
 
 
@@ -142,7 +142,7 @@ def _note_unknown(grid: Grid, found: UnknownLevels, counts: Counts, parted: int,
     """Note which levels are taken as unknown against the thresholds of the file, and which might be and are not."""
     option = "set the option unknown to none, or to the grey value of unknown cells, if this is wrong"
     for spike in found.spikes if grid.unknown is None else ():
-        occupancy = spike / (LEVELS - 1)
+        occupancy = spike / (tuning.LEVELS - 1)
         kind = "free" if occupancy < grid.free_below else "occupied" if occupancy > grid.occupied_above else None
         if kind is not None:
             notes.add_assumed(
@@ -173,7 +173,7 @@ def _edges_decided(cells: Cells, kept: Flags, grid: Grid) -> Cells:
     beside = np.ones((3, 3), dtype=np.bool_)
     for kind in (FREE, OCCUPIED):  # through other such cells, not through a wall
         own = cells == kind
-        edge &= ndimage.binary_dilation(own, beside, EDGE_REACH, mask=between | own)
+        edge &= ndimage.binary_dilation(own, beside, tuning.EDGE_REACH, mask=between | own)
     middle = np.float32(0.5 * (grid.free_below + grid.occupied_above))
     decided = np.where(grid.occupancy > middle, OCCUPIED, FREE)
     return np.where(edge, decided, cells).astype(np.int8)

@@ -17,22 +17,10 @@ from vectorization import VectorizationOptions, vectorize
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_POINTS, MAX_SEGMENTS
 from ..report import Notes
+from . import tuning
 from .cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
-from .tuning import (
-    BAND_SHARE,
-    CONTOUR_SIGMA,
-    CORNER_REACH,
-    COVERED,
-    DRAWN,
-    GREATEST_BAND,
-    LEAST_DEPTH,
-    LEAST_LENGTH,
-    LEAST_POINTS,
-    LEAST_STEPS,
-    LONGEST_CONTOUR,
-    THIN,
-)
 
+KINDS = {"free": FREE, "occupied": OCCUPIED, "unknown": UNKNOWN}
 DECIDED = ("thresholds", "unknown_grey")  # notes on how cells were told apart
 
 WHY_DRAWN = "because walls have a constant thickness, as in a drawn grid; set the option surface for another value"
@@ -88,49 +76,56 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
         When there are too many segments.
     """
     cells = classify(grid, notes)
-    for name_of_kind, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN)):
-        count = int((cells == kind).sum())
-        notes.add_read(f"{name_of_kind}_cells", f"{name_of_kind} cells" if count else f"no {name_of_kind} cell", count)
+    counts = {word: int((cells == kind).sum()) for word, kind in KINDS.items()}
+    for word, count in counts.items():
+        notes.add_read(f"{word}_cells", f"{word} cells" if count else f"no {word} cell", count)
     depth, drawn = surface_depth(cells) if surface is None else (surface, False)
-    options = VectorizationOptions(
-        sigma=CONTOUR_SIGMA * grid.resolution, min_length=max(1e-3, LEAST_LENGTH * grid.resolution)
-    )
-    found: list[Floats] = []
-    fronts: list[Floats] = []
-    for contour in wall_contours(cells):
-        lines = vectorize(contour * grid.resolution, options, viewpoint=None).measured
-        if len(lines):
-            fronts.append(lines.segments.endpoints / grid.resolution)
-            found.append(lines.segments.endpoints - np.tile(lines.segments.normals * depth * grid.resolution, 2))
-        if sum(map(len, found)) > MAX_SEGMENTS:
-            raise TooLargeError(
-                f"expected a grid of at most {MAX_SEGMENTS} segments, found more; crop it, or remove noise",
-                argument=name,
-            )
-    if not found:
-        counts = ", ".join(
-            f"{int((cells == kind).sum())} {word}"
-            for word, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN))
-        )
+    fronts, normals = _fronts(cells, grid, name)
+    if not len(fronts):
+        told = ", ".join(f"{count} {word}" for word, count in counts.items())
         said = "".join(f"; {note.message}" for code, note in notes.assumed.items() if code in DECIDED)
         raise MalformedFileError(
-            f"no wall found: expected a straight border between free and occupied cells, found {counts} cells{said}",
+            f"no wall found: expected a straight border between free and occupied cells, found {told} cells{said}",
             argument=name,
         )
     why = "as an option states" if surface is not None else WHY_DRAWN if drawn else WHY_MAPPED
     notes.add_assumed(
         "surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells, {why}"
     )
-    points = _outside_of(np.vstack(fronts), cells)
+    walls = fronts - np.tile(normals * depth * grid.resolution, 2)
+    points = _points(fronts / grid.resolution, cells, notes)
+    placed = grid.origin.apply(walls.reshape(-1, 2))
+    return Faces(Segments.from_array(placed.reshape(-1, 4)), grid.origin.apply(points * grid.resolution), depth)
+
+
+def _fronts(cells: Cells, grid: Grid, name: str) -> tuple[Floats, Floats]:
+    """Return the lines along the fronts of the occupied cells, (n, 4), metres, and their normals, (n, 2)."""
+    size = grid.resolution
+    options = VectorizationOptions(sigma=tuning.CONTOUR_SIGMA * size, min_length=max(1e-3, tuning.LEAST_LENGTH * size))
+    fronts, normals, count = [np.zeros((0, 4))], [np.zeros((0, 2))], 0
+    for contour in wall_contours(cells):
+        lines = vectorize(contour * size, options, viewpoint=None).measured.segments
+        fronts.append(lines.endpoints)
+        normals.append(lines.normals)
+        count += len(lines)
+        if count > MAX_SEGMENTS:
+            raise TooLargeError(
+                f"expected a grid of at most {MAX_SEGMENTS} segments, found more; crop it, or remove noise",
+                argument=name,
+            )
+    return np.concatenate(fronts), np.concatenate(normals)
+
+
+def _points(fronts: Floats, cells: Cells, notes: Notes) -> Floats:
+    """Return the occupied cells that are on no wall, (n, 2), in cells; none of more than a map may have."""
+    points = _outside_of(fronts, cells)
     if len(points) > MAX_POINTS:
-        notes.add_dropped(
-            "points", f"cells that are on no wall, more than the {MAX_POINTS} points of a map", len(points)
-        )
-        points = np.zeros((0, 2))
-    elif len(points):
+        what = f"cells that are on no wall, more than the {MAX_POINTS} points of a map"
+        notes.add_dropped("points", what, len(points))
+        return np.zeros((0, 2))
+    if len(points):
         notes.add_read("points", "occupied cells that are on no wall", len(points))
-    placed = grid.origin.apply(points * grid.resolution)
-    return Faces(Segments.from_array(_placed(np.vstack(found), grid)), placed, depth)
+    return points
 
 
 def _outside_of(fronts: Floats, cells: Cells) -> Floats:
@@ -150,7 +145,7 @@ def _outside_of(fronts: Floats, cells: Cells) -> Floats:
     first = np.repeat(np.cumsum(counts) - counts, counts)
     along = ((np.arange(len(of_front)) - first) / (counts[of_front] - 1))[:, None]
     on_fronts = (1.0 - along) * fronts[of_front, :2] + along * fronts[of_front, 2:]
-    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=COVERED)
+    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
     return np.asarray(middles[np.isinf(away)])
 
 
@@ -163,13 +158,14 @@ def surface_depth(cells: Cells) -> tuple[float, bool]:
     """
     bands = [_bands(np.rot90(cells, k)) for k in range(4)]
     every = np.concatenate([thickness[thickness > 0] for thickness, _ in bands])
-    usual = float(np.median(every)) if len(every) >= LEAST_STEPS else 0.0
-    if usual > THIN:  # else a cell more or less is no evidence, or the surface is in the middle of the only cell
+    usual = float(np.median(every)) if len(every) >= tuning.LEAST_STEPS else 0.0
+    if usual > tuning.THIN:  # else a cell more or less is no evidence, or the surface is in the middle of the only cell
         steps = np.concatenate([_steps(thickness) for thickness, _ in bands])
-        if float((steps <= (1 if usual > 2.0 * THIN else 0)).mean()) >= DRAWN:
+        if float((steps <= (1 if usual > 2.0 * tuning.THIN else 0)).mean()) >= tuning.DRAWN:
             return 0.0, True
     one_sided = np.concatenate([thickness[behind] for thickness, behind in bands])
-    return (max(LEAST_DEPTH, BAND_SHARE * float(np.median(one_sided))) if len(one_sided) else LEAST_DEPTH), False
+    behind_front = tuning.BAND_SHARE * float(np.median(one_sided)) if len(one_sided) else 0.0
+    return max(tuning.LEAST_DEPTH, behind_front), False
 
 
 def _bands(cells: Cells) -> tuple[NDArray[np.int8], Flags]:
@@ -178,11 +174,11 @@ def _bands(cells: Cells) -> tuple[NDArray[np.int8], Flags]:
     The second array tells which bands have an unknown cell behind, and so are seen from one side. Thicker bands than
     `GREATEST_BAND` are as thick as that.
     """
-    padded = np.pad(cells, ((0, 0), (1, GREATEST_BAND + 1)), constant_values=UNKNOWN)
+    padded = np.pad(cells, ((0, 0), (1, tuning.GREATEST_BAND + 1)), constant_values=UNKNOWN)
     width = cells.shape[1]
     front = (padded[:, :width] == FREE) & (padded[:, 1 : width + 1] == OCCUPIED)
     thickness, behind = np.zeros(front.shape, dtype=np.int8), np.zeros(front.shape, dtype=np.bool_)
-    for k in range(1, GREATEST_BAND + 1):
+    for k in range(1, tuning.GREATEST_BAND + 1):
         at = padded[:, k : k + width]
         behind |= front & (thickness == k - 1) & (k > 1) & (at == UNKNOWN)
         thickness += front & (thickness == k - 1) & (at == OCCUPIED)
@@ -225,9 +221,9 @@ def wall_contours(cells: Cells) -> Iterator[Floats]:
             start = sharpest_corner(contour) if wall.all() else int(np.argmin(wall))
             contour, wall = np.roll(contour, -start, axis=0), np.roll(wall, -start)
         places = contour[wall] - 0.5
-        for k in range(0, len(places), LONGEST_CONTOUR):
-            if len(places) - k >= LEAST_POINTS:
-                yield places[k : k + LONGEST_CONTOUR]
+        for k in range(0, len(places), tuning.LONGEST_CONTOUR):
+            if len(places) - k >= tuning.LEAST_POINTS:
+                yield places[k : k + tuning.LONGEST_CONTOUR]
 
 
 def sharpest_corner(contour: Floats) -> int:
@@ -240,8 +236,8 @@ def sharpest_corner(contour: Floats) -> int:
     contour : (n, 2)
         Without the first point repeated.
     """
-    before = np.roll(contour, 1, axis=0) - np.roll(contour, 1 + CORNER_REACH, axis=0)
-    after = np.roll(contour, -CORNER_REACH, axis=0) - contour
+    before = np.roll(contour, 1, axis=0) - np.roll(contour, 1 + tuning.CORNER_REACH, axis=0)
+    after = np.roll(contour, -tuning.CORNER_REACH, axis=0) - contour
     products = np.einsum("ij,ij->i", before, after)
     scale = np.hypot(*before.T) * np.hypot(*after.T)
     return int(np.argmin(np.divide(products, scale, out=np.ones(len(contour)), where=scale > 0.0)))
@@ -252,9 +248,3 @@ def _borders_on_wall(contour: Floats, padded: Cells) -> Flags:
     low, high = np.floor(contour).astype(np.intp), np.ceil(contour).astype(np.intp)
     wall: Flags = (padded[low[:, 1], low[:, 0]] == OCCUPIED) | (padded[high[:, 1], high[:, 0]] == OCCUPIED)
     return wall
-
-
-def _placed(endpoints: Floats, grid: Grid) -> Floats:
-    """Return endpoints in the map frame."""
-    placed: Floats = grid.origin.apply(endpoints.reshape(-1, 2)).reshape(-1, 4)
-    return placed

@@ -7,19 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .tuning import (
-    DARKER_SHARE,
-    DARKER_SIDES,
-    DARKEST_UNKNOWN,
-    LEAST_CELLS,
-    LEVELS,
-    NOISE_RATIO,
-    NOISE_REACH,
-    SHADE_REACH,
-    SPIKE_RATIO,
-    SPIKE_SHARE,
-    SPIKE_WINDOW,
-)
+from . import tuning
 
 Counts = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -61,10 +49,10 @@ def find_unknown_levels(counts: Counts, shades: tuple[int, ...], between: tuple[
     """
     usual = sorted({peak for shade in shades if (peak := _peak_near(counts, shade)) is not None})
     lighter, darker = np.cumsum(counts) - counts, int(counts.sum()) - np.cumsum(counts)
-    spikes = [k for k in usual if lighter[k] >= LEAST_CELLS and darker[k] >= LEAST_CELLS]
+    spikes = [k for k in usual if lighter[k] >= tuning.LEAST_CELLS and darker[k] >= tuning.LEAST_CELLS]
     if not spikes and (spike := find_unknown_level(counts, between)) is not None:
         spikes = [spike]
-    taken = np.zeros(LEVELS, dtype=np.bool_)
+    taken = np.zeros(tuning.LEVELS, dtype=np.bool_)
     for spike in spikes:
         taken |= _with_noise(counts, spike)
     refused = tuple(k for k in usual if k not in spikes)
@@ -73,7 +61,7 @@ def find_unknown_levels(counts: Counts, shades: tuple[int, ...], between: tuple[
 
 def given_levels(levels: tuple[int, ...]) -> UnknownLevels:
     """Return the levels that the caller says stand for unknown cells; none where there are no unknown cells."""
-    taken = np.zeros(LEVELS, dtype=np.bool_)
+    taken = np.zeros(tuning.LEVELS, dtype=np.bool_)
     taken[list(levels)] = True
     return UnknownLevels(taken, levels)
 
@@ -106,40 +94,40 @@ def find_unknown_level(counts: Counts, between: tuple[int, int] = (1, 0)) -> int
     """
     total = int(counts.sum())
     beside = np.maximum(np.r_[0, counts[:-1]], np.r_[counts[1:], 0])
-    stands_out = (counts > SPIKE_SHARE * total) & (counts > SPIKE_RATIO * beside)
+    stands_out = (counts > tuning.SPIKE_SHARE * total) & (counts > tuning.SPIKE_RATIO * beside)
     spikes = np.flatnonzero(stands_out)
     if len(spikes) < 2:
         return None
     free = int(counts[spikes[0]])
     darker = total - np.cumsum(counts)
     # Walls around a large hall are few cells: their number grows with the side of the free area, not with the area.
-    least = max(float(LEAST_CELLS), min(DARKER_SHARE * free, DARKER_SIDES * free**0.5))
+    least = max(float(tuning.LEAST_CELLS), min(tuning.DARKER_SHARE * free, tuning.DARKER_SIDES * free**0.5))
     fit = [
         k
         for k in spikes[1:]
-        if k <= DARKEST_UNKNOWN * (LEVELS - 1)
-        and (darker[k] >= least or (between[0] <= k <= between[1] and darker[k] >= LEAST_CELLS))
+        if k <= tuning.DARKEST_UNKNOWN * (tuning.LEVELS - 1)
+        and (darker[k] >= least or (between[0] <= k <= between[1] and darker[k] >= tuning.LEAST_CELLS))
     ]
     return int(max(fit, key=lambda k: counts[k])) if fit else None
 
 
 def _peak_near(counts: Counts, shade: int) -> int | None:
     """Return the level next to a shade that stands out of all others around it; None where none does."""
-    low, high = max(0, shade - SHADE_REACH), min(LEVELS, shade + SHADE_REACH + 1)
+    low, high = max(0, shade - tuning.SHADE_REACH), min(tuning.LEVELS, shade + tuning.SHADE_REACH + 1)
     peak = low + int(np.argmax(counts[low:high]))
-    around = counts[max(0, peak - SPIKE_WINDOW) : peak + SPIKE_WINDOW + 1]
+    around = counts[max(0, peak - tuning.SPIKE_WINDOW) : peak + tuning.SPIKE_WINDOW + 1]
     others = np.sort(around)[:-1]
-    stands_out = counts[peak] >= LEAST_CELLS and counts[peak] > SPIKE_RATIO * int(others[-1])
+    stands_out = counts[peak] >= tuning.LEAST_CELLS and counts[peak] > tuning.SPIKE_RATIO * int(others[-1])
     return peak if stands_out else None
 
 
 def _with_noise(counts: Counts, spike: int) -> Flags:
     """Return the level of a spike, and those around it where a compression spread its cells."""
-    taken = np.zeros(LEVELS, dtype=np.bool_)
+    taken = np.zeros(tuning.LEVELS, dtype=np.bool_)
     taken[spike] = True
-    distance = np.abs(np.arange(LEVELS) - spike)
-    near = int(counts[(distance > 0) & (distance <= NOISE_REACH)].sum())
-    far = int(counts[(distance > NOISE_REACH) & (distance <= 3 * NOISE_REACH)].sum())
-    if near > NOISE_RATIO * far:  # a gradient has as many cells farther from the spike
-        taken[distance <= 2 * NOISE_REACH] = True
+    distance = np.abs(np.arange(tuning.LEVELS) - spike)
+    near = int(counts[(distance > 0) & (distance <= tuning.NOISE_REACH)].sum())
+    far = int(counts[(distance > tuning.NOISE_REACH) & (distance <= 3 * tuning.NOISE_REACH)].sum())
+    if near > tuning.NOISE_RATIO * far:  # a gradient has as many cells farther from the spike
+        taken[distance <= 2 * tuning.NOISE_REACH] = True
     return taken

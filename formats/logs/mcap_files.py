@@ -9,6 +9,7 @@ import heapq
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
+from io import BufferedReader, FileIO
 from itertools import count
 from pathlib import Path
 
@@ -34,30 +35,15 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 MAGIC = b"\x89MCAP0\r\n"
 
 
-class _WholeReads:
+class _WholeReads(BufferedReader):
     """A file whose reads return all the bytes that were requested, or raise `EndOfFile`."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("rb")
-
-    def read(self, size: int = -1) -> bytes:
+    def read(self, size: int | None = -1) -> bytes:
         """Return `size` bytes."""
-        data = self._file.read(size)
-        if len(data) < size:
+        data = super().read(size)
+        if len(data) < (size or 0):
             raise EndOfFile
         return data
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        """Set the position."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the position."""
-        return self._file.tell()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 class McapFile:
@@ -85,7 +71,7 @@ class McapFile:
         self._cut = False
         self._broken: set[int] = set()  # chunks, by where they begin in the file
         self._limit = path.stat().st_size
-        self._file = _WholeReads(path)
+        self._file = _WholeReads(FileIO(path))
         try:
             self._begin()
             summary = self._summary()
@@ -145,7 +131,7 @@ class McapFile:
         """Return the summary; None where it does not name all that has to be known of the messages."""
         self._file.seek(0)
         try:
-            found = SeekingReader(self._file, record_size_limit=self._limit).get_summary()  # type: ignore[arg-type]
+            found = SeekingReader(self._file, record_size_limit=self._limit).get_summary()
         except BROKEN:
             return None
         if found is None or found.statistics is None:
@@ -190,7 +176,7 @@ class McapFile:
     def _records(self) -> Iterator[McapRecord]:
         """Yield the records from the beginning to the end, or to where they cannot be read any further."""
         self._file.seek(0)
-        reader = StreamReader(self._file, emit_chunks=True, record_size_limit=self._limit)  # type: ignore[arg-type]
+        reader = StreamReader(self._file, emit_chunks=True, record_size_limit=self._limit)
         self._cut = True
         try:
             for record in reader.records:
@@ -225,10 +211,7 @@ class McapFile:
 
     def _chunk_at(self, index: ChunkIndex) -> list[McapRecord]:
         self._file.seek(index.chunk_start_offset)
-        reader = StreamReader(
-            self._file,  # type: ignore[arg-type]
-            skip_magic=True, emit_chunks=True, record_size_limit=self._limit,
-        )  # fmt: skip
+        reader = StreamReader(self._file, skip_magic=True, emit_chunks=True, record_size_limit=self._limit)
         try:
             chunk = next(iter(reader.records))
         except (*BROKEN, StopIteration):

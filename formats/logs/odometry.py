@@ -39,6 +39,8 @@ class Odometry:
         Frame that the poses are in.
     source : str
         ``tf``, or the topic of the Odometry messages.
+    moving : tuple of Track
+        The transforms that are not fixed.
     """
 
     outer: str
@@ -46,7 +48,7 @@ class Odometry:
     _tree: Transforms
     _path: Sequence[str]  # from the frame outwards: to `outer`, or to the frame that the messages are of
     _messages: Track | None = None
-    _moving: tuple[Track, ...] = field(default=(), repr=False)
+    moving: tuple[Track, ...] = field(default=(), repr=False)
 
     @classmethod
     def of_tree(cls, tree: Transforms, path: Sequence[str]) -> Odometry:
@@ -62,12 +64,7 @@ class Odometry:
     @property
     def stands(self) -> bool:
         """True where all poses are equal."""
-        return not self._moving
-
-    @property
-    def moving(self) -> tuple[Track, ...]:
-        """The transforms that are not fixed."""
-        return self._moving
+        return not self.moving
 
     def known(self, stamp: int, received: int) -> Known | None:
         """Return outer_from_frame of something with a stamp and a time of reception, nanoseconds; None if unknown."""
@@ -89,7 +86,7 @@ class Odometry:
         received : int
             When the scan was received.
         """
-        windows = [track.window(begin, end, received) for track in self._moving]
+        windows = [track.window(begin, end, received) for track in self.moving]
         known = [one for one in windows if one is not None]
         if len(known) < len(windows):
             return None
@@ -105,7 +102,7 @@ class Odometry:
 
     def note_doubts(self, notes: Notes) -> None:
         """Note where odometry contradicts itself, is missing, or begins again."""
-        for track in self._moving:
+        for track in self.moving:
             topics = " and ".join(shown(one) for one in sorted(track.topics))
             if track.jumps:
                 notes.add_assumed(

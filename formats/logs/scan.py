@@ -94,6 +94,7 @@ class LoggedScan:
         return self.stamp_ns * 1e-9
 
 
+@dataclass(slots=True, eq=False)
 class Log:
     """The scans of a log. Each iteration reads the file again, so a long log is never in memory as a whole.
 
@@ -104,14 +105,11 @@ class Log:
         Number of scan messages, if the log has it.
     """
 
-    def __init__(
-        self, format: str, name: str, scans: Callable[[Notes], Iterator[LoggedScan]], count: int | None = None
-    ) -> None:
-        self.format = format
-        self.name = name
-        self.count = count
-        self._scans = scans
-        self._notes = Notes()
+    format: str
+    name: str
+    _scans: Callable[[Notes], Iterator[LoggedScan]]
+    count: int | None = None
+    _notes: Notes = field(default_factory=Notes)
 
     def __iter__(self) -> Iterator[LoggedScan]:
         self._notes = Notes()

@@ -14,18 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .tuning import (
-    CLOCKS_APART_NS,
-    FASTEST,
-    JITTER,
-    MOST_GAP_NS,
-    MOST_PERIODS,
-    PART_NS,
-    REFIXED,
-    STALE_NS,
-    USUAL_GAP_NS,
-    WINDOW_NS,
-)
+from . import tuning
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +56,7 @@ class Jump:
 
     def __str__(self) -> str:
         seconds = (self.end - self.begin) / NS
-        turned = f" and {math.degrees(self.angle):.0f} degrees" if self.angle > JITTER else ""
+        turned = f" and {math.degrees(self.angle):.0f} degrees" if self.angle > tuning.JITTER else ""
         return f"{self.distance:.2f} m{turned} within {seconds:.3f} s at stamp {self.begin / NS:.3f}"
 
 
@@ -137,8 +126,8 @@ class _Part:
     def known(self, stamp: int, number: int) -> Known | None:
         """Return the value at a time as odometry."""
         matrix = self.near(stamp, 0)
-        near = bisect.bisect_left(self.jumps, stamp - MOST_GAP_NS, key=lambda one: one.end)
-        if matrix is None or (near < len(self.jumps) and self.jumps[near].begin <= stamp + MOST_GAP_NS):
+        near = bisect.bisect_left(self.jumps, stamp - tuning.MOST_GAP_NS, key=lambda one: one.end)
+        if matrix is None or (near < len(self.jumps) and self.jumps[near].begin <= stamp + tuning.MOST_GAP_NS):
             return None
         at = min(bisect.bisect_left(self.stamps, stamp), len(self.stamps) - 1)
         return Known(matrix, (number, self._stretches[at]), self._unknown[at])
@@ -189,10 +178,10 @@ class Track:
         if self.static:
             if static and self._parts:
                 before = self._parts[-1].matrices[-1]
-                self.refixed = self.refixed or not np.allclose(before, matrix, rtol=0.0, atol=REFIXED)
+                self.refixed = self.refixed or not np.allclose(before, matrix, rtol=0.0, atol=tuning.REFIXED)
             self._parts.clear()
         self.static = static
-        if not self._parts or stamp < self._parts[-1].stamps[-1] - PART_NS:
+        if not self._parts or stamp < self._parts[-1].stamps[-1] - tuning.PART_NS:
             self._dropped += len(self._parts) if self.most else 0
             self._parts[:] = [_Part()] if self.most else [*self._parts, _Part()]
         first = self._parts[0].matrices
@@ -202,7 +191,7 @@ class Track:
         if self.most:
             self._parts[-1].trim(self.most)
 
-    def at(self, stamp: int, received: int | None = None, hold: int = STALE_NS) -> Floats | None:
+    def at(self, stamp: int, received: int | None = None, hold: int = tuning.STALE_NS) -> Floats | None:
         """Return the value at a time, nanoseconds; None where it is not known.
 
         Parameters
@@ -229,7 +218,7 @@ class Track:
             matrix = self.at(stamp, received)
             return None if matrix is None else Known(matrix, (self._dropped + number, 0))
         part = self._parts[number]
-        if received is not None and abs(received - stamp - part.latency(stamp)) > CLOCKS_APART_NS:
+        if received is not None and abs(received - stamp - part.latency(stamp)) > tuning.CLOCKS_APART_NS:
             return None
         return part.known(stamp, self._dropped + number)
 
@@ -282,7 +271,11 @@ class Track:
         if first == last:
             first, last = max(0, first - 1), min(len(stamps) - 1, last + (first == 0))
         a, b = stamps[first], stamps[last]
-        if not 0 < b - a <= WINDOW_NS + end - begin or a > end + WINDOW_NS or b < begin - WINDOW_NS:
+        if (
+            not 0 < b - a <= tuning.WINDOW_NS + end - begin
+            or a > end + tuning.WINDOW_NS
+            or b < begin - tuning.WINDOW_NS
+        ):
             return None
         within = max(a, begin), min(b, end)
         return within if 2 * (within[1] - within[0]) >= end - begin else (a, b)
@@ -305,7 +298,7 @@ def between(a: Floats, b: Floats, fraction: float) -> Floats:
 
 def jump_between(begin: int, end: int, distance: float, angle: float) -> Jump | None:
     """Return a motion (m, rad) between two times, nanoseconds, if no robot moves so fast."""
-    possible = JITTER + FASTEST * max(0, end - begin) / NS
+    possible = tuning.JITTER + tuning.FASTEST * max(0, end - begin) / NS
     return None if distance <= possible and abs(angle) <= possible else Jump(begin, end, distance, abs(angle))
 
 
@@ -319,5 +312,5 @@ def _jump(stamps: Sequence[int], matrices: Sequence[Floats], before: int, after:
 def _most_gap(stamps: Sequence[int], k: int) -> float:
     """Return how far a value may be from the one before, nanoseconds: some periods, within limits."""
     periods = sorted(stamps[j] - stamps[j - 1] for j in range(max(1, k - PERIODS), k))
-    usual = MOST_PERIODS * periods[len(periods) // 2] if periods else MOST_GAP_NS
-    return min(MOST_GAP_NS, max(USUAL_GAP_NS, usual))
+    usual = tuning.MOST_PERIODS * periods[len(periods) // 2] if periods else tuning.MOST_GAP_NS
+    return min(tuning.MOST_GAP_NS, max(tuning.USUAL_GAP_NS, usual))

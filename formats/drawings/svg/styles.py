@@ -14,23 +14,10 @@ from ...limits import MAX_STYLE_RULES
 from .xml import kind_of
 
 # Those by which it is decided what is drawn, and where.
-PROPERTIES = frozenset(
-    {
-        "display",
-        "visibility",
-        "opacity",
-        "stroke",
-        "stroke-opacity",
-        "stroke-width",
-        "fill",
-        "fill-opacity",
-        "transform",
-        "transform-origin",
-        "transform-box",
-        "clip-path",
-        "mask",
-    }
-)
+PROPERTIES = frozenset((
+    "display", "visibility", "opacity", "stroke", "stroke-opacity", "stroke-width", "fill", "fill-opacity",
+    "transform", "transform-origin", "transform-box", "clip-path", "mask",
+))  # fmt: skip
 OF_CSS_ALONE = frozenset({"translate", "rotate", "scale"})  # attributes of these names are something else
 CACHED = 10_000  # texts of style attributes, which repeat
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
 import svgelements
 
 from ...errors import TooLargeError
@@ -185,15 +186,11 @@ class Visible:
         if math.isnan(self._whole.width + self._whole.height):
             return False
         (points, _), *_ = [*SHAPES["rect"](Measure(element, place.viewport, self._drawing.name)), ([(0.0, 0.0)], False)]
-        corners = [place.matrix.point_in_matrix_space(point) for point in points]
-        x, y = [float(corner[0]) for corner in corners], [float(corner[1]) for corner in corners]
-        whole, slack = self._whole, WHOLE * max(self._whole.width, self._whole.height)
-        return (
-            min(x) <= whole.x + slack
-            and max(x) >= whole.x + whole.width - slack
-            and min(y) <= whole.y + slack
-            and max(y) >= whole.y + whole.height - slack
-        )
+        corners = np.array([tuple(place.matrix.point_in_matrix_space(point)) for point in points], dtype=np.float64)
+        low, size = np.array([self._whole.x, self._whole.y]), np.array([self._whole.width, self._whole.height])
+        slack = WHOLE * size.max()
+        begins, ends = corners.min(axis=0) <= low + slack, corners.max(axis=0) >= low + size - slack
+        return bool(begins.all() and ends.all())
 
     def _viewport_of_root(self) -> Viewport:
         measure = Measure(self._root, Viewport(), self._drawing.name)

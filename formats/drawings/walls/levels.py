@@ -79,13 +79,15 @@ def _by_height(lines: list[Polyline], metres: float) -> list[Polyline]:
 def _differ(lines: list[Polyline], names: Iterable[str], metres: float, *, named: bool) -> bool:
     """Tell whether floors are drawn unlike; those of heights may be a part of another."""
     drawn = [
-        {tuple(row) for one in lines if name in one.levels for row in _keys(one, metres).tolist()} for name in names
+        {tuple(row) for one in lines if name in one.levels for row in undirected(one.ends * (metres / SAME)).tolist()}
+        for name in names
     ]
     most = max(drawn, key=len)
     return any(one != most if named else not one <= most for one in drawn)
 
 
-def _keys(one: Polyline, metres: float) -> NDArray[np.float64]:
-    keys = np.rint(one.ends * (metres / SAME))
+def undirected(lines: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return lines rounded to whole numbers, (n, 4), each from its lesser end to its greater."""
+    keys = np.rint(lines)
     backward = (keys[:, 0] > keys[:, 2]) | ((keys[:, 0] == keys[:, 2]) & (keys[:, 1] > keys[:, 3]))
     return np.where(backward[:, None], keys[:, [2, 3, 0, 1]], keys)

@@ -14,7 +14,7 @@ from ..drawing import Drawing
 from .centre_lines import are_centres, walls_of
 from .far_lines import near_lines
 from .free_sides import Sides, sides_seen
-from .levels import on_level
+from .levels import on_level, undirected
 from .outline import outline
 from .units import note_unit
 
@@ -98,10 +98,7 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
         doubt = drawing.notes.assumed.get("unlikely_unit")
         why = doubt.message if doubt is not None else "check the unit"
         raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}", argument=drawing.name)
-    keys = np.rint(endpoints / SAME)
-    if not oriented:
-        backward = (keys[:, 0] > keys[:, 2]) | ((keys[:, 0] == keys[:, 2]) & (keys[:, 1] > keys[:, 3]))
-        keys[backward] = keys[backward][:, [2, 3, 0, 1]]
+    keys = np.rint(endpoints / SAME) if oriented else undirected(endpoints / SAME)
     _, first = np.unique(keys, axis=0, return_index=True)
     if len(first) < len(endpoints):
         drawing.notes.add_merged("doubles", "lines drawn more than once", len(endpoints) - len(first))

@@ -1,4 +1,4 @@
-"""Reading a map: which reader, by the file's name."""
+"""Reading a map or a log: which reader, by the file's name."""
 
 from __future__ import annotations
 
@@ -21,9 +21,12 @@ from .grids.faces import find_faces
 from .grids.map_server import read_grid
 from .grids.tuning import SURFACE_SIGMA
 from .line_map import ImportedMap, LineMap
+from .logs.carmen import read_carmen
 from .logs.folders import SUFFIXES as BAG_SUFFIXES
 from .logs.folders import is_bag
 from .logs.grids import grid_of, read_bag_grid
+from .logs.ros import read_bag
+from .logs.scan import Log, LogOptions
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
@@ -36,6 +39,10 @@ DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
 }
 MAP_SUFFIXES = (".yaml", ".yml", *DRAWINGS, *BAG_SUFFIXES)
 """Of files that `read_map` reads; a ``.yaml`` has its picture in the same folder."""
+TEXTS = (".log", ".clf", ".carmen")
+LOG_SUFFIXES = (*BAG_SUFFIXES, *TEXTS)
+"""Of files that `read_log` reads."""
+DEFAULT_LOG_OPTIONS = LogOptions()
 
 
 def read_map(
@@ -77,9 +84,40 @@ def read_map(
         drawing = DRAWINGS[suffix](file, options, notes)
         line_map = to_map(drawing, options)
         return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
-    raise UnsupportedFormatError(
-        f"expected a file that ends in one of {', '.join(MAP_SUFFIXES)}, found {ending_of(file)}",
-        argument=name_of(file),
+    raise _unsupported(file, "a file", MAP_SUFFIXES)
+
+
+def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPTIONS) -> Log:
+    """Open a log; its scans are read while iterating.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.bag`` of ROS 1; the folder of a bag of ROS 2, or its ``.mcap`` or ``.db3``; a ``.log``, ``.clf`` or
+        ``.carmen`` of CARMEN.
+    options : LogOptions
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    FormatError
+        When the file cannot be read, in one line that names it; while iterating, too.
+    """
+    file = Path(path)
+    if is_bag(file):
+        return read_bag(file, options)
+    if file.suffix.lower() in TEXTS:
+        return read_carmen(file, options)
+    raise _unsupported(file, "the folder of a bag, or a file", LOG_SUFFIXES)
+
+
+def _unsupported(file: Path, what: str, suffixes: tuple[str, ...]) -> UnsupportedFormatError:
+    known = ", ".join(suffixes)
+    return UnsupportedFormatError(
+        f"expected {what} that ends in one of {known}, found {ending_of(file)}", argument=name_of(file)
     )
 
 
