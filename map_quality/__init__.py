@@ -11,7 +11,6 @@ from .check.check import check_map
 from .check.judging import conclude
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
-from .check.thickness import find_thickness
 from .update.applying import apply_changes
 from .update.result import (
     NOT_SHARPENED,
@@ -56,7 +55,6 @@ __all__ = [
     "apply_changes",
     "check_map",
     "conclude",
-    "find_thickness",
     "standing_places",
     "try_sample",
     "update",

@@ -17,6 +17,12 @@ AGREEING = 3.0  # deviations
 LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 
 
+def fits(result: AssociationResult) -> bool:
+    """Return whether an answer is usable, or explains enough of its scan to show how far walls are off."""
+    diagnostics = result.diagnostics
+    return result.usable or (diagnostics is not None and diagnostics.inlier_fraction >= LEAST_SHARE)
+
+
 @dataclass(frozen=True, slots=True)
 class Matched:
     """A scan at its pose on a map, map_from_scan, and its correspondences."""
@@ -28,8 +34,7 @@ class Matched:
     @classmethod
     def of(cls, segments: Segments, scan: Scan, result: AssociationResult) -> Matched | None:
         """Return a scan with its answer on the map of these segments; None where too little of the scan fits."""
-        fits = result.diagnostics is not None and result.diagnostics.inlier_fraction >= LEAST_SHARE
-        if result.pose is None or not (result.usable or fits):
+        if result.pose is None or not fits(result):
             return None
         pairs = [(one.scan, one.map) for one in result.correspondences]
         return cls(scan, result.pose, Correspondences.of(segments, scan.measured, pairs))

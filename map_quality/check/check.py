@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from association import CancelledError, Deadline, MapIndex
 
+from . import tuning
 from .likeness import find_look_alikes, likeness_findings
 from .pieces import drawing_findings, drawn_sigma, find_near_walls
 from .result import Advice, Finding, MapCheck, Size
 from .sides import Sides, direction_findings, look_from_walls
-from .tuning import LARGEST, SMALLEST
 
 
 def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bool = True) -> MapCheck:
@@ -58,13 +58,13 @@ def _directed(sides: Sides, findings: list[Finding]) -> bool | None:
     """Return whether directions mean something; None where findings, or no rays that hit, leave that open."""
     if sides.meaningless:
         return False
-    return None if findings or not sides.left.sum() else True
+    return None if findings or not sides.hits[:, 0].sum() else True
 
 
 def _size_findings(size: Size) -> Iterator[Finding]:
-    if not SMALLEST <= size.diagonal <= LARGEST:
+    if not tuning.SMALLEST <= size.diagonal <= tuning.LARGEST:
         yield Finding(
             "unlikely_size",
-            f"The map's diagonal is {size.diagonal:.3g} m, expected {SMALLEST:g} to {LARGEST:g} m. Check that it is "
-            "in metres.",
+            f"The map's diagonal is {size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m. "
+            "Check that it is in metres.",
         )

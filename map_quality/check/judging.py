@@ -9,24 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import Deadline, MapIndex, Scan
-from registration import wrap_angle
 
+from ..scale import Matched, agreed
+from . import tuning
 from .result import Advice, Finding, SampleReport
 from .samples import Hypothesis, Mistake, Sample, Trial
 from .scaling import Scale, find_scale, unit_mistake
-from .thickness import find_thickness, thickness_finding
-from .tuning import (
-    BETTER_SCORE,
-    BETTER_USABLE,
-    GREATEST_SIGMA,
-    LEAST_SIGMA,
-    LITTLE,
-    MANY,
-    MOST_SCANS,
-    MOVED_METRES,
-    MOVED_RADIANS,
-    WIDEST,
-)
 
 MISTAKES: Mapping[Mistake, str] = {
     "mirrored": "fit better with left and right exchanged. The y axis of the map may point down, or the laser may be "
@@ -60,22 +48,21 @@ def conclude(
     tried = [(scan, one) for scan, one in zip(scans, samples, strict=True) if one is not None]
     if not tried:
         return SampleReport((), Advice(), 0, 0)
-    some = [(scan, one) for scan, one in tried if len(scan.measured)][:: -(-len(tried) // MOST_SCANS)]
-    some_scans, some_samples = [scan for scan, _ in some], [one for _, one in some]
+    some = [(scan, one) for scan, one in tried if len(scan.measured)][:: -(-len(tried) // tuning.MOST_SCANS)]
     fits = _Fits([one for _, one in tried], Hypothesis(oriented, index.sigma))
     directed = fits.best_directions()
     mistakes, thicker = fits.mistakes(), None
     if some and not mistakes and not deadline.passed:
-        scale = find_scale(index, some_scans, some_samples, deadline, oriented=oriented)
+        scale = find_scale(index, some, deadline, oriented=oriented)
         mistakes = [*_scaled(scale, len(some), fits.usable(fits.present))]
     if not mistakes and not deadline.passed:
-        thicker = find_thickness(index, some_scans, deadline, oriented=directed)
+        thicker = _thickness(index, some, oriented=directed)
     advice, usable, would_be = fits.advice(directed, mistakes)
     findings = [*mistakes, *_moved(fits.samples)]
     if directed is not oriented and not mistakes:
         findings.insert(0, _undirected(len(tried), usable, would_be))
     if thicker is not None:
-        findings.insert(0, thickness_finding(thicker, oriented=directed))
+        findings.insert(0, _thickness_finding(thicker, oriented=directed))
     return SampleReport(tuple(findings), advice, usable, usable if advice.oriented is None else would_be, thicker)
 
 
@@ -97,18 +84,18 @@ class _Fits:
     def is_better(self, sent: Hypothesis, other: Hypothesis, known: int, usable: int) -> bool:
         """Return whether scans fit clearly better under another hypothesis, by scores or by how many are usable."""
         both = self.both(sent, other)
-        clearly = max(1.0, BETTER_USABLE * len(self.samples))
+        clearly = max(1.0, tuning.BETTER_USABLE * len(self.samples))
         if usable > known + min(clearly, len(self.samples) - 1):
             return True
         # Scores of scans of another building are better by chance: hardly any of these is usable, or clearly fewer.
-        better = sum(one.score for _, one in both) > BETTER_SCORE * sum(one.score for one, _ in both)
+        better = sum(one.score for _, one in both) > tuning.BETTER_SCORE * sum(one.score for one, _ in both)
         return better and usable >= max(min(2, len(self.samples)), known - clearly)
 
     def mistakes(self) -> list[Finding]:
         """Return what all scans were sent with and fit better without."""
         found = []
         for mistake, message in MISTAKES.items():
-            undone, widest = replace(self.present, mistake=mistake), replace(self.present, sigma=WIDEST)
+            undone, widest = replace(self.present, mistake=mistake), replace(self.present, sigma=tuning.WIDEST)
             usable = self.usable(self.present), self.usable(undone)
             if self.is_better(widest, replace(widest, mistake=mistake), *usable):
                 both = self.both(self.present, undone)
@@ -120,7 +107,7 @@ class _Fits:
         """Return whether directions should mean something: as now, unless the scans fit clearly better otherwise."""
         now = self.present.oriented
         usable = (max((self.usable(way) for way in self.ways(one)), default=0) for one in (now, not now))
-        return now is not self.is_better(Hypothesis(now, WIDEST), Hypothesis(not now, WIDEST), *usable)
+        return now is not self.is_better(Hypothesis(now, tuning.WIDEST), Hypothesis(not now, tuning.WIDEST), *usable)
 
     def ways(self, directed: bool) -> list[Hypothesis]:
         """Return the hypotheses about directions and sigma alone that any scan was tried with."""
@@ -133,7 +120,7 @@ class _Fits:
         if off is None or not self.ways(directed):
             return Advice(), usable, usable
         # No sigma at all counts as `LITTLE`.
-        best = min(self.ways(directed), key=lambda way: abs(math.log((way.sigma or LITTLE) / off)))
+        best = min(self.ways(directed), key=lambda way: abs(math.log((way.sigma or tuning.LITTLE) / off)))
         # Offsets that come from a mistake are no measure of the walls.
         return Advice() if mistakes else Advice(off, directed), usable, self.usable(best)
 
@@ -145,13 +132,45 @@ class _Fits:
         """
         seen: dict[int, list[float]] = {}
         for one in self.samples:
-            trial = one.trials.get(Hypothesis(directed, WIDEST))
+            trial = one.trials.get(Hypothesis(directed, tuning.WIDEST))
             for wall, offset in trial.offsets.items() if trial is not None else ():
                 seen.setdefault(wall, []).append(offset)
         if not seen:
             return None
         squares = [float(np.mean(np.square(offsets))) for offsets in seen.values()]
-        return round(min(GREATEST_SIGMA, max(LEAST_SIGMA, math.sqrt(float(np.mean(squares))))), 3)
+        return round(min(tuning.GREATEST_SIGMA, max(tuning.LEAST_SIGMA, math.sqrt(float(np.mean(squares))))), 3)
+
+
+def _thickness(index: MapIndex, tried: Sequence[tuple[Scan, Sample]], *, oriented: bool) -> float | None:
+    """Return by how much the walls of a map are thicker than drawn, metres; None where most scans agree on none.
+
+    Lines without directions are walls of no thickness. In each scan the distance by which all walls are nearer than
+    drawn is half of the thickness that is missing.
+    """
+    wide = Hypothesis(oriented, tuning.THICKNESS_SIGMA)
+    trials = [(scan, sample.trials[wide].result) for scan, sample in tried if wide in sample.trials]
+    found = [Matched.of(index.segments, scan, result) for scan, result in trials]
+    offset = agreed([one for one in found if one is not None], tuning.LITTLE, "offset", 0.5 * tuning.SAME_THICKNESS)
+    thicker = 2.0 * offset.value if oriented else max(0.0, 2.0 * offset.value)
+    least = max(tuning.LEAST_THICKER, 2.0 * tuning.DEVIATIONS * offset.deviation)
+    return round(thicker, 3) if offset.count > tuning.MANY * len(tried) and abs(thicker) >= least else None
+
+
+def _thickness_finding(thicker: float, *, oriented: bool) -> Finding:
+    """Describe walls that are thicker, or thinner, than they are drawn."""
+    if not oriented:
+        return Finding(
+            "centre_lines",
+            f"The scans fit better if each line is the centre line of a wall {thicker:.2f} m thick. Import the drawing "
+            f"with drawn `centres` and thickness {thicker:.2f}.",
+        )
+    more, sign = ("thicker", "plus") if thicker > 0.0 else ("thinner", "minus")
+    return Finding(
+        "thickness",
+        f"The scans fit better if walls are {100.0 * abs(thicker):.0f} cm {more} than drawn. For a drawing that was "
+        f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For any other map, "
+        "for example a grid, state this uncertainty as `sigma`.",
+    )
 
 
 def _undirected(count: int, usable: int, would_be: int) -> Finding:
@@ -164,13 +183,9 @@ def _undirected(count: int, usable: int, would_be: int) -> Finding:
 
 def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
     """Return a finding if most scans fit better by one factor."""
-    if (
-        scale is None
-        or scale.is_one
-        or scale.agreeing < min(2, count)
-        or scale.agreeing <= MANY * scale.usable
-        or scale.usable < usable
-    ):
+    if scale is None or scale.is_one or scale.usable < usable:
+        return
+    if scale.agreeing < min(2, count) or scale.agreeing <= tuning.MANY * scale.usable:
         return
     if scale.of_scans:
         factor, unit = unit_mistake(1.0 / scale.factor, "scans")
@@ -182,18 +197,19 @@ def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
 
 
 def _moved(samples: Sequence[Sample]) -> Iterator[Finding]:
-    moves = [one.moved for one in samples if one.moved is not None]
-    if not moves:
+    moves = np.array([(one.moved.x, one.moved.y, one.moved.theta) for one in samples if one.moved is not None])
+    if not len(moves):
         return
-    at = np.array([(one.x, one.y) for one in moves])
     # In a rotation the places far from the origin move most: agree about all three at the median.
-    x, y = (float(value) for value in np.median(at, axis=0))
-    turn = math.atan2(*(float(np.median([f(one.theta) for one in moves])) for f in (math.sin, math.cos)))
-    same = sum(
-        math.hypot(one.x - x, one.y - y) < 2.0 * MOVED_METRES and abs(wrap_angle(one.theta - turn)) < MOVED_RADIANS
-        for one in moves
+    x, y, sine, cosine = np.median(np.column_stack([moves[:, :2], np.sin(moves[:, 2]), np.cos(moves[:, 2])]), axis=0)
+    turn = math.atan2(sine, cosine)
+    away, turned = (
+        np.hypot(*(moves[:, :2] - [x, y]).T),
+        np.abs(np.remainder(moves[:, 2] - turn + np.pi, math.tau) - np.pi),
     )
-    if same <= MANY * len(moves) or (math.hypot(x, y) < MOVED_METRES and abs(turn) < MOVED_RADIANS):
+    same = int(((away < 2.0 * tuning.MOVED_METRES) & (turned < tuning.MOVED_RADIANS)).sum())
+    is_moved = math.hypot(x, y) >= tuning.MOVED_METRES or abs(turn) >= tuning.MOVED_RADIANS
+    if same <= tuning.MANY * len(moves) or not is_moved:
         return
     yield Finding(
         "moved",

@@ -13,13 +13,13 @@ from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
 from ..views import Robot, look, similar_pose
+from . import tuning
 from .pieces import longest_pieces
 from .result import Finding, Place
-from .tuning import CLEARANCE, FOLLOWED, LEAST_ROOM, OFF_THE_WALL, PLACES, RAYS, REACH, SIGMA
 
 LEAST_SEEN = 3  # segments of a scan that is searched
-ROBOT = Robot(beams=RAYS, range_max=REACH, sigma=SIGMA)
-RAY = Scanner(beams=1, angle_min=0.0, range_max=FOLLOWED, sigma=0.0)
+ROBOT = Robot(beams=tuning.RAYS, range_max=tuning.REACH, sigma=tuning.SIGMA)
+RAY = Scanner(beams=1, angle_min=0.0, range_max=tuning.FOLLOWED, sigma=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +74,8 @@ def likeness_findings(likeness: Likeness) -> Iterator[Finding]:
     if likeness.places:
         yield Finding(
             "looks_alike",
-            f"At {len(likeness.places)} of {likeness.viewpoints} poses a laser with a range of {REACH:g} m sees the "
-            "same as at another pose of the map. There a scan alone is ambiguous: send a prior, or the scans of a "
+            f"At {len(likeness.places)} of {likeness.viewpoints} poses a laser with a range of {tuning.REACH:g} m sees "
+            "the same as at another pose of the map. There a scan alone is ambiguous: send a prior, or the scans of a "
             "drive.",
             likeness.segments,
         )
@@ -84,7 +84,7 @@ def likeness_findings(likeness: Likeness) -> Iterator[Finding]:
 def _places(index: MapIndex, segments: Segments) -> Iterator[RigidTransform]:
     """Yield free places in front of walls, in the map frame, at even steps of the length of all walls."""
     reached = np.cumsum(index.walls.longest)
-    chosen = np.searchsorted(reached, (np.arange(PLACES) + 0.5) / PLACES * reached[-1])
+    chosen = np.searchsorted(reached, (np.arange(tuning.PLACES) + 0.5) / tuning.PLACES * reached[-1])
     for piece in dict.fromkeys(longest_pieces(index)[chosen].tolist()):
         place = _free_place(segments, piece % index.directed)
         if place is not None:
@@ -96,8 +96,12 @@ def _free_place(segments: Segments, piece: int) -> RigidTransform | None:
     (x, y), (dx, dy) = segments.midpoints[piece], segments.directions[piece]
     for normal in (math.atan2(dx, -dy), math.atan2(-dx, dy)):
         c, s = math.cos(normal), math.sin(normal)
-        room = float(scan(segments, RigidTransform(x + OFF_THE_WALL * c, y + OFF_THE_WALL * s, normal), RAY).ranges[0])
-        if LEAST_ROOM < room < math.inf:
-            away = min(CLEARANCE, 0.5 * room)
+        room = float(
+            scan(
+                segments, RigidTransform(x + tuning.OFF_THE_WALL * c, y + tuning.OFF_THE_WALL * s, normal), RAY
+            ).ranges[0]
+        )
+        if tuning.LEAST_ROOM < room < math.inf:
+            away = min(tuning.CLEARANCE, 0.5 * room)
             return RigidTransform(x + away * c, y + away * s, 0.0)
     return None

@@ -12,28 +12,8 @@ from numpy.typing import NDArray
 from association import Deadline, MapIndex
 from registration.layout import Floats, Records
 
+from . import tuning
 from .result import Finding
-from .tuning import (
-    DOUBLE,
-    DOUBLE_LENGTH,
-    DOUBLE_SHARE,
-    ENDS_AT_A_TIME,
-    GAP_SIGMAS,
-    GREATEST_GAP,
-    LARGEST_PIXEL,
-    LEAST_GAP,
-    MANY_ENDS,
-    MOST_ENDS,
-    MOST_IN_CELL,
-    MOST_PAIRS,
-    ON_STEP,
-    OVERLAP,
-    PAIRS_AT_A_TIME,
-    PARALLEL,
-    SAME_LINE,
-    SHORT,
-    STEPS,
-)
 
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -79,14 +59,14 @@ def near_pairs(index: MapIndex) -> Iterator[Indices]:
 
     Those of cells with few walls come first. A pair comes once for each cell that lists both.
     """
-    grid, left = index.grid, MOST_PAIRS
+    grid, left = index.grid, tuning.MOST_PAIRS
     sizes = np.diff(grid.starts)
-    for size in range(2, MOST_IN_CELL + 1):
-        cells = np.flatnonzero(sizes == size if size < MOST_IN_CELL else sizes >= size)
+    for size in range(2, tuning.MOST_IN_CELL + 1):
+        cells = np.flatnonzero(sizes == size if size < tuning.MOST_IN_CELL else sizes >= size)
         first, second = np.triu_indices(size, 1)
         cells = cells[: left // len(first)]
         left -= len(cells) * len(first)
-        step = PAIRS_AT_A_TIME // len(first)
+        step = tuning.PAIRS_AT_A_TIME // len(first)
         for begin in range(0, len(cells), step):
             listed = grid.items[grid.starts[cells[begin : begin + step]][:, None] + np.arange(size)]
             yield np.stack([listed[:, first].reshape(-1), listed[:, second].reshape(-1)], axis=1)
@@ -95,7 +75,7 @@ def near_pairs(index: MapIndex) -> Iterator[Indices]:
 def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
     """Mark how the second wall of each pair, (p, 2), runs next to the first."""
     one, other = walls["dx"][pairs], walls["dy"][pairs]
-    pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < PARALLEL]
+    pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < tuning.PARALLEL]
     a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
     along = a["dx"] * b["dx"] + a["dy"] * b["dy"] > 0.0
     places = []
@@ -109,24 +89,25 @@ def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
     # The length that both run next to each other, and how far the second lies to the left of the first there, metres.
     shared, off = high - low, o1 + slope * (0.5 * (low + high) - s1)
     shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
-    for_long = (shared > DOUBLE_LENGTH) & (shared > DOUBLE_SHARE * shorter)
-    on_it, apart = np.abs(off) < SAME_LINE, np.abs(off)
+    for_long = (shared > tuning.DOUBLE_LENGTH) & (shared > tuning.DOUBLE_SHARE * shorter)
+    on_it, apart = np.abs(off) < tuning.SAME_LINE, np.abs(off)
     near.opposite[pairs[for_long & on_it & ~along]] = True
     # Back to back they are the two faces of one wall, as they should be.
-    near.doubled[pairs[for_long & ~on_it & (apart < DOUBLE) & (along | (off > 0.0))]] = True
-    near.overlapping[pairs[along & on_it & (shared > OVERLAP)]] = True
+    near.doubled[pairs[for_long & ~on_it & (apart < tuning.DOUBLE) & (along | (off > 0.0))]] = True
+    near.overlapping[pairs[along & on_it & (shared > tuning.OVERLAP)]] = True
 
 
 def _short(index: MapIndex) -> Iterator[Finding]:
     lengths = index.walls.longest
-    short = lengths < SHORT
+    short = lengths < tuning.SHORT
     if short.any():
         share = lengths[short].sum() / lengths.sum()
         found = segments_of(index, short)
         yield Finding(
             "short_pieces",
-            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * SHORT:g} cm, also "
-            "together with the segments that they continue. A search does not profit from them. Omit or join them.",
+            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * tuning.SHORT:g} "
+            "cm, also together with the segments that they continue. A search does not profit from them. Omit or join "
+            "them.",
             found,
         )
 
@@ -136,9 +117,9 @@ def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
         found = segments_of(index, near.doubled)
         yield Finding(
             "doubled_faces",
-            f"{len(found)} segments lie less than {100.0 * DOUBLE:g} cm from a parallel segment that faces the same "
-            "way, or faces them. Either one face of a wall is drawn twice, or the inside of a wall is drawn as free "
-            "space. A scan fits both segments. Keep one of them.",
+            f"{len(found)} segments lie less than {100.0 * tuning.DOUBLE:g} cm from a parallel segment that faces the "
+            "same way, or faces them. Either one face of a wall is drawn twice, or the inside of a wall is drawn as "
+            "free space. A scan fits both segments. Keep one of them.",
             found,
         )
     if near.opposite.any():
@@ -166,13 +147,13 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
 
     Ends are as uncertain as the walls: gaps within the declared error of the map are none.
     """
-    least = max(LEAST_GAP, GAP_SIGMAS * (index.sigma or 0.0))
-    if least >= GREATEST_GAP:
+    least = max(tuning.LEAST_GAP, tuning.GAP_SIGMAS * (index.sigma or 0.0))
+    if least >= tuning.GREATEST_GAP:
         return
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
     _, first, counts = np.unique(ends, axis=0, return_index=True, return_counts=True)
     # A segment whose end is as near as this to its own begin is too short for the test.
-    alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > GREATEST_GAP)])
+    alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > tuning.GREATEST_GAP)])
     if not len(alone) or deadline.passed:
         return
     found = set()
@@ -180,13 +161,13 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
         if deadline.passed:
             break
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
-        if apart > least + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
+        if apart > least + tuning.SAME_LINE and min(apart, gap) <= tuning.GREATEST_GAP:
             found.add(end // 2)
     if found:
         yield Finding(
             "gaps",
-            f"{len(found)} segments end {100.0 * least:g} to {100.0 * GREATEST_GAP:g} cm before another segment: "
-            "rays pass through the gaps. Extend the segments until they meet.",
+            f"{len(found)} segments end {100.0 * least:g} to {100.0 * tuning.GREATEST_GAP:g} cm before another "
+            "segment: rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
 
@@ -198,12 +179,12 @@ def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline)
     """
     from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
 
-    tree, left = cKDTree(ends), MOST_ENDS
-    for begin in range(0, len(chosen), ENDS_AT_A_TIME):
-        some = chosen[begin : begin + ENDS_AT_A_TIME]
+    tree, left = cKDTree(ends), tuning.MOST_ENDS
+    for begin in range(0, len(chosen), tuning.ENDS_AT_A_TIME):
+        some = chosen[begin : begin + tuning.ENDS_AT_A_TIME]
         if left <= 0 or deadline.passed:
             return
-        nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=GREATEST_GAP)[0])[:, 1]
+        nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=tuning.GREATEST_GAP)[0])[:, 1]
         free = np.flatnonzero(nearest > least)[:left]  # after the end itself
         left -= len(free)
         yield from zip(some[free].tolist(), nearest[free].tolist(), strict=True)
@@ -242,7 +223,7 @@ def _lapping(index: MapIndex, deadline: Deadline) -> set[int]:
         # Which piece reaches so far: the last that reached farther than all before it.
         farther = np.append(True, stops[1:] > reach[:-1])
         last = np.maximum.accumulate(np.where(farther, np.arange(len(by)), 0))
-        lapping = np.flatnonzero(begins[1:] - reach[:-1] < -OVERLAP)
+        lapping = np.flatnonzero(begins[1:] - reach[:-1] < -tuning.OVERLAP)
         found.update(pieces[last[lapping]].tolist(), pieces[lapping + 1].tolist())
     return found
 
@@ -254,9 +235,11 @@ def drawn_sigma(index: MapIndex) -> float | None:
     """
     ends = index.segments.endpoints[: index.directed]
     ends = ends - ends[0, [0, 1, 0, 1]]
-    step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
+    step = next(
+        (one for one in tuning.STEPS if np.abs(ends - one * np.round(ends / one)).max() < tuning.ON_STEP), math.inf
+    )
     # A caller copies the advice: to a tenth of a millimetre.
-    return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
+    return round(step / math.sqrt(12.0), 4) if len(ends) >= tuning.MANY_ENDS and step <= tuning.LARGEST_PIXEL else None
 
 
 def segments_of(index: MapIndex, walls: NDArray[np.bool_] | NDArray[np.intp]) -> tuple[int, ...]:

@@ -20,8 +20,8 @@ from association import (
 )
 from registration import RigidTransform
 
-from ..scale import LEAST_SHARE
-from .tuning import CONFIDENCE, SIGMAS, WIDEST
+from ..scale import fits
+from . import tuning
 
 Mistake = Literal["mirrored", "reversed"]
 UNDONE: Mapping[Mistake | None, Callable[[Scan], Scan]] = {
@@ -53,30 +53,24 @@ class Hypothesis:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Fit of a scan under a hypothesis.
+    """The answer for a scan under a hypothesis."""
 
-    Attributes
-    ----------
-    usable : bool
-    score : float
-        Nats; 0 where nothing fits.
-    offsets : dict of int to float
-        By map segment, how far its matched scan segments are off, metres. Empty where too little of the scan fits.
-    """
+    result: AssociationResult
 
-    usable: bool
-    score: float
-    offsets: Mapping[int, float]
+    @property
+    def usable(self) -> bool:
+        """Return whether a robot may use the answer."""
+        return self.result.usable
 
-    @classmethod
-    def of(cls, result: AssociationResult) -> Trial:
-        """Return what counts of an answer."""
-        diagnostics = result.diagnostics
-        if diagnostics is None:
-            return cls(False, 0.0, {})
-        enough = result.usable or diagnostics.inlier_fraction >= LEAST_SHARE
-        offsets = {pair.map: pair.offset for pair in result.correspondences} if enough else {}
-        return cls(result.usable, max(0.0, diagnostics.score), offsets)
+    @property
+    def score(self) -> float:
+        """Nats; 0 where nothing fits."""
+        return 0.0 if self.result.diagnostics is None else max(0.0, self.result.diagnostics.score)
+
+    @property
+    def offsets(self) -> dict[int, float]:
+        """By map segment, how far its matched scan segments are off, metres; none where too little of the scan fits."""
+        return {pair.map: pair.offset for pair in self.result.correspondences} if fits(self.result) else {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +119,7 @@ def try_sample(
     if not oriented:
         index.undirected_by(deadline)  # the search takes it from there
     result = associate(index, scan, None, AssociationOptions(oriented=oriented, on_map=1.0), deadline)
-    trials = {Hypothesis(oriented, index.sigma): Trial.of(result)}
+    trials = {Hypothesis(oriented, index.sigma): Trial(result)}
     for one in hypotheses(oriented, index.sigma):
         if not deadline.passed:
             with suppress(IndexingEndedError):
@@ -137,16 +131,16 @@ def try_sample(
 def hypotheses(oriented: bool, sigma: float | None) -> Iterator[Hypothesis]:
     """Yield the hypotheses that a scan is tried with, except the one that map and scan are right."""
     for directed in (True, False) if oriented else (False,):
-        for other in (sigma, *SIGMAS):
+        for other in (sigma, *tuning.SIGMAS):
             if (directed, other) != (oriented, sigma):
                 yield Hypothesis(directed, other)
     mistakes: tuple[Mistake, ...] = ("mirrored", "reversed") if oriented else ("mirrored",)
     for mistake in mistakes:
-        for other in dict.fromkeys((sigma, WIDEST)):
+        for other in dict.fromkeys((sigma, tuning.WIDEST)):
             yield Hypothesis(oriented, other, mistake)
 
 
 def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> Trial:
     place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)
-    options = AssociationOptions(max_alternatives=0, confidence=CONFIDENCE, oriented=one.oriented, on_map=1.0)
-    return Trial.of(associate(place, UNDONE[one.mistake](scan), None, options, deadline))
+    options = AssociationOptions(max_alternatives=0, confidence=tuning.CONFIDENCE, oriented=one.oriented, on_map=1.0)
+    return Trial(associate(place, UNDONE[one.mistake](scan), None, options, deadline))

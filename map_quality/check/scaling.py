@@ -26,24 +26,8 @@ from association import (
 from registration import Segments
 
 from ..scale import Matched, agreed
+from . import tuning
 from .samples import Sample, Trial
-from .tuning import (
-    CONFIDENCE,
-    DEVIATIONS,
-    EXCEEDING,
-    GREATEST_EXTENT,
-    LADDER,
-    LARGEST,
-    LAX_TOLERANCE,
-    LEAST_EXTENT,
-    LEAST_SCALE,
-    LITTLE,
-    MANY,
-    MOST_LINES,
-    MOST_ON_LADDER,
-    SAME_FACTOR,
-    SMALLEST,
-)
 
 # Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
 TAKEN_FOR: Mapping[float, tuple[str, str]] = {
@@ -86,7 +70,7 @@ class Scale:
     @property
     def is_one(self) -> bool:
         """Return whether map and scans may be of one scale."""
-        return abs(self.factor - 1.0) < max(LEAST_SCALE, DEVIATIONS * self.deviation)
+        return abs(self.factor - 1.0) < max(tuning.LEAST_SCALE, tuning.DEVIATIONS * self.deviation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +109,9 @@ class _Scaled:
         """Search each scan; `lax` finds walls that are off by decimetres, by segments alone, in half of the time."""
         options = AssociationOptions(
             max_alternatives=0,
-            confidence=CONFIDENCE,
+            confidence=tuning.CONFIDENCE,
             oriented=self.oriented,
-            offset_tolerance=LAX_TOLERANCE if lax else None,
+            offset_tolerance=tuning.LAX_TOLERANCE if lax else None,
             on_map=1.0,
         )
         scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
@@ -137,7 +121,7 @@ class _Scaled:
         """Estimate the factor from the correspondences."""
         found = [Matched.of(self.index.segments, scan, one) for scan, one in zip(self.scans, results, strict=True)]
         matched, sigma = [one for one in found if one is not None], self.index.sigma
-        off = agreed(matched, LITTLE if sigma is None else sigma, "scale", SAME_FACTOR)
+        off = agreed(matched, tuning.LITTLE if sigma is None else sigma, "scale", tuning.SAME_FACTOR)
         usable = sum(one.usable for one in results)
         return Scale(self.factor * (1.0 - off.value), self.factor * off.deviation, off.count, usable)
 
@@ -149,26 +133,29 @@ class _Scaled:
     @property
     def is_usual(self) -> bool:
         """Return whether the scans are as large as scans are: then the map is put to scale, else they are."""
-        return LEAST_EXTENT <= self.extent <= GREATEST_EXTENT
+        return tuning.LEAST_EXTENT <= self.extent <= tuning.GREATEST_EXTENT
 
     def rungs(self) -> Iterator[float]:
         """Yield the factors that are tried: those after which the scans fit into the map, and robots drive about it."""
-        for factor in (*LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
+        for factor in (*tuning.LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
             of_map, of_scans = (1.0 / factor, 1.0) if self.is_usual else (1.0, factor)
             extent, diagonal = of_scans * self.extent, of_map * self.index.diagonal
-            if LEAST_EXTENT <= extent <= EXCEEDING * diagonal and SMALLEST <= diagonal <= LARGEST:
+            if (
+                tuning.LEAST_EXTENT <= extent <= tuning.EXCEEDING * diagonal
+                and tuning.SMALLEST <= diagonal <= tuning.LARGEST
+            ):
                 yield factor
 
 
 def find_scale(
-    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample], deadline: Deadline, *, oriented: bool
+    index: MapIndex, tried: Sequence[tuple[Scan, Sample]], deadline: Deadline, *, oriented: bool
 ) -> Scale | None:
     """Estimate the factor between a map and sample scans.
 
     Parameters
     ----------
     index : MapIndex
-    scans, samples : sequence of Scan and of Sample
+    tried : sequence of (Scan, Sample)
         Each scan, and its search in the map as it is.
     deadline : Deadline
         When it passes, no factor is found.
@@ -180,9 +167,9 @@ def find_scale(
     CancelledError
         When the deadline was cancelled.
     """
-    results = [one.result for one in samples]
+    scans, results = [scan for scan, _ in tried], [sample.result for _, sample in tried]
     sent = _Scaled(index, scans, 1.0, oriented, deadline)
-    if sum(one.usable for one in results) > MANY * len(scans):
+    if sum(one.usable for one in results) > tuning.MANY * len(scans):
         first = sent.fit(results)
     else:
         rung = _best_rung(sent)
@@ -195,15 +182,15 @@ def find_scale(
 
 def _best_rung(sent: _Scaled) -> _Scaled | None:
     """Return map and scans by the factor of the ladder at which some scans fit best; None where none fits."""
-    few = replace(sent, scans=sorted(sent.scans, key=lambda scan: -len(scan.measured))[:MOST_ON_LADDER])
-    if sent.index.directed > MOST_LINES or few.extent <= 0.0:
+    few = replace(sent, scans=sorted(sent.scans, key=lambda scan: -len(scan.measured))[: tuning.MOST_ON_LADDER])
+    if sent.index.directed > tuning.MOST_LINES or few.extent <= 0.0:
         return None
     best, most = None, 0.0
     for factor in few.rungs():
         if sent.deadline.passed:
             return None
         place = few.by(factor)
-        score = 0.0 if place is None else sum(Trial.of(one).score for one in place.search(lax=True))
+        score = 0.0 if place is None else sum(Trial(one).score for one in place.search(lax=True))
         if score > most:
             best, most = factor, score
     return None if best is None else sent.by(best)

@@ -83,6 +83,6 @@ EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs 
 
 # --- Thickness --------------------------------------------------------------------------------------------------------
 
-THICKNESS_SIGMA = 0.05  # m, tables; of walls where these are searched for
+THICKNESS_SIGMA = SIGMAS[0]  # of the trials that show it, tables
 LEAST_THICKER = 0.03  # m, tables
 SAME_THICKNESS = 0.03  # m, tables; of scans that agree

@@ -11,21 +11,10 @@ from numpy.typing import NDArray
 from association import Deadline
 from registration import Segments
 
+from . import tuning
 from .beams import within
 from .evidence import are_enough
 from .scans import Localized, blocks, go_on
-from .tuning import (
-    BIN,
-    FULLY_ON_MAP,
-    LEAST_PIECE,
-    LEAST_SEEN,
-    LEAST_VISITS,
-    ON_MAP,
-    SAME_ANGLE,
-    SAME_GAP,
-    SAME_LINE,
-    SAME_SIDE,
-)
 from .walls import runs
 
 Floats = NDArray[np.float64]
@@ -60,23 +49,21 @@ class SeenLines:
 
 def unexplained(found: Sequence[Localized], known: Segments, deadline: Deadline) -> SeenLines:
     """Return the lines of scans that lie along no wall of the map, or only in part."""
-    ends, visits, places, weights = [], [], [], []
+    none = np.zeros(0, dtype=np.intp)
+    ends, visits, places, weights = [np.zeros((0, 4))], [none], [none.reshape(0, 2)], [np.zeros(0)]
     for one in found:
         seen = one.scan.measured
-        long = np.flatnonzero(seen.segments.lengths >= LEAST_SEEN)
+        long = np.flatnonzero(seen.segments.lengths >= tuning.LEAST_SEEN)
         lines = Segments.derived(one.pose.apply(seen.segments.endpoints[long].reshape(-1, 2)).reshape(-1, 4))
         place = np.array([one.pose.x, one.pose.y])
         reach = np.abs(lines.endpoints.reshape(-1, 2) - place).max(initial=0.0)
         near = known.take(within(known, place, 1.5 * float(reach)))
-        new = _fraction_on_map(lines, near, deadline) < FULLY_ON_MAP
+        new = _fraction_on_map(lines, near, deadline) < tuning.FULLY_ON_MAP
         rows = long[new]
         ends.append(lines.endpoints[new])
         visits.append(np.full(len(rows), one.visit))
         places.append(np.tile(one.place, (len(rows), 1)))
         weights.append(np.maximum(seen.point_counts[rows], 1.0) / np.maximum(seen.sigma[rows], 1e-3) ** 2)
-    if not ends:
-        nothing = np.zeros(0, dtype=np.intp)
-        return SeenLines(Segments.derived(np.zeros((0, 4))), nothing, np.zeros((0, 2), dtype=np.intp), np.zeros(0))
     return SeenLines(
         Segments.derived(np.concatenate(ends)), np.concatenate(visits), np.concatenate(places), np.concatenate(weights)
     )
@@ -86,8 +73,8 @@ def _fraction_on_map(lines: Segments, known: Segments, deadline: Deadline) -> Fl
     """Return which fraction of each line lies along walls of the map that face the same way, at most 1, (n,)."""
     covered = np.zeros(len(lines))
     for part in blocks(len(lines), len(known), deadline):
-        parallel = lines.directions[part] @ known.directions.T >= np.cos(2.0 * SAME_ANGLE)
-        beside = np.abs(lines.midpoints[part] @ known.normals.T - known.offsets) <= ON_MAP
+        parallel = lines.directions[part] @ known.directions.T >= np.cos(2.0 * tuning.SAME_ANGLE)
+        beside = np.abs(lines.midpoints[part] @ known.normals.T - known.offsets) <= tuning.ON_MAP
         rows, walls = np.nonzero(parallel & beside)
         rows += part.start
         direction = lines.directions[rows]
@@ -136,7 +123,7 @@ def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Fl
 
 
 def _is_seen_often(visits: Indices, places: Indices) -> bool:
-    if len(visits) < LEAST_VISITS:
+    if len(visits) < tuning.LEAST_VISITS:
         return False
     return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
@@ -146,16 +133,16 @@ def _along(endpoints: Floats, directions: Floats) -> Bools:
     direction = directions[0]
     normal = np.array([-direction[1], direction[0]])
     offset = 0.5 * float((endpoints[0, :2] + endpoints[0, 2:]) @ normal)
-    mine = directions @ direction >= np.cos(SAME_ANGLE)
+    mine = directions @ direction >= np.cos(tuning.SAME_ANGLE)
     for points in (endpoints[:, :2], endpoints[:, 2:]):
-        mine &= np.abs(points @ normal - offset) <= SAME_LINE
+        mine &= np.abs(points @ normal - offset) <= tuning.SAME_LINE
     begins, ends = endpoints[:, :2] @ direction, endpoints[:, 2:] @ direction
     low, high = begins[0], ends[0]
-    inside = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
+    inside = mine & (begins <= high + tuning.SAME_GAP) & (ends >= low - tuning.SAME_GAP)
     inside[0] = True
     for _ in range(8):
         low, high = begins[inside].min(), ends[inside].max()
-        more = mine & (begins <= high + SAME_GAP) & (ends >= low - SAME_GAP)
+        more = mine & (begins <= high + tuning.SAME_GAP) & (ends >= low - tuning.SAME_GAP)
         if (more == inside).all():
             break
         inside = more | inside
@@ -168,20 +155,23 @@ def _pieces(group: SeenLines, known: Segments, deadline: Deadline) -> list[tuple
     begins = (group.lines.endpoints[:, :2] - place) @ direction
     ends = (group.lines.endpoints[:, 2:] - place) @ direction
     low = float(begins.min())
-    count = int(np.ceil((float(ends.max()) - low) / BIN)) + 1
-    middles = low + BIN * (np.arange(count) + 0.5)
+    count = int(np.ceil((float(ends.max()) - low) / tuning.BIN)) + 1
+    middles = low + tuning.BIN * (np.arange(count) + 0.5)
     covered = np.zeros(count, dtype=np.intp)
     for visit in np.unique(group.visits):
         mine = group.visits == visit
         first, past = np.searchsorted(middles, begins[mine]), np.searchsorted(middles, ends[mine], side="right")
         steps = np.bincount(first, minlength=count + 1) - np.bincount(past, minlength=count + 1)
         covered += np.cumsum(steps[:count]) > 0
-    seen = covered >= LEAST_VISITS
+    seen = covered >= tuning.LEAST_VISITS
     seen[seen] = ~_on_map(known, place + middles[seen, None] * direction, direction, deadline)
     return [
-        (np.concatenate([place + (low + BIN * a) * direction, place + (low + BIN * b) * direction]), sigma)
+        (
+            np.concatenate([place + (low + tuning.BIN * a) * direction, place + (low + tuning.BIN * b) * direction]),
+            sigma,
+        )
         for a, b in runs(seen)
-        if (b - a) * BIN >= LEAST_PIECE
+        if (b - a) * tuning.BIN >= tuning.LEAST_PIECE
     ]
 
 
@@ -207,9 +197,9 @@ def _on_map(known: Segments, points: Floats, direction: Floats, deadline: Deadli
 
     A line across the sides of a round column is off their directions, too.
     """
-    facing = np.flatnonzero(known.directions @ direction >= SAME_SIDE)
-    low = points.min(axis=0, initial=np.inf) - ON_MAP
-    high = points.max(axis=0, initial=-np.inf) + ON_MAP
+    facing = np.flatnonzero(known.directions @ direction >= tuning.SAME_SIDE)
+    low = points.min(axis=0, initial=np.inf) - tuning.ON_MAP
+    high = points.max(axis=0, initial=-np.inf) + tuning.ON_MAP
     begins, ends = known.endpoints[facing, :2], known.endpoints[facing, 2:]
     met = (np.maximum(begins, ends) >= low).all(axis=1) & (np.minimum(begins, ends) <= high).all(axis=1)
     walls = known.take(facing[met])
@@ -218,5 +208,5 @@ def _on_map(known: Segments, points: Floats, direction: Floats, deadline: Deadli
         off = points[rows, None, :] - walls.endpoints[None, :, :2]
         along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
         gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
-        out[rows] = (gaps <= ON_MAP).any(axis=1)
+        out[rows] = (gaps <= tuning.ON_MAP).any(axis=1)
     return out

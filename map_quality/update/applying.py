@@ -49,44 +49,31 @@ def apply_changes(
     if len(sharpened.segments) and int(sharpened.segments.max()) >= len(known):
         told = f"found segment {int(sharpened.segments.max())}, expected indices below {len(known)}"
         raise InvalidArgumentError(told, argument="sharpened.segments")
-    new = apply(with_ends(known, sharpened), changes)
+    new, _ = apply(with_ends(known, sharpened), changes)
     if not len(new):
         told = "found no segment that is left, expected at least one; refuse a change"
         raise InvalidArgumentError(told, argument="changes")
     return new, sharper_sigma(known, sigma, sharpened)
 
 
-def apply(known: Segments, changes: Sequence[Replacement]) -> Segments:
-    """Return the segments of a map with some changes.
+def apply(known: Segments, changes: Sequence[Replacement]) -> tuple[Segments, NDArray[np.intp]]:
+    """Return the segments of a map with some changes, and which old segment each of them is, -1 for new ones.
 
     Segments that no change names keep their order. The first new segment of a change takes the place of its first old
     one; others are appended.
     """
-    kept: list[Floats | None] = list(known.endpoints)
-    appended: list[Floats] = []
+    kept = {k: (ends, k) for k, ends in enumerate(known.endpoints)}
+    appended: list[tuple[Floats, int]] = []
     for one in changes:
-        new = list(one.new)
+        new = [(ends, -1) for ends in one.new]
         for old in one.segments:
-            kept[old] = None
+            kept.pop(old, None)
         if one.segments and new and one.code in ("shortened", "extended"):
             kept[one.segments[0]] = new.pop(0)
         appended += new
-    ends = [*(one for one in kept if one is not None), *appended]
-    return Segments.derived(np.array(ends).reshape(-1, 4))
-
-
-def kept_indices(count: int, changes: Sequence[Replacement]) -> NDArray[np.intp]:
-    """Return which old segment each segment of the map with some changes is, -1 for those that changes made."""
-    kept = list(range(count))
-    made = 0
-    for one in changes:
-        in_place = bool(one.segments) and len(one.new) > 0 and one.code in ("shortened", "extended")
-        for old in one.segments:
-            kept[old] = -2
-        if in_place:
-            kept[one.segments[0]] = -1
-        made += len(one.new) - in_place
-    return np.array([*(k for k in kept if k != -2), *[-1] * made], dtype=np.intp)
+    found = [*(kept[k] for k in sorted(kept)), *appended]
+    ends = np.array([ends for ends, _ in found]).reshape(-1, 4)
+    return Segments.derived(ends), np.array([k for _, k in found], dtype=np.intp)
 
 
 def with_ends(known: Segments, sharpened: Sharpened) -> Segments:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from association import Deadline
 from registration import Segments
 
+from . import tuning
 from .hanging import on_lines
 from .scans import Localized, blocks
-from .tuning import CHUNK, DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, MOST_BEAMS, MOST_PASSED, THROUGH
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -39,7 +39,7 @@ class Chunks:
     @classmethod
     def of(cls, walls: Segments) -> Chunks:
         """Cut walls into chunks of equal length."""
-        counts = np.maximum(1, np.round(walls.lengths / CHUNK)).astype(np.intp)
+        counts = np.maximum(1, np.round(walls.lengths / tuning.CHUNK)).astype(np.intp)
         return cls(walls, np.concatenate([[0], np.cumsum(counts)]).astype(np.intp))
 
     def __len__(self) -> int:
@@ -53,6 +53,12 @@ class Chunks:
     def of_wall(self, wall: int) -> slice:
         """Return the chunks of a wall."""
         return slice(int(self.first[wall]), int(self.first[wall + 1]))
+
+    def part(self, wall: int, begin: int, end: int) -> Floats:
+        """Return the ends of a wall's chunks from one to another (exclusive), (4,)."""
+        walls, step = self.walls, self.walls.lengths[wall] / self.counts[wall]
+        place, along = walls.endpoints[wall, :2], walls.directions[wall]
+        return np.concatenate([place + begin * step * along, place + end * step * along])
 
     def walls_of(self, chunks: Indices) -> Indices:
         """Return the wall of each of some chunks."""
@@ -118,11 +124,11 @@ def _met(
     normals = walls.normals[columns]
     slant = np.einsum("ij,ij->i", rays[beams], normals)
     ahead = walls.offsets[columns] - np.einsum("ij,ij->i", origins[beams], normals)
-    met = (np.abs(slant) >= LEAST_SLANT) & (ahead * slant > 0.0)
+    met = (np.abs(slant) >= tuning.LEAST_SLANT) & (ahead * slant > 0.0)
     beams, columns, slant = beams[met], columns[met], slant[met]
     distance = ahead[met] / slant
     gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
-    kept = np.flatnonzero(gap >= -np.maximum(HIDDEN, tolerance))
+    kept = np.flatnonzero(gap >= -np.maximum(tuning.HIDDEN, tolerance))
     kept = kept[_nearest(beams[kept], distance[kept])]
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
@@ -132,10 +138,10 @@ def _met(
     along = np.clip(np.einsum("ij,ij->i", off, directions) + distance * across, 0.0, lengths)
     facing = (slant < 0.0) | (not oriented)
     # The beam has to be behind the wall there, not past its end: else a wall that is a little off would seem gone.
-    deep = along + THROUGH * tolerance / np.abs(slant) * across
-    passed = (gap > THROUGH * tolerance) & (deep >= 0.0) & (deep <= lengths)
+    deep = along + tuning.THROUGH * tolerance / np.abs(slant) * across
+    passed = (gap > tuning.THROUGH * tolerance) & (deep >= 0.0) & (deep <= lengths)
     ended = (np.abs(gap) <= tolerance) & facing
-    hidden = (gap >= -HIDDEN) & (gap <= tolerance) & ~ended
+    hidden = (gap >= -tuning.HIDDEN) & (gap <= tolerance) & ~ended
     return columns, along, np.stack([passed, ended, hidden], axis=1)
 
 
@@ -155,7 +161,7 @@ def _nearest(beams: Indices, distance: Floats) -> Indices:
     order = np.lexsort((distance, beams))
     sorted_beams = beams[order]
     rank = np.arange(len(order)) - np.searchsorted(sorted_beams, sorted_beams)
-    return np.sort(order[rank < MOST_PASSED])
+    return np.sort(order[rank < tuning.MOST_PASSED])
 
 
 def sees(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> bool:
@@ -177,7 +183,7 @@ def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
     assert beams is not None
     assert one.scan.viewpoint is not None
     known = np.flatnonzero(np.isfinite(beams.ranges) & (beams.ranges < beams.range_max))
-    known = known[:: max(1, math.ceil(len(known) / MOST_BEAMS))]
+    known = known[:: max(1, math.ceil(len(known) / tuning.MOST_BEAMS))]
     at = np.tile(one.scan.viewpoint, (len(known), 1)) if beams.origins is None else beams.origins[known]
     angles = beams.angles[known] + one.pose.theta
     return one.pose.apply(at), np.stack([np.cos(angles), np.sin(angles)], axis=1), beams.ranges[known]
@@ -198,4 +204,4 @@ def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
     turn = float(one.result.covariance[2, 2])
     noise = float(np.median(one.scan.measured.sigma)) if len(one.scan.measured) else 0.0
     deviation = np.sqrt(noise**2 + sigma**2 + position + turn * distance**2)
-    return np.maximum(LEAST_TOLERANCE, DEVIATIONS * deviation)
+    return np.maximum(tuning.LEAST_TOLERANCE, tuning.DEVIATIONS * deviation)

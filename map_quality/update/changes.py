@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +11,16 @@ from numpy.typing import NDArray
 from association import Deadline
 from registration import Segments
 
-from .beams import Chunks
+from . import tuning
+from .beams import NOTHING, Chunks
 from .evidence import Judged, WallEvidence, are_enough
 from .result import Change, ChangeCode, Evidence
 from .scans import blocks, go_on
-from .tuning import (
-    CONTRADICTING,
-    DEVIATIONS,
-    DOOR_VISITS,
-    DOUBLED,
-    DOUBT_POSE,
-    DOUBT_VISIT,
-    JAMB,
-    JOINED,
-    LEAST_PIECE,
-    LEAST_STEP,
-    LONGEST_LEAF,
-    MOST_CONFIDENCE,
-    NEAR_MOVE,
-    NEW_JOINED,
-    SAME_ANGLE,
-    SAME_GAP,
-    SAME_LENGTH,
-    SAME_LINE,
-)
-from .walls import Bools, Cut, find_cuts, runs
+from .walls import Bools, find_cuts, runs
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 NO_WALLS = np.zeros((0, 4))
-NO_CHUNKS = np.zeros(0, dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,10 +42,10 @@ class Draft:
 
     code: ChangeCode
     segments: tuple[int, ...]
-    new: Floats
-    sigma: Floats
-    gone: Indices
-    there: Indices
+    new: Floats = field(default_factory=lambda: NO_WALLS)
+    sigma: Floats = field(default_factory=lambda: np.zeros(0))
+    gone: Indices = field(default_factory=lambda: NOTHING)
+    there: Indices = field(default_factory=lambda: NOTHING)
     door: bool = False
 
     @property
@@ -105,22 +85,18 @@ def draft_changes(
     """
     judged = evidence.judge()
     cuts = find_cuts(evidence, judged, len(known), deadline)
-    removed = [_removal(cut) for cut in cuts if not len(cut.left)]
-    shortened = [_shortening(cut, sigma) for cut in cuts if len(cut.left)]
+    removed = [Draft("removed", (cut.wall,), gone=cut.chunks) for cut in cuts if not len(cut.left)]
+    shortened = [
+        Draft("shortened", (cut.wall,), cut.left, np.full(len(cut.left), sigma), cut.chunks)
+        for cut in cuts
+        if len(cut.left)
+    ]
     extended, added = _new_walls(judged, known, {cut.wall for cut in cuts}, sigmas, sigma, deadline)
     ends = [known.endpoints[list(one.segments)] for one in removed]
-    removed = _joined(removed, ends, JOINED, deadline)
-    added = _joined(added, [one.new for one in added], NEW_JOINED, deadline)
+    removed = _joined(removed, ends, tuning.JOINED, deadline)
+    added = _joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline)
     moved, removed, added = _moves(removed, added, known, deadline)
     return [*moved, *removed, *added, *extended, *shortened]
-
-
-def _removal(cut: Cut) -> Draft:
-    return Draft("removed", (cut.wall,), NO_WALLS, np.zeros(0), cut.chunks, NO_CHUNKS)
-
-
-def _shortening(cut: Cut, sigma: float) -> Draft:
-    return Draft("shortened", (cut.wall,), cut.left, np.full(len(cut.left), sigma), cut.chunks, NO_CHUNKS)
 
 
 def _new_walls(
@@ -135,25 +111,21 @@ def _new_walls(
         gone, there, _, _ = judged.of_wall(wall)
         single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), judged.chunks, wall, deadline)
         for begin, end in runs(_filled(there, gone) & single):
-            piece = _part(judged.chunks, wall, begin, end)
+            piece = judged.chunks.part(wall, begin, end)
             chunks = judged.chunks.first[wall] + begin + np.flatnonzero(there[begin:end])
-            if np.hypot(*(piece[2:] - piece[:2])) < LEAST_PIECE:
+            if np.hypot(*(piece[2:] - piece[:2])) < tuning.LEAST_PIECE:
                 continue
             pieces.append(piece)
-            old = _continued(known, piece, max(LEAST_STEP, DEVIATIONS * float(np.hypot(sigma, map_sigma))))
+            off = tuning.DEVIATIONS * float(np.hypot(sigma, map_sigma))
+            old, door = _continued(known, piece, max(tuning.LEAST_STEP, off)), _may_be_door(known, piece)
             if old is None or old in cut:
-                door = _may_be_door(known, piece)
-                added.append(Draft("added", (), piece[None], np.array([sigma]), NO_CHUNKS, chunks, door))
+                added.append(Draft("added", (), piece[None], np.array([sigma]), there=chunks, door=door))
                 continue
-            before = extended.get(old)
-            line = known.endpoints[old] if before is None else before.new[0]
-            whole = _prolonged(known, old, line, piece)
-            door = _may_be_door(known, piece)
-            one = Draft("extended", (old,), whole[None], np.array([sigma]), NO_CHUNKS, chunks, door)
-            if before is not None:
-                both = np.concatenate([before.there, chunks])
-                one = replace(one, there=both, door=door or before.door)
-            extended[old] = one
+            before = extended.get(old, Draft("extended", (old,), known.endpoints[old : old + 1]))
+            whole, read = _prolonged(known, old, before.new[0], piece), np.concatenate([before.there, chunks])
+            extended[old] = replace(
+                before, new=whole[None], sigma=np.array([sigma]), there=read, door=door or before.door
+            )
     return list(extended.values()), added
 
 
@@ -173,34 +145,27 @@ def _doubled(new: Segments, chunks: Chunks, wall: int, deadline: Deadline) -> Bo
     direction = walls.directions[wall]
     places = (np.arange(count) + 0.5) / count * walls.lengths[wall]
     points = walls.endpoints[wall, :2] + places[:, None] * direction
-    near = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * SAME_ANGLE)))
+    near = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * tuning.SAME_ANGLE)))
     out = np.zeros(count, dtype=bool)
     for rows in blocks(count, len(near), deadline):
         off = points[rows, None, :] - near.endpoints[None, :, :2]
         along = np.einsum("kij,ij->ki", off, near.directions)
         across = np.abs(np.einsum("kij,ij->ki", off, near.normals))
-        out[rows] = ((along >= 0.0) & (along <= near.lengths) & (across <= DOUBLED)).any(axis=1)
+        out[rows] = ((along >= 0.0) & (along <= near.lengths) & (across <= tuning.DOUBLED)).any(axis=1)
     return out
-
-
-def _part(chunks: Chunks, wall: int, begin: int, end: int) -> Floats:
-    """Return the ends of some chunks of a wall, (4,)."""
-    walls, count = chunks.walls, chunks.counts[wall]
-    step, place, along = walls.lengths[wall] / count, walls.endpoints[wall, :2], walls.directions[wall]
-    return np.concatenate([place + begin * step * along, place + end * step * along])
 
 
 def _continued(known: Segments, piece: Floats, step: float) -> int | None:
     """Return the wall of the map that a new piece continues, off its line by a step at most; None if there is none."""
     along = piece[2:] - piece[:2]
     direction = along / np.hypot(*along)
-    parallel = known.directions @ direction >= np.cos(SAME_ANGLE)
+    parallel = known.directions @ direction >= np.cos(tuning.SAME_ANGLE)
     middle = 0.5 * (piece[:2] + piece[2:])
-    beside = np.abs(known.normals @ middle - known.offsets) <= min(step, SAME_LINE)
+    beside = np.abs(known.normals @ middle - known.offsets) <= min(step, tuning.SAME_LINE)
     begin = known.endpoints[:, :2] @ direction - piece[2:] @ direction
     end = piece[:2] @ direction - known.endpoints[:, 2:] @ direction
     gaps = np.maximum(begin, end)  # the wall lies ahead of the piece, or behind it
-    fitting = np.flatnonzero(parallel & beside & (gaps <= SAME_GAP) & (gaps >= -SAME_GAP))
+    fitting = np.flatnonzero(parallel & beside & (gaps <= tuning.SAME_GAP) & (gaps >= -tuning.SAME_GAP))
     return int(fitting[np.argmin(np.abs(gaps[fitting]))]) if len(fitting) else None
 
 
@@ -211,14 +176,14 @@ def _may_be_door(known: Segments, piece: Floats) -> bool:
     """
     along = piece[2:] - piece[:2]
     length = float(np.hypot(*along))
-    if length > LONGEST_LEAF:
+    if length > tuning.LONGEST_LEAF:
         return False
     off = known.endpoints.reshape(-1, 2) - piece[:2]
     at = off @ along / length
     across = np.abs(off @ np.array([-along[1], along[0]])) / length
     beyond = np.maximum(-at, at - length)
-    reach = max(JAMB, LONGEST_LEAF - length)
-    return bool(((across <= JAMB) & (beyond >= -JAMB) & (beyond <= reach)).any())
+    reach = max(tuning.JAMB, tuning.LONGEST_LEAF - length)
+    return bool(((across <= tuning.JAMB) & (beyond >= -tuning.JAMB) & (beyond <= reach)).any())
 
 
 def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Floats:
@@ -258,7 +223,7 @@ def _moves(
             if k in taken or not _fits(np.hypot(*(new.new[:, 2:] - new.new[:, :2]).T), sides):
                 continue
             away = float(np.hypot(*(new.new.reshape(-1, 2).mean(axis=0) - middle)))
-            if away <= NEAR_MOVE:
+            if away <= tuning.NEAR_MOVE:
                 near.append((away, k))
         if near:
             _, k = min(near)
@@ -274,7 +239,7 @@ def _fits(new: Floats, old: Floats) -> bool:
     free = sorted(old.tolist())
     for length in sorted(new.tolist(), reverse=True):
         best = min(free, key=lambda one: abs(one - length), default=None)
-        if best is None or abs(best - length) > SAME_LENGTH:
+        if best is None or abs(best - length) > tuning.SAME_LENGTH:
             return False
         free.remove(best)
     return True
@@ -286,15 +251,22 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
     through, contra, _ = evidence.counts[gone].sum(axis=0).tolist()
     passed, on, _ = evidence.counts[there].sum(axis=0).tolist()
     against = contra + passed
-    if against > CONTRADICTING * (through + on + against):
+    if against > tuning.CONTRADICTING * (through + on + against):
         return None
     sides = [(rows, is_on) for rows, is_on in ((gone, False), (there, True)) if len(rows)]
     visits = sorted({visit for rows, is_on in sides for visit in evidence.visits_of(rows, on=is_on)})
     poses = [evidence.places_of(rows, on=is_on) for rows, is_on in sides]
-    if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < DOOR_VISITS):
+    if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < tuning.DOOR_VISITS):
         return None
-    doubt = DOUBT_VISIT ** len(visits) * DOUBT_POSE ** min(poses) + 0.1 * against / (through + on + against)
+    doubt = tuning.DOUBT_VISIT ** len(visits) * tuning.DOUBT_POSE ** min(poses) + 0.1 * against / (
+        through + on + against
+    )
     told = Evidence(through, on, min(poses), len(visits), names[visits[0]], names[visits[-1]])
     return Change(
-        draft.code, draft.segments, draft.new, draft.sigma, told, float(np.clip(1.0 - doubt, 0.01, MOST_CONFIDENCE))
+        draft.code,
+        draft.segments,
+        draft.new,
+        draft.sigma,
+        told,
+        float(np.clip(1.0 - doubt, 0.01, tuning.MOST_CONFIDENCE)),
     )

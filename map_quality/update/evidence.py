@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from association import AssociationResult, Deadline
 from registration import Segments
 
+from . import tuning
 from .beams import NOTHING, Chunks, Followed, follow
 from .hanging import hanging_lines
 from .scans import Localized
-from .tuning import ENOUGH_VISITS, FEW, LEAST_BEAMS, LEAST_POSES, LEAST_VISITS, MOST
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -87,10 +87,10 @@ class WallEvidence:
         through, on, before = cells.T
         total, read, hidden = np.zeros((len(seen), 3), dtype=np.intp), *np.zeros((2, len(seen)), dtype=bool)
         np.add.at(total, chunk, cells)
-        np.logical_or.at(read, chunk, on >= LEAST_BEAMS)
+        np.logical_or.at(read, chunk, on >= tuning.LEAST_BEAMS)
         np.logical_or.at(hidden, chunk, shows(on + before, through))
         passed, ended = total[:, 0], total[:, 1]
-        is_open = (passed >= LEAST_BEAMS) & (ended <= FEW * (passed + ended)) & ~hidden
+        is_open = (passed >= tuning.LEAST_BEAMS) & (ended <= tuning.FEW * (passed + ended)) & ~hidden
         rows, near = self._spread(seen, at)
         gone, there = (self._decided(total, rows, near, on=is_on) for is_on in (False, True))
         return Judged(self.chunks, seen, gone, there, is_open, read)
@@ -114,7 +114,7 @@ class WallEvidence:
         sights = self._shown(rows, on=on)
         poses = np.unique(np.stack([near[sights], self.place[rows][sights]]), axis=1)[0]
         enough = are_enough(visits, np.bincount(poses, minlength=size))
-        return np.asarray((total[:, int(on)] > 0) & (others <= FEW * both) & ~contradicted & enough)
+        return np.asarray((total[:, int(on)] > 0) & (others <= tuning.FEW * both) & ~contradicted & enough)
 
     def _shown(self, rows: Indices, *, on: bool) -> Bools:
         """Return which rows read their chunk, or pass through it."""
@@ -130,7 +130,7 @@ class WallEvidence:
     def is_read(self, rows: Indices) -> bool:
         """Return whether a visit reads any chunk of some rows."""
         _, cells = _by_visit(self.chunk[rows], self.visit[rows], self.counts[rows])
-        return bool((cells[:, 1] >= LEAST_BEAMS).any())
+        return bool((cells[:, 1] >= tuning.LEAST_BEAMS).any())
 
     def places_of(self, rows: Indices, *, on: bool) -> int:
         """Return the number of places from which the chunks of some rows are read, or passed through."""
@@ -161,14 +161,14 @@ def are_enough(visits: Indices | int, poses: Indices | int) -> Bools:
     Of three visits each may have seen it from the same place.
     """
     return np.asarray(
-        (np.asarray(visits) >= LEAST_VISITS)
-        & ((np.asarray(poses) >= LEAST_POSES) | (np.asarray(visits) >= ENOUGH_VISITS))
+        (np.asarray(visits) >= tuning.LEAST_VISITS)
+        & ((np.asarray(poses) >= tuning.LEAST_POSES) | (np.asarray(visits) >= tuning.ENOUGH_VISITS))
     )
 
 
 def shows(agree: Indices, against: Indices) -> Bools:
     """Return where the beams of a visit show something: enough of them, and most of all."""
-    return np.asarray((agree >= LEAST_BEAMS) & (agree >= MOST * (agree + against)))
+    return np.asarray((agree >= tuning.LEAST_BEAMS) & (agree >= tuning.MOST * (agree + against)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

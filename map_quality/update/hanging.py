@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from registration import JointSums, RigidTransform, Segments
 
+from . import tuning
 from .scans import Localized
-from .tuning import HANGING, LEAST_TOLERANCE
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -50,7 +50,7 @@ def hanging_lines(one: Localized, sigma: float) -> Floats:
         lines.append(np.array([*normal, offset]))
         rests.append(total - JointSums.of_set(local.take(mine), weights[mine]))
     found = np.array(lines).reshape(-1, 3)
-    return found[_deviations(rests, one.pose, found[:, :2]) > HANGING]
+    return found[_deviations(rests, one.pose, found[:, :2]) > tuning.HANGING]
 
 
 def on_lines(walls: Segments, lines: Floats) -> Bools:
@@ -63,7 +63,9 @@ def on_lines(walls: Segments, lines: Floats) -> Bools:
 
 def _on_line(directions: Floats, midpoints: Floats, normal: Floats, offset: float) -> Bools:
     """Return which segments lie on a line, as pieces of one wall do."""
-    return np.asarray((np.abs(directions @ normal) < 0.05) & (np.abs(midpoints @ normal - offset) < LEAST_TOLERANCE))
+    return np.asarray(
+        (np.abs(directions @ normal) < 0.05) & (np.abs(midpoints @ normal - offset) < tuning.LEAST_TOLERANCE)
+    )
 
 
 def _deviations(sums: Sequence[JointSums], pose: RigidTransform, normals: Floats) -> Floats:

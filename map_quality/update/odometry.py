@@ -13,22 +13,14 @@ import numpy as np
 from association import CancelledError, Deadline, MapIndex
 from registration import RigidTransform
 
+from . import tuning
 from .scans import Localized, VisitScan, is_vouched, mahalanobis, search
-from .tuning import (
-    AGREEING,
-    MOST_CONFIRMING_SIGMA,
-    ODOMETRY,
-    ODOMETRY_A_METRE,
-    ODOMETRY_TURN,
-    ODOMETRY_TURN_A_METRE,
-    ODOMETRY_TURN_A_RADIAN,
-)
 
 
 def odometry_deviations(driven: float, turned: float) -> tuple[float, float]:
     """Return the standard deviations of position (m) and heading (rad) by odometry, after a way (m) and turns (rad)."""
-    heading = ODOMETRY_TURN + ODOMETRY_TURN_A_METRE * driven + ODOMETRY_TURN_A_RADIAN * turned
-    return ODOMETRY + ODOMETRY_A_METRE * driven, heading
+    heading = tuning.ODOMETRY_TURN + tuning.ODOMETRY_TURN_A_METRE * driven + tuning.ODOMETRY_TURN_A_RADIAN * turned
+    return tuning.ODOMETRY + tuning.ODOMETRY_A_METRE * driven, heading
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +73,7 @@ class Carrying:
         """
         pairs = list(itertools.pairwise(usable))
         agreeing = [pair for pair in pairs if self._agree(*pair)]
-        against = [pair for pair in pairs if self._distance(*pair) > AGREEING]
+        against = [pair for pair in pairs if self._distance(*pair) > tuning.AGREEING]
         if len(against) > len(agreeing):
             return set()
         confirmed = {k for pair in agreeing for k in pair}
@@ -95,7 +87,7 @@ class Carrying:
         self._trail.clear()
         for k in rows:
             if k in anchors:
-                if last is not None and self._distance(last, k) > AGREEING:
+                if last is not None and self._distance(last, k) > tuning.AGREEING:
                     self._undo()
                 last = k
                 self._trail.clear()
@@ -114,7 +106,7 @@ class Carrying:
         if self.deadline.cancelled:
             raise CancelledError
         pose, covariance = self._predicted(last, k)
-        if _sigma(covariance) > MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
+        if _sigma(covariance) > tuning.MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
             return None
         sent = replace(self.scans[k], pose=pose, covariance=covariance)
         result = search(self.index, sent, self.deadline)
@@ -130,7 +122,9 @@ class Carrying:
 
     def _agree(self, a: int, b: int) -> bool:
         """Return whether the poses of two scans agree with odometry, which is precise enough to tell."""
-        return _sigma(self._predicted(a, b)[1]) <= MOST_CONFIRMING_SIGMA and self._distance(a, b) <= AGREEING
+        return (
+            _sigma(self._predicted(a, b)[1]) <= tuning.MOST_CONFIRMING_SIGMA and self._distance(a, b) <= tuning.AGREEING
+        )
 
     def _distance(self, a: int, b: int) -> float:
         """Return the squared Mahalanobis distance of the poses of two scans by odometry."""

@@ -22,21 +22,8 @@ from association import (
 from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
 
 from ..scale import Matched, errors_of
+from . import tuning
 from .result import RefusedVisit
-from .tuning import (
-    AGREEING,
-    HELD_BACK,
-    LEAST_SCANS,
-    LEAST_USABLE,
-    MOST_CELLS,
-    MOST_OWN_SIGMA,
-    MOST_SIGMA,
-    MOST_TURN_SIGMA,
-    NEXT_HELD_BACK,
-    OFF_SCALE,
-    PLACE,
-    SURE_OF_SCALE,
-)
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -67,7 +54,7 @@ def go_on(deadline: Deadline) -> None:
 
 def blocks(rows: int, columns: int, deadline: Deadline) -> Iterator[slice]:
     """Cut a table of pairs into blocks of rows of bounded size, and look at the deadline before each."""
-    step = max(1, MOST_CELLS // max(1, columns))
+    step = max(1, tuning.MOST_CELLS // max(1, columns))
     for begin in range(0, rows, step):
         go_on(deadline)
         yield slice(begin, min(rows, begin + step))
@@ -168,7 +155,7 @@ class Localized:
             return False
         x, y, theta = np.sqrt(np.diag(self.result.covariance))
         doubtful = any(one.code in DOUBTFUL for one in self.result.warnings)
-        return bool(max(x, y) <= MOST_SIGMA and theta <= MOST_TURN_SIGMA) and not doubtful
+        return bool(max(x, y) <= tuning.MOST_SIGMA and theta <= tuning.MOST_TURN_SIGMA) and not doubtful
 
     @property
     def pose(self) -> RigidTransform:
@@ -184,7 +171,7 @@ class Localized:
     @property
     def place(self) -> tuple[int, int]:
         """The square that it was taken in."""
-        return math.floor(self.pose.x / PLACE), math.floor(self.pose.y / PLACE)
+        return math.floor(self.pose.x / tuning.PLACE), math.floor(self.pose.y / tuning.PLACE)
 
     @property
     def pairs(self) -> Correspondences:
@@ -206,7 +193,10 @@ def held_back(visits: Sequence[int]) -> list[bool]:
     held = []
     for visit in visits:
         counts[visit] = counts.get(visit, -1) + 1
-        held.append(counts[visit] % HELD_BACK == (HELD_BACK // 2 + NEXT_HELD_BACK * visit) % HELD_BACK)
+        held.append(
+            counts[visit] % tuning.HELD_BACK
+            == (tuning.HELD_BACK // 2 + tuning.NEXT_HELD_BACK * visit) % tuning.HELD_BACK
+        )
     return held
 
 
@@ -249,7 +239,7 @@ def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
         return False
     x, y, _ = np.sqrt(np.diag(one.covariance))
     square = mahalanobis(one.pose, result.pose, np.asarray(one.covariance) + result.covariance)
-    return bool(max(x, y) <= MOST_OWN_SIGMA and square <= AGREEING)
+    return bool(max(x, y) <= tuning.MOST_OWN_SIGMA and square <= tuning.AGREEING)
 
 
 def mahalanobis(a: RigidTransform, b: RigidTransform, covariance: Floats) -> float:
@@ -282,22 +272,22 @@ def choose_evidence(
 def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float) -> str | None:
     """Return why a visit gives no evidence; None if it does."""
     sure = sum(one.usable for one in precise)
-    if sure < max(LEAST_SCANS, LEAST_USABLE * len(own)):
+    least = max(tuning.LEAST_SCANS, math.ceil(tuning.LEAST_USABLE * len(own)))
+    if sure < least:
         return (
-            f"{sure} of {len(own)} scans are usable and precise, expected at least "
-            f"{max(LEAST_SCANS, math.ceil(LEAST_USABLE * len(own)))}. Check that the scans are from this building, "
-            "and that the map shows the places where they were taken."
+            f"{sure} of {len(own)} scans are usable and precise, expected at least {least}. Check that the scans are "
+            "from this building, and that the map shows the places where they were taken."
         )
     matched = [Matched(one.scan, one.pose, one.pairs) for one in precise]
     errors = errors_of(matched, sigma)
-    if errors.scale_deviation > SURE_OF_SCALE:
+    if errors.scale_deviation > tuning.SURE_OF_SCALE:
         return (
             f"The scale of the scans is known to {100.0 * errors.scale_deviation:.1f} % only, expected "
-            f"{100.0 * SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
+            f"{100.0 * tuning.SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
         )
-    if abs(errors.scale) > OFF_SCALE:
+    if abs(errors.scale) > tuning.OFF_SCALE:
         return (
             f"Lengths of the scans are off by {100.0 * errors.scale:.1f} % from those of the map, expected at most "
-            f"{100.0 * OFF_SCALE:g} %. Check the scale of the map and of the ranges."
+            f"{100.0 * tuning.OFF_SCALE:g} %. Check the scale of the map and of the ranges."
         )
     return None

@@ -24,21 +24,9 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from association import Deadline, MapIndex
 from registration import Segments
 
+from . import tuning
 from .result import Sharpened
 from .scans import Localized, blocks, go_on
-from .tuning import (
-    ANGLE_FLOOR,
-    CORNER,
-    CORNER_SINE,
-    FREE_POSE,
-    LEAST_POSES,
-    LEAST_VISITS,
-    LINE_FLOOR,
-    MOST_POSES,
-    MOST_TILT,
-    OUTLYING,
-    SHARPER,
-)
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -88,7 +76,7 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline:
     Sharpened
         Of walls that several visits and places see, and whose position becomes clearly better known.
     """
-    found = found[:: max(1, math.ceil(len(found) / MOST_POSES))]
+    found = found[:: max(1, math.ceil(len(found) / tuning.MOST_POSES))]
     known = Segments.derived(index.segments.endpoints[: index.directed])
     wall_of = np.array(index.wall_of_piece[: index.directed], dtype=np.intp)
     seen = np.unique([pair.map for one in found for pair in one.result.correspondences]).astype(np.intp)
@@ -97,16 +85,16 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline:
     middles, lengths = _extents(own, number, len(walls))
     wall_of[pieces] = number  # those that no scan sees stay as they are
     pairs = _pairs_of(known, wall_of, middles, found)
-    prior = np.stack([np.full(len(walls), sigma), np.minimum(MOST_TILT, 2.0 * sigma / lengths)], axis=1)
+    prior = np.stack([np.full(len(walls), sigma), np.minimum(tuning.MOST_TILT, 2.0 * sigma / lengths)], axis=1)
     shift, covariance = _solve(pairs, prior, deadline)
     off = np.abs(pairs.residual - np.einsum("ij,ij->i", pairs.of_wall, shift[pairs.wall]))
-    inliers = off <= OUTLYING * np.sqrt(pairs.variance + sigma**2)
+    inliers = off <= tuning.OUTLYING * np.sqrt(pairs.variance + sigma**2)
     shift, covariance = _solve(pairs.take(inliers), prior, deadline)
     spread = _deviations(own, number, middles, covariance)
     widest = np.zeros(len(walls))
     np.maximum.at(widest, number, spread)
-    better = _seen_often(pairs, found, len(walls)) & (widest <= SHARPER * sigma)
-    better &= np.abs(shift[:, 0]) <= OUTLYING * sigma
+    better = _seen_often(pairs, found, len(walls)) & (widest <= tuning.SHARPER * sigma)
+    better &= np.abs(shift[:, 0]) <= tuning.OUTLYING * sigma
     mine = np.flatnonzero(better[number])
     moved, ends = pieces[mine], known.endpoints.copy()
     ends[moved] = _moved(own, number, middles, shift)[mine]
@@ -148,7 +136,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
                 np.column_stack([normals, lever]),
                 np.column_stack([one_, along]),
                 offset,
-                pairs.variances + LINE_FLOOR**2,
+                pairs.variances + tuning.LINE_FLOOR**2,
             ),
             _Pairs(
                 np.full(len(on), number),
@@ -156,7 +144,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
                 np.column_stack([zero, zero, one_]),
                 np.column_stack([zero, one_]),
                 angle,
-                pairs.variances / np.maximum(pairs.spreads, 1e-6) + ANGLE_FLOOR**2,
+                pairs.variances / np.maximum(pairs.spreads, 1e-6) + tuning.ANGLE_FLOOR**2,
             ),
         ]
     return _Pairs(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Pairs.__slots__))
@@ -180,7 +168,7 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
     weighted = diags_array(weight) @ of_pose
     both = (of_wall.T @ weighted).tocsr()
     gain = (inverse @ both).tocsr()
-    x, y = FREE_POSE
+    x, y = tuning.FREE_POSE
     free = np.diag(np.tile(1.0 / np.square([x, x, y]), size // 3))
     of_poses = np.linalg.inv(free + (of_pose.T @ weighted - both.T @ gain).toarray())
     shift = inverse @ at_wall - gain @ (of_poses @ (at_pose - gain.T @ at_wall))
@@ -212,7 +200,7 @@ def _seen_often(pairs: _Pairs, found: Sequence[Localized], count: int) -> Bools:
     places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
     of_scan = np.array([(one.visit, places[one.place]) for one in found], dtype=np.intp).reshape(-1, 2)
     often = np.ones(count, dtype=bool)
-    for column, least in ((0, LEAST_VISITS), (1, LEAST_POSES)):
+    for column, least in ((0, tuning.LEAST_VISITS), (1, tuning.LEAST_POSES)):
         seen = np.unique(np.stack([pairs.wall, of_scan[pairs.scan, column]], axis=1), axis=0)
         often &= np.bincount(seen[:, 0], minlength=count) >= least
     return often
@@ -230,7 +218,7 @@ def _moved(known: Segments, wall_of: Indices, middles: Floats, shift: Floats) ->
 def _joined(known: Segments, ends: Floats, moved: Indices) -> Floats:
     """Return the ends with corners closed again: walls that moved end where they cross the wall that they met."""
     new, out = Segments.derived(ends), ends.copy()
-    _, cell = np.unique(np.round(known.endpoints.reshape(-1, 2) / CORNER), axis=0, return_inverse=True)
+    _, cell = np.unique(np.round(known.endpoints.reshape(-1, 2) / tuning.CORNER), axis=0, return_inverse=True)
     order = np.argsort(cell.ravel(), kind="stable")
     first, count = np.unique(cell.ravel()[order], return_index=True, return_counts=True)[1:]
     corners = np.stack([order[first[count == 2]], order[first[count == 2] + 1]], axis=1)
@@ -241,7 +229,7 @@ def _joined(known: Segments, ends: Floats, moved: Indices) -> Floats:
         if a == b or not (is_moved[a] or is_moved[b]):
             continue
         normals = np.stack([new.normals[a], new.normals[b]])
-        if abs(float(np.linalg.det(normals))) < CORNER_SINE:
+        if abs(float(np.linalg.det(normals))) < tuning.CORNER_SINE:
             continue
         point = np.linalg.solve(normals, [new.offsets[a], new.offsets[b]])
         for corner in both:

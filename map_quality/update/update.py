@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from registration import InvalidArgumentError, Segments
 
+from . import tuning
 from .additions import candidates, unexplained
-from .applying import apply, apply_changes, kept_indices, with_ends
+from .applying import apply, apply_changes, with_ends
 from .beams import Chunks, sees
 from .changes import Draft, change_of, draft_changes
 from .evidence import Gatherer, WallEvidence
@@ -35,7 +36,6 @@ from .scans import (
     visit_numbers,
 )
 from .sharpening import sharpen
-from .tuning import DROPS, LEAST_BLUR, ROUNDS, USUAL_SIGMA
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 
 Floats = NDArray[np.float64]
@@ -139,7 +139,10 @@ class _Update:
     def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
         """Begin an update."""
         known = Segments.derived(index.segments.endpoints[: index.directed])
-        sigma, oriented = USUAL_SIGMA if index.sigma is None else index.sigma, len(index.segments) == index.directed
+        sigma, oriented = (
+            tuning.USUAL_SIGMA if index.sigma is None else index.sigma,
+            len(index.segments) == index.directed,
+        )
         return cls(index, list(scans), deadline, Gatherer(known, sigma, oriented, deadline))
 
     @property
@@ -178,10 +181,10 @@ class _Update:
         """Draft changes until they show no more scans, and verify them."""
         latest = first
         shown: list[tuple[str, tuple[int, ...], int]] = []
-        for number in range(ROUNDS):
+        for number in range(tuning.ROUNDS):
             drafts, evidence = yield from self.draft(chosen, names)
             before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
-            if shown == before or number == ROUNDS - 1:
+            if shown == before or number == tuning.ROUNDS - 1:
                 break
             latest = yield from self.search_others(drafts, first, latest)
             chosen, _ = choose_evidence(names, latest, self.sigma)
@@ -205,7 +208,7 @@ class _Update:
     ) -> Generator[None, None, Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
         found, changed = list(first), self._changed(drafts)
-        for _ in range(DROPS):
+        for _ in range(tuning.DROPS):
             new = self._index(drafts) if drafts else None
             if new is None:
                 break
@@ -238,21 +241,21 @@ class _Update:
         Proposed
             The same if the map is sharp enough, or if the sharper one fits the scans less.
         """
-        if self.index.sigma is None or self.index.sigma < LEAST_BLUR:
+        if self.index.sigma is None or self.index.sigma < tuning.LEAST_BLUR:
             return proposed
         found = proposed.found or tuple(first)
         chosen, _ = choose_evidence(names, found, self.sigma)
         if not chosen:
             return proposed
-        kept = kept_indices(len(self.known), proposed.changes)
-        index = self._indexed(apply(self.known, proposed.changes)) if proposed.changes else self.index
+        segments, kept = apply(self.known, proposed.changes)
+        index = self._indexed(segments) if proposed.changes else self.index
         better = sharpen(index, on_map(chosen, self.index, index, kept), self.sigma, self.deadline)
         old = kept[better.segments]
         mine = old >= 0
         if not mine.any():
             return proposed
         sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
-        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
+        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes)[0])
         again = yield from self._search_all(new, first, None)
         if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
             return proposed
@@ -305,7 +308,7 @@ class _Update:
 
     def _index(self, drafts: Drafts) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
-        segments = apply(self.known, [change for _, change in drafts])
+        segments, _ = apply(self.known, [change for _, change in drafts])
         return self._indexed(segments) if len(segments) else None
 
     def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from . import tuning
 from .changes import Draft
 from .evidence import WallEvidence
 from .result import NOT_SHARPENED, Change, Sharpened, Usable
 from .scans import Localized
-from .tuning import FEWER_USABLE, LOWER_SCORE, SAME_POSE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,9 +46,9 @@ def is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], 
         if before.number not in concerned or not before.located:
             continue
         gain += after.score - before.score
-        if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > SAME_POSE:
+        if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > tuning.SAME_POSE:
             return False
-    return gain >= -LOWER_SCORE
+    return gain >= -tuning.LOWER_SCORE
 
 
 def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
@@ -65,13 +65,13 @@ def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> list[L
     return [
         before
         for before, after in zip(first, found, strict=True)
-        if before.usable and not after.usable and after.score < before.score - LOWER_SCORE
+        if before.usable and not after.usable and after.score < before.score - tuning.LOWER_SCORE
     ]
 
 
 def most_lost(count: int) -> float:
     """Return how many of so many scans a proposal may lose."""
-    return max(1.0, FEWER_USABLE * count)
+    return max(1.0, tuning.FEWER_USABLE * count)
 
 
 def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:

@@ -12,18 +12,10 @@ from scipy.sparse.csgraph import connected_components
 
 from association import Deadline
 
+from . import tuning
 from .beams import Chunks
 from .evidence import Judged, WallEvidence, are_enough
 from .scans import go_on
-from .tuning import (
-    FEW_ON_THING,
-    LEAST_CUT,
-    LEAST_GONE,
-    LEAST_GONE_OF_THING,
-    LEAST_PIECE,
-    LOOP_GAP,
-    THING,
-)
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -75,7 +67,7 @@ def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iter
     A thing that beams pass through is not solid, so its other sides are gone, too, whether they were seen or not.
     """
     chunks = evidence.chunks
-    corners = np.round(chunks.walls.endpoints[:walls].reshape(-1, 2) / LOOP_GAP).astype(np.int64)
+    corners = np.round(chunks.walls.endpoints[:walls].reshape(-1, 2) / tuning.LOOP_GAP).astype(np.int64)
     _, corner = np.unique(corners, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 2)
     at = np.bincount(corner.ravel())
@@ -87,7 +79,7 @@ def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iter
     for loop in np.unique(loop_of[passed[passed < walls]]):
         go_on(deadline)
         mine = order[np.searchsorted(loop_of, loop, sorter=order) : np.searchsorted(loop_of, loop, "right", order)]
-        if len(mine) < 3 or chunks.walls.lengths[mine].sum() > THING or (at[np.unique(corner[mine])] != 2).any():
+        if len(mine) < 3 or chunks.walls.lengths[mine].sum() > tuning.THING or (at[np.unique(corner[mine])] != 2).any():
             continue
         own = [np.arange(chunks.first[wall], chunks.first[wall + 1]) for wall in mine]
         if _is_gone_whole(evidence, np.concatenate(own)):
@@ -101,22 +93,22 @@ def _is_gone_whole(evidence: WallEvidence, chunks: Indices) -> bool:
     """Return whether beams of several visits and poses pass through a good part of a thing, and nothing reads it."""
     rows = evidence.rows_of(chunks)
     through, on, _ = evidence.counts[rows].sum(axis=0)
-    if on > FEW_ON_THING * (through + on) or evidence.visits_of(rows, on=True) or evidence.is_read(rows):
+    if on > tuning.FEW_ON_THING * (through + on) or evidence.visits_of(rows, on=True) or evidence.is_read(rows):
         return False
     passed = len(np.unique(evidence.chunk[rows][evidence.counts[rows, 0] > 0])) / len(chunks)
     visits, poses = evidence.visits_of(rows, on=False), evidence.places_of(rows, on=False)
-    return bool(are_enough(len(visits), poses) and passed >= LEAST_GONE_OF_THING)
+    return bool(are_enough(len(visits), poses) and passed >= tuning.LEAST_GONE_OF_THING)
 
 
 def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
     """Return what is gone of a wall; None where that is too little to be sure of."""
     first, length = int(chunks.first[wall]), float(chunks.walls.lengths[wall])
     step = length / len(gone)
-    if gone.mean() >= LEAST_GONE and not (read & ~gone).any():
+    if gone.mean() >= tuning.LEAST_GONE and not (read & ~gone).any():
         return Cut(wall, first + np.flatnonzero(gone), np.zeros((0, 4)))
     out = np.zeros(len(gone), dtype=bool)
     for begin, end in runs(gone):
-        if (end - begin) * step < LEAST_CUT:
+        if (end - begin) * step < tuning.LEAST_CUT:
             continue
         while begin > 0 and open_[begin - 1]:
             begin -= 1
@@ -124,10 +116,9 @@ def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools) -> C
             end += 1
         out[begin:end] = True
     for begin, end in runs(~out):  # what is too short to be a wall, and is not read
-        if (end - begin) * step < LEAST_PIECE + 0.5 * step and not read[begin:end].any() and out.any():
+        if (end - begin) * step < tuning.LEAST_PIECE + 0.5 * step and not read[begin:end].any() and out.any():
             out[begin:end] = True
     if not out.any():
         return None
-    place, along = chunks.walls.endpoints[wall, :2], chunks.walls.directions[wall]
-    left = [np.concatenate([place + begin * step * along, place + end * step * along]) for begin, end in runs(~out)]
+    left = [chunks.part(wall, begin, end) for begin, end in runs(~out)]
     return Cut(wall, first + np.flatnonzero(out & gone), np.array(left).reshape(-1, 4))

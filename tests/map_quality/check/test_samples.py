@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex, Scan, associate, scaled
-from map_quality import Sample, SampleReport, conclude, find_thickness, try_sample
-from map_quality.check.thickness import thickness_finding
+from map_quality import Sample, SampleReport, conclude, try_sample
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
 
@@ -177,9 +177,8 @@ def test_a_deadline_leaves_out_what_it_has_no_time_for() -> None:
 # --- Thickness of walls -----------------------------------------------------------------------------------------------
 
 
-def found(walls: Floats, *, oriented: bool = True, deadline: Deadline | None = None) -> float | None:
-    scans = [scan for _, scan in sampled()]
-    return find_thickness(index_of(walls), scans, deadline or Deadline(), oriented=oriented)
+def found(walls: Floats, *, oriented: bool = True) -> float | None:
+    return told(walls, oriented=oriented).wall_thickness
 
 
 def test_the_thickness_of_centre_lines() -> None:
@@ -206,21 +205,27 @@ def test_whether_a_map_is_mirrored_or_too_thick(walls: Floats, code: str) -> Non
 
 def test_no_thickness_by_scans_that_see_nothing() -> None:
     blind = Scan(MeasuredSegments.from_segments(Segments.from_array([])))
-    assert find_thickness(index_of(faces()), [blind], Deadline(), oriented=True) is None
+    index = index_of(faces())
+    sample = try_sample(index, blind, Deadline(), oriented=True)
+    assert conclude(index, [blind], [sample], Deadline(), oriented=True).wall_thickness is None
 
 
-def test_no_thickness_without_scans_and_without_time() -> None:
-    assert find_thickness(index_of(faces()), [], Deadline(), oriented=True) is None
-    assert found(centre_lines(), oriented=False, deadline=Deadline(time.monotonic())) is None
+def test_no_thickness_without_trials() -> None:
+    index, scans = index_of(centre_lines()), [scan for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=False) for scan in scans]
+    late = [replace(one, trials=dict(list(one.trials.items())[:1])) for one in samples]
+    assert conclude(index, scans, late, Deadline(), oriented=False).wall_thickness is None
 
 
 def test_the_sentence_on_thickness_says_what_to_do() -> None:
-    centres = thickness_finding(0.284, oriented=False)
-    assert (centres.code, "thickness 0.28" in centres.message) == ("centre_lines", True)
-    thin, thick = thickness_finding(0.08, oriented=True), thickness_finding(-0.08, oriented=True)
-    assert thin.code == thick.code == "thickness"
-    assert "8 cm thicker than drawn" in thin.message
-    assert "8 cm thinner than drawn" in thick.message
-    assert "thickness plus 0.08 m" in thin.message
-    assert "thickness minus 0.08 m" in thick.message
+    centres, thick, thin = (
+        next(one for one in told(walls, oriented=oriented).findings if one.code in ("centre_lines", "thickness"))
+        for walls, oriented in ((centre_lines(), False), (two_faces(0.1), True), (two_faces(0.35), True))
+    )
+    assert (centres.code, "thickness 0.2" in centres.message) == ("centre_lines", True)
+    assert thick.code == thin.code == "thickness"
+    assert "cm thicker than drawn" in thick.message
+    assert "cm thinner than drawn" in thin.message
+    assert "thickness plus 0.1" in thick.message
+    assert "thickness minus 0.1" in thin.message
     assert all("any other map, for example a grid" in one.message for one in (thin, thick))  # which has no thickness
