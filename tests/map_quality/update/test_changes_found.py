@@ -8,7 +8,7 @@ import pytest
 import map_quality
 from association import MapIndex
 from map_quality import Change, Evidence, MapUpdate, VisitScan, apply_changes
-from map_quality.update.applying import kept_indices
+from map_quality.update.applying import apply
 from map_quality.update.evidence import are_enough
 from registration import Segments
 
@@ -181,4 +181,4 @@ def test_changes_are_applied_in_the_order_of_the_segments() -> None:
     applied, sigma = apply_changes(old, 0.02, changes)
     assert applied.endpoints.tolist() == np.array(expected).tolist()
     assert sigma == 0.02
-    assert kept_indices(5, changes).tolist() == [0, -1, 2, 4, -1, -1]
+    assert apply(old, changes)[1].tolist() == [0, -1, 2, 4, -1, -1]
