@@ -14,6 +14,7 @@ import pytest
 from examples.running import free_port
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
+from tests.issuing import ADMIN
 from tests.running import RunningService
 
 from .running import Linefix, refused
@@ -116,7 +117,7 @@ def test_what_is_not_done_is_told_in_one_line(
 def test_a_key_comes_from_the_environment(linefix: Linefix, folder: Path, guarded: RunningService) -> None:
     asked = ("locate", "room.json", "scan.json", "--server", guarded.url)
     assert "LINEFIX_KEY" in refused(linefix(*asked), 4)
-    assert linefix(*asked, LINEFIX_KEY="sesame").code == 0
+    assert linefix(*asked, LINEFIX_KEY=ADMIN).code == 0
 
 
 def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix, folder: Path) -> None:
