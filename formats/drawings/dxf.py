@@ -26,8 +26,7 @@ from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_
 from ..options import US_FOOT, ImportOptions
 from ..report import Notes, listed, shown
 from .drawing import Drawing
-from .dxf_blocks import Expansion, Placed
-from .dxf_clips import shown_parts
+from .dxf_blocks import Expansion, Placed, shown_parts
 from .selection import matches
 
 if TYPE_CHECKING:

@@ -2,30 +2,50 @@
 
 An entity on layer 0 of a block is on the layer of the block's reference (INSERT). A frozen layer hides its entities
 and references, with all that is in them. A layer that is off hides its entities alone. Of a reference on it these are
-the entities on layer 0 of the block; those with a visible layer of their own remain.
+the entities on layer 0 of the block; those with a visible layer of their own remain. A clipped reference (XCLIP) shows
+a part of its lines.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.insert import Insert
 from ezdxf.entities.mline import MLine
+from ezdxf.math import BoundingBox2d, Vec2, Vec3
+from ezdxf.math.clipping import ConcaveClippingPolygon2d, InvertedClippingPolygon2d
+from ezdxf.xclip import XClip
 
 from ..errors import TooLargeError
 from ..limits import MAX_BLOCK_DEPTH, MAX_ENTITIES
 from ..report import Notes, listed, shown
 from .drawing import Drawing
-from .dxf_clips import Clip, clip_of
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document
 
 BYBLOCK = "0"  # the layer whose entities take that of their block's reference
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A polygon of the model space; what is outside is hidden, or inside where `inverted`."""
+
+    polygon: tuple[Vec2, ...]
+    inverted: bool
+
+    def shown(self, line: Sequence[Vec2]) -> list[Sequence[Vec2]]:
+        """Return the parts of a polyline that are shown."""
+        if not self.inverted:
+            return list(ConcaveClippingPolygon2d(self.polygon).clip_polyline(line))
+        bounds = BoundingBox2d([*self.polygon, *line])
+        bounds.grow(0.1 * bounds.size.magnitude)
+        return list(InvertedClippingPolygon2d(self.polygon, bounds).clip_polyline(line))
+
 
 Clips = tuple[Clip, ...]
 
@@ -164,3 +184,26 @@ class Expansion:
 def _layers_of(entity: DXFEntity, outer: tuple[str, ...]) -> tuple[str, ...]:
     layer = str(entity.dxf.get("layer", BYBLOCK))
     return (*outer, outer[-1] if outer and layer == BYBLOCK else layer)
+
+
+def clip_of(reference: Insert, placed: Insert) -> Clip | None:
+    """Return how a reference clips its block, at the place of one of its copies; None where it does not."""
+    source = reference.origin_of_copy or reference
+    clip = XClip(source) if isinstance(source, Insert) else None
+    if clip is None or not (clip.has_clipping_path and clip.is_clipping_enabled):
+        return None
+    path = clip.get_block_clipping_path()
+    inner = list(path.inner_polygon())
+    corners = BoundingBox2d(inner).rect_vertices() if len(inner) == 2 else inner
+    polygon = Vec2.tuple(placed.matrix44().transform_vertices(Vec3.generate(corners)))
+    return Clip(polygon, path.is_inverted_clip) if len(polygon) > 2 else None
+
+
+def shown_parts(points: list[Vec3], clips: Sequence[Clip]) -> list[list[tuple[float, float, float]]]:
+    """Return the parts of a polyline that no reference hides."""
+    if not clips:
+        return [[(p.x, p.y, p.z) for p in points]]
+    parts: list[Sequence[Vec2]] = [Vec2.list(points)]
+    for clip in clips:
+        parts = [part for line in parts for part in clip.shown(line)]
+    return [[(p.x, p.y, points[0].z) for p in part] for part in parts]
