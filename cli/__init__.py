@@ -4,7 +4,7 @@
 
     entry                     run a command; errors become one line and an exit code
     program                   all commands together
-    locate, register, vectorize, replay, batch, analyze, key, ros2, maps/    the commands
+    locate, register, vectorize, replay, batch, analyze, ros2, maps/    the commands
     asking                    where a request goes: to a server by `linefix-client`, or to `linefix.answering`
     stored                    the store of maps of this machine
     inputs, scans, logs       files to requests

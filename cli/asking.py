@@ -10,86 +10,65 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from .compiling import compile_first
-from .errors import NOTHING, Asked, CommandError, NoServerError, RefusedError, WrongUseError, error_of, refusing
-from .inputs import read_map_or_id
+from .errors import (
+    NOTHING,
+    Asked,
+    CommandError,
+    NoServerError,
+    NoSuchMapError,
+    RefusedError,
+    WrongUseError,
+    refused_at,
+    refusing,
+)
 from .printing import Json
+from .progress import compile_first
 
 if TYPE_CHECKING:
     from linefix.answering import Within
 
+    from .stored import StoredMaps
+
 N = TypeVar("N", int, float)
-Question = Literal["associate", "register", "vectorize"]
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
 MAX_PAGES = 100_000  # of a list of maps
 MOST_SCANS = 10**9  # of an update: each is read from a file of this machine
+OF_STORED = {"check": "check_map", "update": "update_map"}  # methods of the client: a server has them for stored maps
+LIMITS = {  # by the name of the setting
+    "MAX_VALUES": "values",
+    "MAX_MAP_SEGMENTS": "map_segments",
+    "MAX_SCAN_SEGMENTS": "scan_segments",
+    "MAX_BEAMS": "beams",
+    "MAX_CORRESPONDENCES": "pairs",
+}
+BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 _HEADER = re.compile(r"[!-~]+")
 
 
-class MapKeeper(Protocol):
-    """Stored maps: of a server, or of this machine."""
-
-    def put(self, map_id: str, document: Json) -> Json:
-        """Store a map; return the answer of ``PUT``."""
-        ...
-
-    def get(self, map_id: str) -> Json:
-        """Return a stored map."""
-        ...
-
-    def maps(self) -> Iterator[Json]:
-        """Yield the summary of each stored map, by id."""
-        ...
-
-    def remove(self, map_id: str) -> None:
-        """Forget a stored map."""
-        ...
+def _about(first: Any) -> Asked:
+    """Return the subject of a request, of the map of one, or of the id of a map."""
+    on = first.get("map", first) if isinstance(first, dict) else first
+    map_id = on.get("map_id") if isinstance(on, dict) else on
+    return Asked(map_id if isinstance(map_id, str) else None)
 
 
-def id_of(on: object) -> str | None:
-    """Return the id of a request's map, None where the map itself is there."""
-    return on.get("map_id") if isinstance(on, dict) else None
+def ask(question: str, server: str | None, *documents: Any, **more: Any) -> Json:
+    """Return the answer to a question of `linefix.answering`: of the server at a URL, else of this process.
 
-
-def ask(question: Question, body: Json, server: str | None) -> Json:
-    """Return the answer of ``POST /v1/<question>``: of the server at a URL, or of this process where there is none."""
+    The first document is a request, or the map of a check or an update; `more` is for this process alone.
+    """
     if server is not None:
+        sent = (_stored(documents[0]), *documents[1:]) if question in OF_STORED else documents
         with server_at(server) as remote:
-            return remote.ask(question, body)
-    with answering(Asked(id_of(body.get("map")))) as within:
+            return remote.call(f"{question.title()}Answer", OF_STORED.get(question, question), *sent)
+    with answering(_about(documents[0])) as within:
         from linefix import answering as library
 
-        return {
-            "associate": library.associate,
-            "register": library.register,
-            "vectorize": library.vectorize,
-        }[question](body, within)
-
-
-def check(on: Json, scans: list[Json], server: str | None) -> Json:
-    """Return the answer of ``/v1/maps/{map_id}:check``; without a server also for a map that is not stored."""
-    samples = {"scans": scans} if scans else None
-    if server is not None:
-        with server_at(server) as remote:
-            return remote.call("CheckAnswer", "check_map", _stored(on), samples)
-    with answering(Asked(id_of(on))) as within:
-        from linefix import answering as library
-
-        return library.check(on, samples, within)
-
-
-def update(on: Json, request: Json, server: str | None) -> Json:
-    """Return the answer of ``/v1/maps/{map_id}:update``; without a server also for a map that is not stored."""
-    if server is not None:
-        with server_at(server) as remote:
-            return remote.call("UpdateAnswer", "update_map", _stored(on), request)
-    with answering(Asked(id_of(on))) as within:
-        from linefix import answering as library
-
-        return library.update(on, request, within)
+        answer: Json = getattr(library, question)(*documents, within, **more)
+        return answer
 
 
 @contextmanager
@@ -99,16 +78,9 @@ def answering(asked: Asked = NOTHING) -> Iterator[Within]:
     from linefix.documents.limits import Limits
 
     compile_first()
-    limits = Limits(
-        values=setting("MAX_VALUES", Limits().values),
-        map_segments=setting("MAX_MAP_SEGMENTS", Limits().map_segments),
-        scan_segments=setting("MAX_SCAN_SEGMENTS", Limits().scan_segments),
-        beams=setting("MAX_BEAMS", Limits().beams),
-        pairs=setting("MAX_CORRESPONDENCES", Limits().pairs),
-        batch=MOST_SCANS,
-    )
+    limits = {name: setting(variable, getattr(Limits(), name)) for variable, name in LIMITS.items()}
     with refusing(asked):
-        yield Within(limits, setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored_here)
+        yield Within(Limits(**limits, batch=MOST_SCANS), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored_here)
 
 
 def setting(name: str, default: N) -> N:
@@ -131,7 +103,7 @@ def _stored_here(map_id: str) -> tuple[Any, Json]:
 
 
 @contextmanager
-def keeping(server: str | None) -> Iterator[MapKeeper]:
+def keeping(server: str | None) -> Iterator[Server | StoredMaps]:
     """Give the stored maps: those of the server at a URL, or those of this machine where there is none."""
     if server is not None:
         with server_at(server) as remote:
@@ -145,15 +117,10 @@ def keeping(server: str | None) -> Iterator[MapKeeper]:
 
 def whole_map(on: Json, server: str | None) -> Json:
     """Return the map of a request itself, also where the request has its id; raises `RefusedError` where it is gone."""
-    if "map_id" not in on or "segments" in on:
+    if "segments" in on or "map_id" not in on:
         return on
     with keeping(server) as maps:
         return maps.get(on["map_id"])
-
-
-def document_at(name: str, server: str | None) -> Json:
-    """Return a map itself: that of a file, or a stored one."""
-    return whole_map(read_map_or_id(name), server)
 
 
 @contextmanager
@@ -197,10 +164,6 @@ class Server:
     def __init__(self, url: str, client: Any) -> None:
         self._url, self._client = url, client
 
-    def ask(self, question: Question, body: Json) -> Json:
-        """Return the answer of ``POST /v1/<question>``."""
-        return self.call(f"{question.title()}Answer", question, body, asked=Asked(id_of(body.get("map"))))
-
     def import_map(self, files: list[Path], fields: Json) -> Json:
         """Return the answer of ``POST /v1/maps:import``."""
         named, asked = [(file.name, file.read_bytes()) for file in files], Asked(files=tuple(f.name for f in files))
@@ -208,7 +171,7 @@ class Server:
 
     def put(self, map_id: str, document: Json) -> Json:
         """Store a map."""
-        return self.call("MapSummaryAnswer", "put_map", map_id, document, asked=NOTHING)
+        return self.call("MapSummaryAnswer", "put_map", map_id, document)
 
     def get(self, map_id: str) -> Json:
         """Return a stored map."""
@@ -239,7 +202,7 @@ class Server:
         """
         from pydantic import ValidationError
 
-        about = asked or Asked(arguments[0] if arguments and isinstance(arguments[0], str) else None)
+        about = asked or (_about(arguments[0]) if arguments else NOTHING)
         answer: Json = self._asked(about, lambda: getattr(self._client, method)(*arguments, **options))
         try:
             _fields(kind).validate_python(answer)
@@ -273,8 +236,13 @@ class Server:
             return NoServerError(f"{self._url} requires a key; set {KEY} in the environment")
         if error.status == 403:
             return NoServerError(f"{self._url}: {error.detail}; set {KEY} in the environment to a key with this right")
-        faults = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
-        return error_of(error.status, error.code, f"{self._url}: {error.detail}", faults, asked)
+        if error.code == "unknown_map" and asked.map_id is not None:
+            return NoSuchMapError(asked.map_id)
+        named = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
+        faults = [(one["pointer"], one["message"]) for one in named]
+        detail = ": ".join((*asked.files[:1], f"{self._url}: {error.detail}"))
+        refused = refused_at(faults, asked) if faults else RefusedError(detail)
+        return refused if 400 <= error.status < 500 and error.status not in BUSY else NoServerError(str(refused))
 
 
 @cache
@@ -288,10 +256,9 @@ def _fields(kind: str) -> Any:
 
 def _stored(on: Json) -> str:
     """Return the id of a stored map; raises `WrongUseError` where it is a map file."""
-    map_id = id_of(on)
-    if map_id is None:
+    if "map_id" not in on:
         raise WrongUseError(
             "found a map file, expected the id of a stored map with --server; "
             "store it with linefix map put, or omit --server"
         )
-    return map_id
+    return str(on["map_id"])

@@ -3,51 +3,41 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from .errors import RefusedError, WrongUseError
-from .options import AsJson, UsableOptions, grouped
+from .options import AsJson, Undirected, UsableOptions, argument, flag, grouped, option
 from .printing import noted, print_json, print_rows
+from .progress import progress
 
 if TYPE_CHECKING:
     from batch import Engine, FleetOptions, LogNote, Summary
-    from batch import Progress as Done
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerOptions:
     """The workers of a run, as options."""
 
-    workers: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Number of processes. Default: the number of cores.")
-    ] = None
-    ray: Annotated[bool, typer.Option("--ray", help="Run on a Ray cluster: that of RAY_ADDRESS, or a new one.")] = False
-    block: Annotated[
-        int, typer.Option(min=1, max=65_536, metavar="N", help="Number of scans in the block of a worker.")
-    ] = 512
+    workers: Annotated[int | None, option("Number of processes. Default: the number of cores.", "N", min=1)] = None
+    ray: Annotated[bool, flag("Run on a Ray cluster: that of RAY_ADDRESS, or a new one.", "--ray")] = False
+    block: Annotated[int, option("Number of scans in the block of a worker.", "N", min=1, max=65_536)] = 512
 
 
 @dataclass(frozen=True, slots=True)
 class SearchChoice:
     """How to search each scan, as options."""
 
-    undirected: Annotated[bool, typer.Option("--undirected", help="The directions of segments have no meaning.")] = (
-        False
-    )
-    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time limit of each search.")] = 10_000.0
+    undirected: Undirected = False
+    deadline_ms: Annotated[float, option("Time limit of each search.", "MS", min=1.0)] = 10_000.0
 
 
 @grouped
 def batch(
-    logs: Annotated[list[str], typer.Argument(metavar="LOGS", help="Parquet files, bags, MCAP files or CARMEN logs.")],
-    maps: Annotated[Path, typer.Option(metavar="MAPS", help="A map file, or a folder of map files.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row per scan.")],
+    logs: Annotated[list[str], argument("Parquet files, bags, MCAP files or CARMEN logs.", "LOGS")],
+    maps: Annotated[Path, option("A map file, or a folder of map files.", "MAPS")],
+    out: Annotated[Path, option("The Parquet file to write, one row per scan.", "FILE")],
     workers: WorkerOptions,
     search: SearchChoice,
     usable: UsableOptions,
@@ -65,9 +55,11 @@ def batch(
     try:
         from batch import associate_many
 
-        with shown_progress() as watch:
-            options = _options(workers.block, search, usable)
-            summary = associate_many(logs, maps, out, options, _engine(workers), watch)
+        options, engine = _options(workers.block, search, usable), _engine(workers)
+        with progress() as show:
+            summary = associate_many(
+                logs, maps, out, options, engine, lambda step: show(step.stage, step.done, step.total)
+            )
     except ModuleNotFoundError as error:
         extra = "ray" if workers.ray else "batch"
         raise RefusedError(
@@ -104,9 +96,7 @@ def _engine(chosen: WorkerOptions) -> Engine | None:
 
     if chosen.ray:
         if chosen.workers is not None:
-            raise WrongUseError(
-                "--workers: not possible with --ray, which uses all cores of the cluster; omit --workers"
-            )
+            raise WrongUseError("--workers: --ray uses all cores of the cluster; omit --workers")
         return OnRay()
     return None if chosen.workers is None else Processes(chosen.workers)
 
@@ -124,23 +114,3 @@ def _noted(note: LogNote) -> str:
     """Return a note, with the log that it is of."""
     more = f" and {note.logs - 1:,} more" if note.logs > 1 else ""
     return f"{noted({'message': note.message, 'count': note.count})}, {Path(note.log).name}{more}"
-
-
-@contextmanager
-def shown_progress() -> Iterator[Callable[[Done], None]]:
-    """Show the progress of a run on a terminal; yield the function that takes its steps."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
-        known = {}
-
-        def watch(progress: Done) -> None:
-            if progress.stage not in known:
-                known[progress.stage] = bars.add_task(progress.stage, total=progress.total)
-                bars.reset(known[progress.stage], total=progress.total, completed=progress.done)
-            bars.update(known[progress.stage], completed=progress.done)
-
-        yield watch

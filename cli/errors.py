@@ -11,12 +11,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
-
-BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 
 
 class CommandError(Exception):
@@ -98,28 +95,12 @@ class Asked:
 NOTHING = Asked()
 
 
-def error_of(status: int, code: str, detail: str, faults: Sequence[Mapping[str, Any]], asked: Asked) -> CommandError:
-    """Return the error that a problem of the service stands for.
-
-    Parameters
-    ----------
-    status, code : int, str
-        As over HTTP.
-    detail : str
-    faults : sequence of mapping
-        ``pointer`` and ``message`` of each place that is wrong; the first is shown, the others are counted.
-    asked : Asked
-    """
-    if code == "unknown_map" and asked.map_id is not None:
-        return NoSuchMapError(asked.map_id)
-    message = ": ".join((*asked.files[:1], detail))
-    if faults:
-        message = f"{asked.place(faults[0]['pointer'])}: {faults[0]['message']}"
-        if len(faults) > 1:
-            message += f" (and {len(faults) - 1} more)"
-    if 400 <= status < 500 and status not in BUSY:
-        return RefusedError(message, faults[0]["pointer"] if faults else "")
-    return NoServerError(message)
+def refused_at(faults: Sequence[tuple[str, str]], asked: Asked = NOTHING) -> RefusedError:
+    """Return the error for places that are wrong, each a pointer and a message: the first is named, others counted."""
+    pointer, message = faults[0]
+    place = asked.place(pointer)
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return RefusedError(f"{place}: {message}{more}" if place else f"{message}{more}", pointer)
 
 
 @contextmanager
@@ -139,8 +120,10 @@ def refusing(asked: Asked = NOTHING) -> Iterator[None]:
     except NotStoredError as error:
         raise RefusedError(str(error)) from None
     except TooManyError as error:
-        named = [{"pointer": error.pointer, "message": str(error)}] if error.pointer else []
-        raise error_of(413, "", str(error), named, asked) from None
-    except (InvalidRequestError, InputError) as error:
-        faults = error.faults if isinstance(error, InvalidRequestError) else (fault_of(error),)
-    raise error_of(422, "", "", [{"pointer": one.pointer, "message": one.message} for one in faults], asked)
+        faults = [(error.pointer, str(error))]
+    except InvalidRequestError as error:
+        faults = [(one.pointer, one.message) for one in error.faults]
+    except InputError as error:
+        fault = fault_of(error)
+        faults = [(fault.pointer, fault.message)]
+    raise refused_at(faults, asked)

@@ -1,36 +1,22 @@
-"""Logs of other tools: their scans, what was made of them, and how they are sent to a server."""
+"""Logs of other tools: their scans, and what was made of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TextIO, TypeVar
-
-import typer
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from .errors import WrongUseError
-from .inputs import needing_formats
-from .printing import Json, noted, plain
+from .inputs import existing
+from .printing import noted, plain
+from .scans import needing_formats
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, LogOptions
 
 T = TypeVar("T")
-Topic = Annotated[
-    str | None,
-    typer.Option(
-        help="Topic of the scans; for CARMEN the kind of line, such as FLASER. Default: the topic with most scans, or "
-        "the first kind in a CARMEN log."
-    ),
-]
-TfNamespace = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAMESPACE",
-        help="Namespace of the transforms in a bag of several robots, such as /robot1 for /robot1/tf.",
-    ),
-]
 
 
 def opened(path: Path, options: LogOptions) -> Log:
@@ -43,9 +29,7 @@ def opened(path: Path, options: LogOptions) -> Log:
     RefusedError
         When it cannot be read.
     """
-    if not path.exists():
-        raise WrongUseError(f"{path}: there is no such file; check the path and the working folder")
-    with needing_formats(f"reading {path.name}"):
+    with needing_formats(f"reading {existing(path).name}"):
         from formats import read_log
 
         return read_log(path, options)
@@ -72,10 +56,32 @@ def scans_of(log: Log) -> Iterator[LoggedScan]:
         yield from log
 
 
-def spread(found: Sequence[T], most: int) -> list[T]:
-    """Return so many, evenly over all; all of them where there are no more."""
-    count = min(most, len(found))
-    return [found[k * len(found) // count] for k in range(count)]
+def some_scans(log: Path, most: int, topic: str | None = None, tf_namespace: str | None = None) -> list[LoggedScan]:
+    """Return some scans of a log, evenly over all of it; print on stderr what was made of the log.
+
+    Raises
+    ------
+    WrongUseError, RefusedError
+        As of `opened`.
+    """
+    source = opened(log, options_of(topic, tf_namespace))
+    taken = thinned(scans_of(source), most)
+    print_notes(source, sys.stderr)
+    return taken
+
+
+def thinned(found: Iterable[T], most: int) -> list[T]:
+    """Return so many, evenly over all, without all of them in memory; all of them where there are no more."""
+    kept: list[T] = []
+    step = 1
+    for number, one in enumerate(found):
+        if number % step:
+            continue
+        kept.append(one)
+        if len(kept) > 4 * most:
+            kept, step = kept[::2], 2 * step
+    count = min(most, len(kept))
+    return [kept[k * len(kept) // count] for k in range(count)]
 
 
 def print_notes(log: Log, where: TextIO) -> None:
@@ -83,10 +89,3 @@ def print_notes(log: Log, where: TextIO) -> None:
     for kind in ("assumed", "dropped"):
         for note in getattr(log.report, kind):
             print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
-
-
-def sent(one: LoggedScan) -> Json:
-    """Return a scan of a log as a request has it."""
-    from formats import scan_json
-
-    return scan_json(one)

@@ -12,35 +12,43 @@ from typing import Annotated, Any
 
 import typer
 
-Server = Annotated[
-    str | None,
-    typer.Option("--server", metavar="URL", help="Use the service at this URL; the key is read from LINEFIX_KEY."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the complete answer as JSON.")]
-MapArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="MAP",
-        help="A map file: json, yaml of map_server, dxf, svg, geojson or csv; or the id of a stored map.",
-    ),
-]
-MapsArgument = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="MAP...",
-        help="A map file: json, yaml of map_server, dxf, svg, geojson or csv; a folder of these; or the id of a stored "
-        "map. Several are searched together.",
-    ),
-]
+
+def option(help: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
+    """Describe an option; `names` where they are not that of the argument, `more` as `typer.Option` has it."""
+    return typer.Option(*names, metavar=metavar, help=help, **more)
+
+
+def flag(help: str, name: str, **more: Any) -> Any:
+    """Describe an option without a value."""
+    return typer.Option(name, help=help, **more)
+
+
+def argument(help: str, metavar: str) -> Any:
+    """Describe an argument."""
+    return typer.Argument(help=help, metavar=metavar)
+
+
+# Each may be left out.
+File = Path | None
+Number = float | None
+Text = str | None
+Texts = list[str] | None
+A_MAP = "A map file: json, yaml of map_server, dxf, svg, geojson or csv;"
+WRITE_MAP = "Write the map to this file: json, dxf, svg, geojson or csv."
+LIKELY = "PROBABILITY"
+
+Server = Annotated[Text, option("Use the service at this URL; the key is read from LINEFIX_KEY.", "URL", "--server")]
+AsJson = Annotated[bool, flag("Print the complete answer as JSON.", "--json")]
+MapArgument = Annotated[str, argument(f"{A_MAP} or the id of a stored map.", "MAP")]
+MapsArgument = Annotated[list[str], argument(f"{A_MAP} a folder of these; or the id of a stored map.", "MAP...")]
 ScanArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCAN",
-        help="A scan file: JSON with segments, points, laser or views; a LaserScan "
-        "message as JSON or as YAML; - reads stdin.",
-    ),
+    str, argument("A scan file: JSON with segments, points, laser or views; or a LaserScan; - reads stdin.", "SCAN")
 ]
-Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result to this PNG file.")]
+Picture = Annotated[File, option("Draw the result to this PNG file.", "FILE")]
+OutMap = Annotated[File, option(WRITE_MAP, "FILE")]
+Undirected = Annotated[bool, flag("The directions of segments have no meaning.", "--undirected")]
+LogTopic = Annotated[Text, option("Topic of the scans; for CARMEN the kind of line. Default: that with most scans.")]
+TfNamespace = Annotated[Text, option("Namespace of transforms, in a bag of several robots: /robot1.", "NAMESPACE")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +56,9 @@ class UsableOptions:
     """When an answer is usable, as options."""
 
     on_map: Annotated[
-        float,
-        typer.Option(
-            metavar="PROBABILITY",
-            min=0.5,
-            max=1.0,
-            help="Prior probability that a scan was taken on this map, or on one of these.",
-        ),
+        float, option("Prior probability that a scan was taken on the map.", LIKELY, min=0.5, max=1.0)
     ] = 0.9
-    usable_from: Annotated[
-        float,
-        typer.Option(metavar="PROBABILITY", min=0.5, max=0.9999, help="Minimum probability of a usable answer."),
-    ] = 0.95
+    usable_from: Annotated[float, option("Minimum probability of a usable answer.", LIKELY, min=0.5, max=0.9999)] = 0.95
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:

@@ -1,7 +1,11 @@
-"""All commands, put together."""
+"""All commands, put together; and those of the service: its start and its keys."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import secrets
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -12,22 +16,54 @@ from . import maps
 from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
-from .explain import explain
-from .key import key
-from .locate import locate
-from .register import register
+from .one_scan import explain, locate, register, vectorize
+from .options import Text, argument, flag, option
 from .replay import replay
 from .ros2 import ros2
-from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+class Role(StrEnum):
+    """A permission of a key."""
+
+    READ = "read"
+    ASSOCIATE = "associate"
+    WRITE = "write"
+
+
+def key(
+    name: Annotated[str, argument("Name of the key, for people; not secret.", "NAME")],
+    role: Annotated[list[Role] | None, option("Role of the key; repeat for more roles. Default: all.")] = None,
+    maps: Annotated[Text, option("Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX")] = None,
+) -> None:
+    """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
+    from service.admission.key_file import parse_keys
+
+    made = secrets.token_urlsafe(32)
+    described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}
+    if maps is not None:
+        described["maps"] = maps
+    # A string or a list of them is the same in TOML as in JSON.
+    lines = "\n".join(["[[key]]", *(f"{field} = {json.dumps(value)}" for field, value in described.items())])
+    try:
+        parse_keys(lines)
+    except ValueError:
+        raise WrongUseError(
+            f"the name {name!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for NAME, and letters, "
+            "digits, dots or dashes for --maps"
+        ) from None
+    print(lines)
+    typer.echo(made, err=True)
+
+
 for command in (locate, explain, replay, analyze, batch, register, vectorize, key, ros2):
     app.command()(command)
 app.add_typer(maps.app)
 
 
-def _tell_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
         from service.version import VERSION
 
@@ -37,9 +73,7 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def linefix(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, flag("Print the version.", "--version", callback=_print_version, is_eager=True)] = False,
 ) -> None:
     """Find the pose of a robot on a map of walls from a laser scan.
 
@@ -49,9 +83,7 @@ def linefix(
 
 
 @app.command(
-    "serve",
-    add_help_option=False,
-    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    "serve", add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True}
 )
 def run_service(context: typer.Context) -> None:
     """Start the HTTP service; linefix serve --help lists all settings."""

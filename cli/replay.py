@@ -13,17 +13,14 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated, TextIO
 
-import typer
-
 from .asking import answering, server_at
 from .errors import CommandError, NoSuchMapError, RefusedError, refusing
-from .frames import Frames
-from .inputs import line_map_of, needing_formats
-from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent
-from .options import AsJson, Server, UsableOptions, grouped
+from .inputs import documents_of, draw_picture, read_target
+from .logs import opened, options_of, print_notes, scans_of
+from .options import AsJson, File, LogTopic, Server, TfNamespace, UsableOptions, argument, grouped, option
 from .printing import Json, plain, print_json, print_rows, print_table
-from .several import documents_of, read_target
-from .tracking import Stays, Tracker, map_of, pose_of
+from .progress import progress
+from .tracking import Frames, Stays, Tracker, map_of, pose_of
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, StampedPose
@@ -40,6 +37,9 @@ class Mode(StrEnum):
 
     TRACK = "track"
     GLOBAL = "global"
+
+
+TRACK = Mode.TRACK
 
 
 @dataclass(slots=True)
@@ -81,51 +81,26 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class LogChoice:
-    """What to read of a log, as options."""
-
-    topic: Topic = None
-    tf_namespace: TfNamespace = None
-    mount: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
-    ] = None
-
-
-@dataclass(frozen=True, slots=True)
 class ScanChoice:
-    """Which scans to localize, and how, as options."""
+    """Which scans of a log to localize, and how, as options."""
 
-    mode: Annotated[
-        Mode,
-        typer.Option(
-            help="track: use odometry from the last usable pose as a prior; global: search each scan on the whole map."
-        ),
-    ] = Mode.TRACK
-    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1
+    topic: LogTopic = None
+    tf_namespace: TfNamespace = None
+    mount: Annotated[tuple[float, float, float] | None, option("Pose of the laser on the robot.", "X Y THETA")] = None
+    mode: Annotated[Mode, option("track: the prior is by odometry from the last usable pose; global: no prior.")] = (
+        TRACK
+    )
+    every: Annotated[int, option("Use each Nth scan.", "N", min=1)] = 1
 
 
 @grouped
 def replay(
-    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
-    on: Annotated[
-        list[str],
-        typer.Option(
-            "--map",
-            metavar="MAP",
-            help="A map file, a folder of map files, or the id of a stored map; repeatable.",
-        ),
-    ],
-    source: LogChoice,
+    log: Annotated[Path, argument("A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.", "LOG")],
+    on: Annotated[list[str], option("A map file, a folder, or the id of a stored map; repeatable.", "MAP", "--map")],
     scans: ScanChoice,
     usable: UsableOptions,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the usable poses to this file in the TUM format.")
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses green, others grey."),
-    ] = None,
+    out: Annotated[File, option("Write the usable poses to this file in the TUM format.", "FILE")] = None,
+    picture: Annotated[File, option("Draw map and poses to this PNG file; usable poses are green.", "FILE")] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -134,7 +109,7 @@ def replay(
     Poses are those of the robot if --mount or the log has the mount of the laser. Otherwise they are those of the
     laser.
     """
-    options = options_of(source.topic, source.tf_namespace, source.mount)
+    options = options_of(scans.topic, scans.tf_namespace, scans.mount)
     told, opened_log = read_target(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
@@ -168,22 +143,16 @@ def locating(target: Json, usable: UsableOptions, server: str | None) -> Iterato
     options = {"include": [], "max_alternatives": 0, **asdict(usable)}
     if server is not None:
         with server_at(server) as remote:
-            yield lambda sought: remote.ask("associate", {**target, **sought, "options": options})
+            yield lambda sought: remote.call("AssociateAnswer", "associate", {**target, **sought, "options": options})
         return
     with answering() as within:
-        from linefix.answering import locate, target_of
-        from linefix.documents.parts import SearchOptions
-        from linefix.documents.reading import validate
-        from linefix.documents.requests import BatchItem, OnMaps
-        from linefix.operations import Stopwatch
+        from linefix.answering import locating as locating_on
 
-        how = validate(SearchOptions, options, within.limits)
-        maps = target_of(validate(OnMaps, target, within.limits), None, within)
+        answer = locating_on(target, options, within)
 
     def here(sought: Json) -> Json:
-        watch = Stopwatch()
         with refusing():
-            return locate(maps, validate(BatchItem, sought, within.limits), how, within, watch)
+            return answer(sought)
 
     yield here
 
@@ -195,6 +164,8 @@ def located(
 
     In mode track the prior comes from the answers before and odometry.
     """
+    from formats import scan_json
+
     tracker = Tracker() if mode is Mode.TRACK else None
     refusals: list[str] | None = []  # None: one was taken
     for logged in scans:
@@ -205,7 +176,7 @@ def located(
             continue
         prior = None if tracker is None else tracker.prior(one)
         try:
-            found = locate({"scan": sent(one)} | ({} if prior is None else {"prior": prior}))
+            found = locate({"scan": scan_json(one)} | ({} if prior is None else {"prior": prior}))
         except RefusedError as error:
             refusals = None if refusals is None else [*refusals, str(error)]
             if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
@@ -226,11 +197,10 @@ def _hopeless(refusals: list[str] | None) -> bool:
 def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
     """Yield the scans; show the progress on a terminal."""
     total = None if log.count is None else -(-log.count // every)
-    from rich.console import Console
-    from rich.progress import track
-
-    where = Console(stderr=True)
-    yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
+    with progress() as show:
+        for number, one in enumerate(scans, 1):
+            yield one
+            show("scans", number, total)
 
 
 def _line(one: LoggedScan, found: Json | CommandError, frames: Frames, *, several: bool) -> Json:
@@ -264,15 +234,10 @@ def _draw(documents: dict[str, Json], tally: Tally, picture: Path) -> None:
     """Draw the map and the poses on it; of several maps those with a usable pose, each to a file with its name."""
     several = len(documents) > 1
     visited = {stay.map_id for stay in tally.stays.found}
-    with needing_formats("drawing a picture"):
-        from formats import draw_map
-
-        for name, document in documents.items():
-            if several and name not in visited:
-                continue
+    for name, document in documents.items():
+        if not several or name in visited:
             usable, others = tally.on_map.get(name if several else "", ([], []))
-            file = picture.with_stem(f"{picture.stem}-{name}") if several else picture
-            draw_map(line_map_of(document), file, usable, others)
+            draw_picture(document, picture.with_stem(f"{picture.stem}-{name}") if several else picture, usable, others)
 
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:

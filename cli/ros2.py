@@ -7,232 +7,110 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from .errors import RefusedError, WrongUseError
-from .inputs import needing_formats
-from .options import UsableOptions, grouped
+from .inputs import read_maps
+from .options import File, Text, Texts, UsableOptions, flag, grouped, option
 from .printing import Json
 from .ros2_parameters import given_parameter, parameters_of, robots_of
-from .several import read_maps
+from .scans import needing_formats
 
 if TYPE_CHECKING:
     from ros2 import Maps, NodeOptions
 
 MAX_FRAME = 255  # characters
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
-# Of the context: what the command line has.
-CHOSEN, FILE, GIVEN = "linefix.ros2.namespace", "linefix.ros2.file", "linefix.ros2.parameters"
+READ = "linefix.ros2"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "stdout_logs", "help")
 OF_ALL_NODES = ("use_sim_time",)  # which changes nothing here: times are those of messages
+LEAST = "Minimum standard deviation"
+TOGETHER = "Search scans of several topics as one if they are so close in time; 0: never."
+STOP_TF = "Stop the transform of --publish-tf this long after the last scan with ranges; 0: never."
+PUBLISH_TF = "Publish the transform from the map to the odometry frame. Do not use it together with AMCL."
+WHEN = (
+    "When to publish initialpose. start: at the start, on request and for new subscribers; lost: also when the "
+    "localizer disagrees; always: also for each scan that confirms the pose."
+)
+MAPS = (
+    "A map file, a folder of map files, or the id of a stored map; repeat for more maps, which are searched together. "
+    "Default: the topic of --map-topic."
+)
 
 
-def _read_params(context: typer.Context, file: Path | None) -> Path | None:
-    """Take the parameters of a file as defaults: what stands on the command line counts before them."""
-    context.meta[FILE] = file, context.default_map or {}
-    _take_defaults(context)
-    return file
+def _read(context: typer.Context, parameter: typer.CallbackParam, value: Any) -> Any:
+    """Take parameters of a file and of ``-p`` as defaults: options of the command line count before them.
 
-
-def _read_namespace(context: typer.Context, value: Any) -> Any:
-    """Take the namespace, from itself or from remappings: it chooses the parameters of a file that may come first."""
-    rules = [value] if isinstance(value, str) else [rule[6:] for rule in value or [] if rule.startswith("__ns:=")]
-    if rules:
-        context.meta[CHOSEN] = rules[-1]
-        _take_defaults(context)
-    return value
-
-
-def _read_parameters(context: typer.Context, rules: list[str] | None) -> list[str] | None:
-    """Take the parameters of the command line: they count before those of a file."""
-    context.meta[GIVEN] = {name: value for rule in rules or [] for name, value in given_parameter(rule).items()}
-    _take_defaults(context)
-    return rules
-
-
-def _take_defaults(context: typer.Context) -> None:
-    file, others = context.meta.get(FILE, (None, {}))
-    given = context.meta.get(GIVEN, {})
-    if file is None and not given:
-        return
-    known = {
-        option.name: option
-        for option in context.command.params
-        if option.name is not None and option.name not in NOT_IN_FILES
-    }
-    values = {} if file is None else parameters_of(file, context.meta.get(CHOSEN), known)
+    The namespace, from itself or from remappings, chooses the parameters of a file that may come before it.
+    """
+    read = context.meta.setdefault(READ, {"others": context.default_map or {}})
+    read[parameter.name] = value
+    file, rules = read.get("params_file"), read.get("parameter") or []
+    if value is None or not (file or rules):
+        return value
+    spaces = [rule[6:] for rule in read.get("remap") or [] if rule.startswith("__ns:=")]
+    known = {one.name for one in context.command.params if one.name is not None and one.name not in NOT_IN_FILES}
+    values = {} if file is None else parameters_of(file, spaces[-1] if spaces else read.get("namespace"), known)
+    given = {name: one for rule in rules for name, one in given_parameter(rule).items()}
     for name in {**values, **given}:
         if name not in known and name not in OF_ALL_NODES:
             expected = ", ".join(sorted("map" if one == "on" else one for one in known))
             source = "-p" if name in given else file
             raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
-    context.default_map = {**others, **values, **given}
+    context.default_map = {**read["others"], **values, **given}
+    return value
+
+
+def chosen(help: str, metavar: str, *names: str) -> Any:
+    """Describe an option that chooses the parameters, so that it is read before others."""
+    return option(help, metavar, *names, is_eager=True, callback=_read)
 
 
 @dataclass(frozen=True, slots=True)
-class MapSource:
-    """The source of the map, or of several, as options."""
+class RobotOptions:
+    """The maps, topics and frames of the robot, and when its pose is published, as options."""
 
-    on: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            metavar="MAP",
-            help="A map file, a folder of map files, or the id of a stored map; repeat for more maps, which are "
-            "searched together. Default: the topic of --map-topic.",
-        ),
-    ] = None
-    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of an OccupancyGrid, without --map.")] = "map"
-
-
-@dataclass(frozen=True, slots=True)
-class ScanSources:
-    """The sources of scans and odometry, as options."""
-
-    scan: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Topic of scans; repeat for more scanners. Default: scan.")
-    ] = None
-    together_s: Annotated[
-        float,
-        typer.Option(
-            metavar="SECONDS",
-            min=0.0,
-            max=5.0,
-            help="Search scans of several topics as one if they are so close in time; 0: never.",
-        ),
-    ] = 0.1
-    odom: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of odometry.")] = "odom"
-    motion: Annotated[
-        bool,
-        typer.Option(help="Correct the motion during a scan by its time_increment and the twist of odometry."),
-    ] = True
-
-
-@dataclass(frozen=True, slots=True)
-class RobotNames:
-    """The names of the robot's topics and frames, as options."""
-
-    base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link"
-    odom_frame: Annotated[
-        str, typer.Option(metavar="FRAME", help="The odometry frame, if no odometry message names it.")
-    ] = "odom"
+    on: Annotated[Texts, option(MAPS, "MAP", "--map")] = None
+    map_topic: Annotated[str, option("Topic of an OccupancyGrid, without --map.", "TOPIC")] = "map"
+    scan: Annotated[Texts, option("Topic of scans; repeat for more scanners. Default: scan.", "TOPIC")] = None
+    together_s: Annotated[float, option(TOGETHER, "SECONDS", min=0.0, max=5.0)] = 0.1
+    odom: Annotated[str, option("Topic of odometry.", "TOPIC")] = "odom"
+    motion: Annotated[bool, option("Correct the motion during a scan by the twist of odometry.")] = True
+    base: Annotated[str, option("The base frame of the robot.", "FRAME")] = "base_link"
+    odom_frame: Annotated[str, option("The odometry frame, if no odometry message names it.", "FRAME")] = "odom"
     namespace: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMESPACE",
-            is_eager=True,
-            callback=_read_namespace,
-            help="Namespace of all relative topics. Default: that of the first --scan.",
-        ),
+        Text, chosen("Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE")
     ] = None
-    frame_prefix: Annotated[
-        str, typer.Option(metavar="PREFIX", help="Prefix of all frames of the robot, such as robot1/.")
-    ] = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Publishing:
-    """The times and contents of publishing, as options."""
-
-    agree: Annotated[
-        int,
-        typer.Option(
-            min=1, max=100, help="Number of scans that have to agree before a pose is published; 1: each scan."
-        ),
-    ] = 3
-    when: Annotated[
-        Literal["start", "lost", "always"],
-        typer.Option(
-            help="When to publish initialpose. start: at the start, on request and for "
-            "new subscribers; lost: also when "
-            "the localizer disagrees; always: also for each scan that confirms the pose."
-        ),
-    ] = "start"
-    min_sigma: Annotated[
-        float,
-        typer.Option(
-            metavar="METRES", min=0.0, max=10.0, help="Minimum standard deviation of the position in initialpose."
-        ),
-    ] = 0.05
+    frame_prefix: Annotated[str, option("Prefix of all frames of the robot, such as robot1/.", "PREFIX")] = ""
+    agree: Annotated[int, option("Number of scans that have to agree on a published pose.", min=1, max=100)] = 3
+    when: Annotated[Literal["start", "lost", "always"], option(WHEN)] = "start"
+    min_sigma: Annotated[float, option(f"{LEAST} of the position in initialpose.", "METRES", min=0.0, max=10.0)] = 0.05
     min_sigma_theta: Annotated[
-        float,
-        typer.Option(
-            metavar="RADIANS", min=0.0, max=3.0, help="Minimum standard deviation of the heading in initialpose."
-        ),
+        float, option(f"{LEAST} of the heading in initialpose.", "RADIANS", min=0.0, max=3.0)
     ] = 0.0349
-    publish_tf: Annotated[
-        bool,
-        typer.Option(
-            help="Publish the transform from the map to the odometry frame. Do not use it together with AMCL."
-        ),
-    ] = False
-    tf_max_age_s: Annotated[
-        float,
-        typer.Option(
-            metavar="SECONDS",
-            min=0.0,
-            max=3600.0,
-            help="Stop the transform of --publish-tf this long after the last scan with ranges; 0: never.",
-        ),
-    ] = 0.0
-    hardware_id: Annotated[
-        str, typer.Option(metavar="NAME", help="Hardware id of the diagnostics. Default: the namespace.")
-    ] = ""
+    publish_tf: Annotated[bool, option(PUBLISH_TF)] = False
+    tf_max_age_s: Annotated[float, option(STOP_TF, "SECONDS", min=0.0, max=3600.0)] = 0.0
+    hardware_id: Annotated[str, option("Hardware id of the diagnostics. Default: the namespace.", "NAME")] = ""
 
 
 @dataclass(frozen=True, slots=True)
 class RosArguments:
     """Parameters and remappings in the way of ROS 2, as options."""
 
-    params_file: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", is_eager=True, callback=_read_params, help="A parameter file of ROS 2 (YAML)."),
-    ] = None
-    ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored; the options after it apply as usual.")] = False
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--param",
-            "-p",
-            metavar="NAME:=VALUE",
-            is_eager=True,
-            callback=_read_parameters,
-            help="Set a parameter, as in ROS 2.",
-        ),
-    ] = None
-    log_level: Annotated[list[str] | None, typer.Option(metavar="LEVEL", help="Ignored, as are rosout logs.")] = None
-    rosout_logs: Annotated[
-        bool, typer.Option("--enable-rosout-logs/--disable-rosout-logs", hidden=True, help="Ignored.")
-    ] = False
-    stdout_logs: Annotated[
-        bool, typer.Option("--enable-stdout-logs/--disable-stdout-logs", hidden=True, help="Ignored.")
-    ] = False
-    remap: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--remap",
-            "-r",
-            metavar="FROM:=TO",
-            is_eager=True,
-            callback=_read_namespace,
-            help="Remap the name of a topic.",
-        ),
-    ] = None
+    params_file: Annotated[File, chosen("A parameter file of ROS 2 (YAML).", "FILE")] = None
+    ros_args: Annotated[bool, flag("Ignored; the options after it apply as usual.", "--ros-args")] = False
+    parameter: Annotated[Texts, chosen("Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")] = None
+    log_level: Annotated[Texts, option("Ignored, as are rosout logs.", "LEVEL")] = None
+    rosout_logs: Annotated[bool, flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)] = False
+    stdout_logs: Annotated[bool, flag("Ignored.", "--enable-stdout-logs/--disable-stdout-logs", hidden=True)] = False
+    remap: Annotated[Texts, chosen("Remap the name of a topic.", "FROM:=TO", "--remap", "-r")] = None
 
 
 @grouped
-def ros2(
-    source: MapSource,
-    sources: ScanSources,
-    names: RobotNames,
-    usable: UsableOptions,
-    publishing: Publishing,
-    ros: RosArguments,
-) -> None:
+def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     """Subscribe to scans of ROS 2, and publish initialpose when they agree, until an interrupt.
 
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
@@ -244,44 +122,23 @@ def ros2(
             'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
         ) from None
 
-    if names.namespace is None and not any(rule.startswith("__ns:=") for rule in ros.remap or []):
-        _require_one_robot(ros.params_file)
-    scans = tuple(sources.scan or ("scan",))
-    try:
-        where, remappings = _names(scans, names.namespace, ros.remap or [])
-        options = NodeOptions(
-            scans=scans,
-            together_s=sources.together_s,
-            odometry=sources.odom,
-            motion=sources.motion,
-            map_topic=None if source.on else source.map_topic,
-            base_frame=names.base,
-            odom_frame=names.odom_frame,
-            namespace=where,
-            remappings=remappings,
-            frame_prefix=names.frame_prefix,
-            on_map=usable.on_map,
-            usable_from=usable.usable_from,
-            agree=publishing.agree,
-            when=publishing.when,
-            min_sigma=publishing.min_sigma,
-            min_sigma_theta=publishing.min_sigma_theta,
-            publish_tf=publishing.publish_tf,
-            tf_max_age_s=publishing.tf_max_age_s,
-            domain=domain_of(os.environ),
-            hardware_id=publishing.hardware_id,
+    rules = ros.remap or []
+    robots = [] if ros.params_file is None else robots_of(ros.params_file)
+    if len(robots) > 1 and robot.namespace is None and not any(rule.startswith("__ns:=") for rule in rules):
+        raise WrongUseError(
+            f"{ros.params_file}: found parameters of {', '.join(robots)}, expected one; add --namespace"
         )
-        maps = _maps_at(source.on) if source.on else None
+    given = asdict(robot) | asdict(usable)
+    names, topics = given.pop("on"), tuple(given.pop("scan") or ("scan",))
+    given["map_topic"] = None if names else robot.map_topic
+    try:
+        given["namespace"], remappings = _names(topics, robot.namespace, rules)
+        options = NodeOptions(scans=topics, remappings=remappings, domain=domain_of(os.environ), **given)
+        maps = _maps_at(names) if names else None
         node = Node(options, maps)
     except (OptionError, ConnectionRefusedError) as error:
         raise WrongUseError(str(error)) from None
     _run(node, options, maps)
-
-
-def _require_one_robot(file: Path | None) -> None:
-    robots = [] if file is None else robots_of(file)
-    if len(robots) > 1:
-        raise WrongUseError(f"{file}: found parameters of {', '.join(robots)}, expected one; add --namespace")
 
 
 def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
@@ -310,7 +167,7 @@ def _started(options: NodeOptions, maps: Maps | None) -> str:
     if maps is not None:
         source = f"{'maps' if maps.several else 'map'} {first_of(list(maps.frames))}"
     return (
-        f"subscribed to {scans} in domain {options.domain}; {source}; base frame {options.base_frame}; "
+        f"subscribed to {scans} in domain {options.domain}; {source}; base frame {options.base}; "
         f"{options.topic('initialpose')} when {options.agree} scans agree"
     )
 

@@ -1,22 +1,92 @@
-"""Read scan files: JSON of a request, or a LaserScan message in JSON or in the YAML of ``ros2 topic echo``."""
+"""Files of JSON, and of scans: JSON of a request, or a LaserScan as JSON or as ``ros2 topic echo`` prints it."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from .errors import RefusedError
-from .inputs import bytes_of, json_of, needing_formats
+from .errors import RefusedError, WrongUseError
 from .printing import Json
 
+STDIN = "-"
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
+WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
+MAX_VALUES = 1_000_000_000  # of a file; what a request may hold is the service's business
 FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
 LOST = re.compile(r"A message was lost!!!.*?---\s*\n", re.DOTALL)  # of `ros2 topic echo`
 WORDS = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf, "nan": math.nan, "-nan": math.nan}  # of `rostopic echo`
 OF_POSE = [("position", key) for key in "xyz"] + [("orientation", key) for key in "xyz"]
 NEXT = "\n---"  # between the messages of `ros2 topic echo`
+
+
+def bytes_of(name: str) -> bytes:
+    """Return the content of a text file; ``-`` reads stdin. A byte-order mark is left out.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file, or it cannot be read.
+    RefusedError
+        When it is text in UTF-16.
+    """
+    try:
+        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
+    except OSError as error:
+        raise WrongUseError(f"{name}: {error.strerror}") from None
+    if data.startswith(WIDE):
+        raise RefusedError(f"{name}: found text in UTF-16, expected UTF-8; save the file as UTF-8")
+    return data.removeprefix(BYTE_ORDER_MARK)
+
+
+def json_of(data: bytes, name: str, *, infinite: bool = False) -> Any:
+    """Parse the JSON of a file, which may contain NaN and Infinity where so stated.
+
+    Raises
+    ------
+    RefusedError
+        When it is not JSON, or has more values than any request may have.
+    """
+    from linefix.documents.errors import NotJsonError, TooManyError
+    from linefix.documents.limits import Limits
+    from linefix.documents.reading import parse
+
+    try:
+        return parse(data, Limits(values=MAX_VALUES))
+    except (NotJsonError, TooManyError) as error:
+        if infinite and "NaN and Infinity" in str(error):
+            return json.loads(data)
+        raise RefusedError(f"{name}: not JSON: {error}") from None
+
+
+def read_json(name: str) -> Any:
+    """Return the content of a file of JSON, as by `bytes_of` and `json_of`."""
+    return json_of(bytes_of(name), name)
+
+
+@contextmanager
+def needing_formats(what: str) -> Iterator[None]:
+    """Raise `RefusedError` if the extra ``[formats]`` is missing, or refuses a file.
+
+    Raises
+    ------
+    RefusedError
+    """
+    from registration import InputError
+
+    try:
+        yield
+    except ModuleNotFoundError:
+        raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
+    except InputError as error:
+        told = f"--point: {error.message}" if error.argument == "inside" else str(error)
+        raise RefusedError(told) from None
 
 
 def read_scan(name: str) -> Json:
@@ -47,14 +117,7 @@ def read_scan(name: str) -> Json:
 def _parsed(data: bytes, name: str) -> Any:
     """Return the content of JSON or YAML; text that begins with a bracket is JSON."""
     if data.lstrip()[:1] in (b"{", b"["):
-        from linefix.documents.errors import NotJsonError, TooManyError
-
-        try:
-            return json_of(data)
-        except (NotJsonError, TooManyError) as error:
-            if "NaN and Infinity" in str(error):
-                return json.loads(data)
-            raise RefusedError(f"{name}: not JSON: {error}") from None
+        return json_of(data, name, infinite=True)
     with needing_formats(f"reading {name} as YAML"):
         from formats.yaml import yaml_of
 

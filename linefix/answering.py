@@ -109,6 +109,21 @@ def associate(document: Json, within: Within) -> Json:
     return locate(target_of(asked, asked.options.oriented, within), asked, asked.options, within, watch)
 
 
+def locating(on: Json, options: Json, within: Within) -> Callable[[Json], Json]:
+    """Index the map, or the maps, of a request once; return the function from its ``scan`` and ``prior`` to its answer.
+
+    The function answers as `associate` does, and raises the same.
+    """
+    how = validate(SearchOptions, options, within.limits)
+    maps = target_of(validate(OnMaps, on, within.limits), how.oriented, within)
+
+    def answer(sought: Json) -> Json:
+        watch = Stopwatch()
+        return locate(maps, validate(BatchItem, sought, within.limits), how, within, watch)
+
+    return answer
+
+
 def locate(
     target: Target, sought: AssociateRequest | BatchItem, how: SearchOptions, within: Within, watch: Stopwatch
 ) -> Json:

@@ -23,14 +23,14 @@ class NodeOptions:
         Topics of scans.
     together_s : float
         Seconds; scans of several topics that are taken no farther apart are searched as one. 0: each separately.
-    odometry : str
+    odom : str
         Topic of odometry: the motion of the robot between scans, and during each.
     motion : bool
         Take every beam to where the scanner was, where a scan has a `time_increment` and odometry a twist; without the
         twist the covariance is wider. False: scans are taken as they are.
     map_topic : str or None
         Of an OccupancyGrid, for a node that was given no map.
-    base_frame, odom_frame : str
+    base, odom_frame : str
         Without `frame_prefix`.
     namespace : str
         Of the robot, such as ``/robot1``; empty: none.
@@ -61,10 +61,10 @@ class NodeOptions:
 
     scans: tuple[str, ...] = ("scan",)
     together_s: float = 0.1
-    odometry: str = "odom"
+    odom: str = "odom"
     motion: bool = True
     map_topic: str | None = None
-    base_frame: str = "base_link"
+    base: str = "base_link"
     odom_frame: str = "odom"
     namespace: str = ""
     remappings: Mapping[str, str] = field(default_factory=dict)
@@ -100,6 +100,6 @@ class NodeOptions:
 
     def base_of(self, frame: str) -> str:
         """Return the base frame for a scan in a frame: with the prefix where the frame has it."""
-        base = self.base_frame.strip("/")
+        base = self.base.strip("/")
         prefixed = bool(self.prefix) and frame.startswith(self.prefix)
         return f"{self.prefix}{base}" if prefixed and not base.startswith(self.prefix) else base

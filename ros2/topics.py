@@ -73,7 +73,7 @@ class Topics:
             return Publisher(participant, options.topic(name), kind, profile)
 
         self.scans: list[Subscription[LaserScan]] = [subscribe(name, LaserScan, SENSOR) for name in options.scans]
-        self.odometry: Subscription[Odometry] = subscribe(options.odometry, Odometry, STREAM)
+        self.odometry: Subscription[Odometry] = subscribe(options.odom, Odometry, STREAM)
         self.maps: list[Subscription[SerializedGrid]] = (
             [subscribe(options.map_topic, SerializedGrid, LATCHED, RELIABLE)] if options.map_topic else []
         )

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from .. import asking
+from ..asking import ask
 from ..inputs import read_map_or_id
-from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
-from ..options import AsJson, MapArgument, Server
+from ..logs import some_scans
+from ..options import AsJson, File, LogTopic, MapArgument, Server, Texts, TfNamespace, option
 from ..printing import Json, print_json, print_rows
 from ..scans import read_scan
+
+if TYPE_CHECKING:
+    from formats import LoggedScan
 
 SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
 
 def check(
     on: MapArgument,
-    scan: Annotated[
-        list[str] | None, typer.Option(metavar="FILE", help="A scan file from the building; repeat for more scans.")
-    ] = None,
-    log: Annotated[
-        Path | None, typer.Option(metavar="FILE", help=f"A log from the building; {SAMPLES} of its scans are used.")
-    ] = None,
-    topic: Topic = None,
+    scan: Annotated[Texts, option("A scan file from the building; repeat for more scans.", "FILE")] = None,
+    log: Annotated[File, option(f"A log from the building; {SAMPLES} of its scans are used.", "FILE")] = None,
+    topic: LogTopic = None,
     tf_namespace: TfNamespace = None,
     server: Server = None,
     as_json: AsJson = False,
@@ -35,25 +31,28 @@ def check(
     """Report possible errors of a map; with scans, also whether they fit better mirrored, scaled or moved."""
     scans = [read_scan(name) for name in scan or []]
     scans += [] if log is None else samples_of(log, topic, tf_namespace)
-    answer = asking.check(read_map_or_id(on), scans, server)
+    answer = checked(read_map_or_id(on), scans, server)
     if as_json:
         print_json(answer)
     else:
         print_rows(check_rows(answer))
 
 
-def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) -> list[Json]:
-    """Return some scans of a log, spread over all of it, as a request has them; print on stderr what was made of it.
+def checked(on: Json, scans: list[Json], server: str | None = None) -> Json:
+    """Return the answer of ``/v1/maps/{map_id}:check``; without a server also for a map that is not stored."""
+    return ask("check", server, on, {"scans": scans} if scans else None)
 
-    Raises
-    ------
-    RefusedError
-        When it cannot be read.
-    """
-    source = opened(log, options_of(topic, tf_namespace))
-    taken = spread(list(scans_of(source)), SAMPLES)
-    print_notes(source, sys.stderr)
-    return [sent(replace(one, mount=None)) for one in taken]  # the mount does not matter to the map
+
+def samples_of(log: Path, topic: str | None = None, tf_namespace: str | None = None) -> list[Json]:
+    """Return some scans of a log as a request has them."""
+    return [of_sensor(one) for one in some_scans(log, SAMPLES, topic, tf_namespace)]
+
+
+def of_sensor(one: LoggedScan) -> Json:
+    """Return a scan of a log as a request has it, without its mount: it does not matter to a map."""
+    from formats import scan_json
+
+    return scan_json(replace(one, mount=None))
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

@@ -3,157 +3,76 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from .. import asking
+from ..asking import answering, server_at
 from ..errors import Asked, WrongUseError
-from ..inputs import line_map_of, needing_formats
-from ..options import AsJson, Picture, Server, grouped
+from ..inputs import draw_picture, existing, write_document
+from ..options import AsJson, File, Number, OutMap, Picture, Server, Text, Texts, argument, flag, grouped, option
 from ..printing import Json, noted, print_json, print_rows
-from .checking import check_rows, samples_of
-from .drawing import write_document
+from ..scans import needing_formats
+from .checking import check_rows, checked, samples_of
 from .updating import draw_changes, update_by_drive, update_rows
 
 if TYPE_CHECKING:
     from formats import ImportOptions
 
 IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
+UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit."
 
 
 @dataclass(frozen=True, slots=True)
 class SaidOfFile:
-    """Facts that a file does not state itself, as options."""
+    """Facts that a file does not state itself, as options; by default detected."""
 
-    units: Annotated[
-        str | None,
-        typer.Option(
-            help="Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit.", metavar="UNIT"
-        ),
-    ] = None
-    layers: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PATTERN", help="Layers of a drawing to read, such as *WALL*; repeat for more patterns."),
-    ] = None
-    where: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PROPERTY=VALUE",
-            help="Entities of a drawing to read, by a property, such as indoor=wall; repeat for more.",
-        ),
-    ] = None
-    level: Annotated[str | None, typer.Option(metavar="NAME", help="Floor of a drawing that has several levels.")] = (
-        None
-    )
-    surface: Annotated[
-        float | None,
-        typer.Option(
-            metavar="CELLS",
-            help="Distance of wall surfaces behind the front of the occupied cells of a grid. Default: detected.",
-        ),
-    ] = None
-    point: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            metavar="X Y", help="A free place in metres; the directions of the walls around it are derived from it."
-        ),
-    ] = None
-    drawn: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHAT", help="Meaning of the lines of a drawing: faces or centres of walls. Default: detected."
-        ),
-    ] = None
-    thickness: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Thickness of walls that are drawn by centre lines.")
-    ] = None
-    directions: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHAT", help="drawn: free space lies on the left of each line; none: directions have no meaning."
-        ),
-    ] = None
-    local_metres: Annotated[bool, typer.Option("--local-metres", help="The coordinates of a GeoJSON are metres.")] = (
-        False
-    )
-    topic: Annotated[str | None, typer.Option(help="Topic of the grid in a bag.")] = None
-    unknown: Annotated[
-        str | None,
-        typer.Option(
-            metavar="GREY", help="Grey value of unknown cells in a picture, 0 to 255, or none. Default: detected."
-        ),
-    ] = None
+    units: Annotated[Text, option(UNIT, "UNIT")] = None
+    layers: Annotated[Texts, option("Layers of a drawing to read, such as *WALL*; repeatable.", "PATTERN")] = None
+    where: Annotated[Texts, option("Entities to read, such as indoor=wall; repeatable.", "PROPERTY=VALUE")] = None
+    level: Annotated[Text, option("Floor of a drawing that has several levels.", "NAME")] = None
+    surface: Annotated[Number, option("Depth of walls' surfaces behind the front of a grid's cells.", "CELLS")] = None
+    point: Annotated[tuple[float, float] | None, option("A free place, to find the walls' directions.", "X Y")] = None
+    drawn: Annotated[Text, option("What a drawing's lines are: faces or centres of walls.", "WHAT")] = None
+    thickness: Annotated[Number, option("Thickness of walls drawn by centre lines.", "METRES")] = None
+    directions: Annotated[Text, option("drawn: free space is left of each line; none: unknown.", "WHAT")] = None
+    local_metres: Annotated[bool, flag("The coordinates of a GeoJSON are metres.", "--local-metres")] = False
+    topic: Annotated[Text, option("Topic of the grid in a bag.")] = None
+    unknown: Annotated[Text, option("Grey value of unknown cells in a picture, 0 to 255, or none.", "GREY")] = None
 
     @property
     def options(self) -> ImportOptions:
         """The same for `formats`; raises `InputError` where a value is out of its range."""
         from formats import ImportOptions
 
-        unknown: Any = int(self.unknown) if self.unknown and self.unknown.isdecimal() else self.unknown
-        layers = tuple(name.strip() for one in self.layers or () for name in one.split(",") if name.strip())
-        drawn, directions = cast("Any", self.drawn), cast("Any", self.directions)
-        inside = (self.point,) if self.point else ()
-        return ImportOptions(
-            _units(self.units),
-            layers,
-            drawn,
-            self.thickness,
-            inside,
-            directions,
-            self.local_metres,
-            self.topic,
-            unknown,
-            tuple(self.where or ()),
-            self.level,
-            self.surface,
-        )
+        said: dict[str, Any] = {name: value for name, value in asdict(self).items() if value is not None}
+        said["layers"] = tuple(name.strip() for one in self.layers or () for name in one.split(",") if name.strip())
+        said["where"] = tuple(self.where or ())
+        said["units"] = _units(self.units)
+        if self.unknown and self.unknown.isdecimal():
+            said["unknown"] = int(self.unknown)
+        if "point" in said:
+            said["inside"] = (said.pop("point"),)
+        return ImportOptions(**said)
 
     @property
     def fields(self) -> Json:
-        """The same as fields of a form."""
-        once = {
-            "units": self.units,
-            "drawn": self.drawn,
-            "thickness": self.thickness,
-            "directions": self.directions,
-            "local_metres": "true" if self.local_metres else None,
-            "topic": self.topic,
-            "unknown": self.unknown,
-            "level": self.level,
-            "surface": self.surface,
-        }
-        found: dict[str, list[str]] = {name: [str(value)] for name, value in once.items() if value is not None}
-        found |= {name: values for name, values in (("layers", self.layers), ("where", self.where)) if values}
-        found |= {"point": [f"{self.point[0]} {self.point[1]}"]} if self.point else {}
-        return found
+        """The same as fields of a form, which are lists of text."""
+        said = {name: value for name, value in asdict(self).items() if value is not None}
+        said["local_metres"] = ["true"] if self.local_metres else []
+        if self.point:
+            said["point"] = f"{self.point[0]} {self.point[1]}"
+        return {name: value if isinstance(value, list) else [str(value)] for name, value in said.items()}
 
 
 @grouped
 def import_map(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            help="Map file: yaml of map_server, dxf, svg, geojson, csv, json, or a bag with an OccupancyGrid."
-        ),
-    ],
+    file: Annotated[Path, argument("Map file: yaml of map_server, dxf, svg, geojson, csv, json, or a bag.", "FILE")],
     said: SaidOfFile,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the map to this file: json, dxf, svg, geojson or csv.")
-    ] = None,
+    out: OutMap = None,
     picture: Picture = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="A log of the building: find the thickness of walls drawn by centre lines, or the surface of a grid.",
-        ),
-    ] = None,
-    update: Annotated[
-        bool, typer.Option("--update", help="Improve the map with the scans of --log; see map update.")
-    ] = False,
+    log: Annotated[File, option("A log of the building: find where the walls' surfaces are.", "FILE")] = None,
+    update: Annotated[bool, flag("Improve the map with the scans of --log; see map update.", "--update")] = False,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -175,10 +94,7 @@ def import_map(
             draw_changes(answer["map"], updated, picture)
         answer = {**answer, "map": updated.pop("map"), "update": updated}
     elif picture is not None:
-        with needing_formats("drawing a picture"):
-            from formats import draw_map
-
-            draw_map(line_map_of(answer["map"]), picture)
+        draw_picture(answer["map"], picture)
     if out is not None:
         write_document(answer["map"], out)
     if as_json:
@@ -195,12 +111,11 @@ def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
     WrongUseError
         When there is no such file.
     """
-    if not file.exists():
-        raise WrongUseError(f"{file}: there is no such file; check the path and the working folder")
+    existing(file)
     if server is not None:
-        with asking.server_at(server) as remote:
+        with server_at(server) as remote:
             return remote.import_map(_with_what_it_names(file), said.fields)
-    with needing_formats(f"reading {file.name}"), asking.answering(Asked(files=(file.name,))) as within:
+    with needing_formats(f"reading {file.name}"), answering(Asked(files=(file.name,))) as within:
         from formats import read_map
         from linefix.answering import check_import
         from linefix.operations import Stopwatch
@@ -218,9 +133,9 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
     dict
         As of `imported`; ``check`` has the scans too.
     """
-    scans = samples_of(log, None)
-    checked = asking.check(answer["map"], scans, None)
-    thicker, line_map = checked["samples"]["wall_thickness"], answer["map"]
+    scans = samples_of(log)
+    found = checked(answer["map"], scans)
+    thicker, line_map = found["samples"]["wall_thickness"], answer["map"]
     meta = line_map["meta"]
     made_of_centres = "thickness" in meta or not line_map["oriented"]
     if thicker is not None and "surface" in meta and said.surface is None:
@@ -232,12 +147,12 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
         changed, replaced = replace(said, drawn="centres", thickness=round(thickness, 2)), "thickness_given"
         message = f"walls are {thickness:.2f} m thick"
     else:
-        return {**answer, "check": checked}
+        return {**answer, "check": found}
     again = imported(file, changed, None)
     kept = [note for note in again["report"]["assumed"] if note["code"] != replaced]
-    found = {"code": f"{replaced.partition('_')[0]}_found", "count": 0}
-    again["report"]["assumed"] = [*kept, {**found, "message": f"{message}, estimated from scans of {log.name}"}]
-    return {**again, "check": asking.check(again["map"], scans, None)}
+    told = {"code": f"{replaced.partition('_')[0]}_found", "count": 0}
+    again["report"]["assumed"] = [*kept, {**told, "message": f"{message}, estimated from scans of {log.name}"}]
+    return {**again, "check": checked(again["map"], scans)}
 
 
 def _with_what_it_names(file: Path) -> list[Path]:

@@ -1,27 +1,22 @@
-"""``linefix map put``, ``list``, ``get``, ``rm``: maps stored by id."""
+"""``linefix map put``, ``list``, ``get``, ``rm``: maps stored by id; and ``draw``: maps to files of other tools."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..asking import keeping
 from ..errors import WrongUseError
-from ..inputs import MAP_ID, read_map_file
-from ..options import AsJson, Server
+from ..inputs import MAP_ID, document_at, draw_picture, read_map_file, write_document
+from ..options import WRITE_MAP, AsJson, File, MapArgument, Server, argument, option
 from ..printing import print_json, print_rows, print_table
-from .drawing import write_document
 
-MapId = Annotated[str, typer.Argument(metavar="ID", help="Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -")]
+MapId = Annotated[str, argument("Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -", "ID")]
 
 
 def put(
     map_id: MapId,
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="A map file: json, or another file that map import reads.")
-    ],
+    file: Annotated[str, argument("A map file: json, or another file that map import reads.", "FILE")],
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -44,21 +39,14 @@ def list_maps(server: Server = None, as_json: AsJson = False) -> None:
             print_json(one)
         return
     columns = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
-    rows = [
-        (m["map_id"], m["revision"], m["segment_count"], *map(float, m["bounds"]), m["sigma"], m["oriented"])
-        for m in found
-    ]
+    names = ("map_id", "revision", "segment_count")
+    rows = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in found]
     print_table(columns, rows)
 
 
 def get(
     map_id: MapId,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Write the map to this file: json, dxf, svg, geojson or csv. Default: print it."
-        ),
-    ] = None,
+    out: Annotated[File, option(f"{WRITE_MAP} Default: print it.", "FILE")] = None,
     server: Server = None,
 ) -> None:
     """Print a stored map as JSON, or write it to a file."""
@@ -80,3 +68,13 @@ def _checked(map_id: str) -> str:
     if not MAP_ID.fullmatch(map_id):
         raise WrongUseError(f"the id is not valid: expected 1 to 128 of A-Z a-z 0-9 . _ -, found {map_id[:200]!r}")
     return map_id
+
+
+def draw(
+    on: MapArgument,
+    out: Annotated[Path, option("File to write: png, svg, dxf, geojson, csv or json.", "FILE")],
+    server: Server = None,
+) -> None:
+    """Draw a map: walls in grey, a blue tick on the free side of each."""
+    write = draw_picture if out.suffix.lower() == ".png" else write_document
+    write(document_at(on, server), out)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import cli
-from cli.logs import spread
+from cli.logs import thinned
 from cli.printing import console
 from tests.map_quality.check.drawn import faces
 
@@ -34,9 +34,9 @@ def test_what_is_printed_is_taken_for_no_markup(capsys: pytest.CaptureFixture[st
 
 
 def test_some_of_many_are_spread_evenly_and_of_none_none() -> None:
-    assert spread([], 3) == []
-    assert spread([1, 2], 3) == [1, 2]
-    assert spread(list(range(10)), 5) == [0, 2, 4, 6, 8]
+    assert thinned([], 3) == []
+    assert thinned([1, 2], 3) == [1, 2]
+    assert thinned(list(range(10)), 5) == [0, 2, 4, 6, 8]
 
 
 def test_help_imports_nothing_that_computes_and_a_replay_no_service(folder: Path) -> None:

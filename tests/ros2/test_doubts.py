@@ -88,7 +88,7 @@ def test_a_map_with_few_changes_keeps_the_pose(room: linefix.MapIndex) -> None:
 
 def test_a_map_that_changes_keeps_the_agreed_pose(domain: int) -> None:
     logged: list[str] = []
-    with running(NodeOptions(domain=domain, agree=1, map_topic="map", base_frame="laser"), None, logged.append):
+    with running(NodeOptions(domain=domain, agree=1, map_topic="map", base="laser"), None, logged.append):
         robot, grid = Fleet(domain), grid_of_room()
         robot.maps.publish(grid)
         robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))

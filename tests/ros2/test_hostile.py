@@ -150,7 +150,7 @@ def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
 
 @pytest.mark.parametrize("quality", [LATCHED, RELIABLE], ids=["transient local", "volatile"])
 def test_a_map_is_taken_however_it_is_published(domain: int, quality: Any) -> None:
-    with running(NodeOptions(agree=1, domain=domain, base_frame="laser", map_topic="map"), None):
+    with running(NodeOptions(agree=1, domain=domain, base="laser", map_topic="map"), None):
         robot = Robot(domain)
         maps = Publisher(robot.net, "/map", messages.OccupancyGrid, quality)
         robot.until(robot.diagnostics, lambda: robot.scans.publish(scan(1)))

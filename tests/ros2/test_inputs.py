@@ -100,7 +100,7 @@ def test_diagnostics_come_once_a_second_without_scans(
 
 @pytest.mark.parametrize("ranges", [[], [float("nan")] * 720], ids=["empty", "NaN"])
 def test_a_scan_without_a_valid_range_is_an_error(domain: int, room: linefix.MapIndex, ranges: list[float]) -> None:
-    with running(NodeOptions(domain=domain, base_frame="laser"), room):
+    with running(NodeOptions(domain=domain, base="laser"), room):
         robot = Robot(domain)
         blind = scan(1)
         blind.ranges = ranges

@@ -73,7 +73,7 @@ def test_it_is_silent_until_asked_again(domain: int, room: linefix.MapIndex) -> 
 
 def test_the_map_may_come_as_a_grid(domain: int) -> None:
     """And a scanner that has the robot's own frame needs no mount."""
-    with running(NodeOptions(domain=domain, agree=1, base_frame="laser", map_topic="map"), None):
+    with running(NodeOptions(domain=domain, agree=1, base="laser", map_topic="map"), None):
         robot = Robot(domain)
         robot.maps.publish(grid_of_room("floor"))
         found = robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))

@@ -11,18 +11,16 @@ import pytest
 from cli.entry import run
 from cli.errors import WrongUseError
 from cli.options import UsableOptions
-from cli.ros2 import Publishing, RobotNames, ScanSources
+from cli.ros2 import RobotOptions
 from cli.ros2_parameters import parameters_of
 from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
 from ros2.names import absolute_name
 
-RENAMED = {"odom": "odometry", "base": "base_frame"}  # options of the command line
-
 
 def test_the_command_has_the_defaults_of_the_node() -> None:
-    groups = ScanSources(), RobotNames(), UsableOptions(), Publishing()
-    found = {RENAMED.get(one.name, one.name): getattr(group, one.name) for group in groups for one in fields(group)}
-    assert found == {name: getattr(NodeOptions(), name, None) for name in found} | {"namespace": None}
+    found = {one.name: getattr(group, one.name) for group in (RobotOptions(), UsableOptions()) for one in fields(group)}
+    assert found.pop("on") is found.pop("scan") is found.pop("namespace") is None
+    assert found == {name: getattr(NodeOptions(), name) for name in found} | {"map_topic": "map"}
 
 
 @pytest.mark.parametrize(
