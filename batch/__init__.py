@@ -4,19 +4,17 @@
 
     running             associate_many: lay out, search, put together
     logs, blocks        logs to Parquet files whose row groups are blocks; the scans of one block
-    maps                which map a scan lies on
-    searching           one block's scans to rows
+    searching           which map a scan lies on; one block's scans to rows
     parts               the results so far, from which a run that was killed continues
-    processes, on_ray   the workers
+    engine              the workers: processes of this machine, or those of Ray
+    tables              the columns of input and output
 
 The extra ``linefix[batch]`` brings the libraries, ``linefix[ray]`` Ray besides.
 """
 
-from .engine import Engine, Lost
+from .engine import Engine, Lost, OnRay, Processes
 from .errors import FleetError, OtherRunError, UnreadableMapsError, UnreadableScansError
 from .logs import LogNote
-from .on_ray import OnRay
-from .processes import Processes
 from .running import Progress, Summary, associate_many
 from .searching import FleetOptions
 from .tables import POSES

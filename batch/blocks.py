@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -19,7 +19,7 @@ from registration import MeasuredSegments, Segments
 from vectorization import LaserScan, Motion
 
 from .errors import UnreadableScansError
-from .tables import MOTION
+from .tables import COLUMNS, MOTION
 
 SIGMA = 0.02  # m, of the points of segments without a sigma; as over HTTP
 
@@ -50,8 +50,7 @@ class Block:
     def halves(self) -> tuple[Block, Block]:
         """The block in two; of at least two scans."""
         middle = (self.start + self.stop) // 2
-        first = Block(self.number, self.log, self.path, self.start, middle)
-        return first, Block(self.number, self.log, self.path, middle, self.stop)
+        return replace(self, stop=middle), replace(self, start=middle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +108,8 @@ class Row:
 
     def _motion(self) -> Motion | None:
         increment, *twist = (self._number(name) for name in MOTION)
-        vx, vy, omega = twist
-        if not increment or vx is None or vy is None or omega is None:
-            return None
-        return Motion(increment, vx, vy, omega)
+        known = [one for one in twist if one is not None]
+        return Motion(increment, *known) if increment and len(known) == 3 else None
 
     def _segments(self) -> Scan:
         try:
@@ -141,29 +138,13 @@ def rows_of(block: Block) -> Iterator[Row]:
         yield Row(block.start + k, values)
 
 
-READ = (
-    "stamp",
-    "map_id",
-    "angle_min",
-    "angle_increment",
-    "ranges",
-    "range_min",
-    "range_max",
-    "flipped",
-    *MOTION,
-    "segments",
-    "sigma",
-    "error",
-)
-
-
 def _read(block: Block) -> pa.Table:
     """Return a block's columns; its file's row groups are no larger than blocks, so little more is read."""
     file = _opened(block.path)
     ends = np.cumsum([file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)])
     first, last = np.searchsorted(ends, [block.start, block.stop - 1], side="right")
     begun = int(ends[first - 1]) if first else 0
-    names = [name for name in READ if name in file.schema_arrow.names]
+    names = [name for name in COLUMNS if name in file.schema_arrow.names]
     table = file.read_row_groups(range(int(first), int(last) + 1), columns=names, use_threads=False)
     return _with_stamps(table.slice(block.start - begun, block.stop - block.start))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +16,12 @@ from registration import InputError
 
 from .blocks import Block
 from .errors import UnreadableScansError
-from .tables import FORMS, LASER, MOTION, SCANS
+from .tables import COLUMNS, FORMS, LASER, MOTION, SCANS
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan
 
 PARQUET = (".parquet", ".pq")
-WORDS = ("map_id", "error")
 NOTES = b"linefix.notes"  # in the metadata of a file that a log is laid out in
 
 
@@ -141,21 +141,11 @@ def lay_out(layout: Layout) -> None:
     else:
         with pq.ParquetWriter(begun, SCANS) as writer:
             reading = _Reading(layout.log)
-            for rows in _filled(reading.rows(), layout.block):
+            found = reading.rows()
+            while rows := list(islice(found, layout.block)):
                 writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
             writer.add_key_value_metadata({NOTES: orjson.dumps(reading.notes())})
     begun.rename(target)
-
-
-def _filled(rows: Iterator[dict[str, Any]], count: int) -> Iterator[list[dict[str, Any]]]:
-    kept: list[dict[str, Any]] = []
-    for row in rows:
-        kept.append(row)
-        if len(kept) == count:
-            yield kept
-            kept = []
-    if kept:
-        yield kept
 
 
 @dataclass(slots=True)
@@ -189,19 +179,10 @@ class _Reading:
 
 def _row(scan: LoggedScan) -> dict[str, Any]:
     laser, motion = scan.laser, scan.laser.motion
-    return {
-        "stamp": scan.stamp_ns,
-        "angle_min": laser.angle_min,
-        "angle_increment": laser.angle_increment,
-        "ranges": laser.ranges,
-        "range_min": laser.range_min,
-        "range_max": laser.range_max,
-        "flipped": scan.flipped,
-        "time_increment": scan.time_increment,
-        "vx": None if motion is None else motion.vx,
-        "vy": None if motion is None else motion.vy,
-        "omega": None if motion is None else motion.omega,
-    }
+    names = (*LASER, "range_min", "range_max")
+    row: dict[str, Any] = {"stamp": scan.stamp_ns, "flipped": scan.flipped, "time_increment": scan.time_increment}
+    row |= {name: getattr(laser, name) for name in names}
+    return row if motion is None else row | {name: getattr(motion, name) for name in MOTION[1:]}
 
 
 def _checked(path: Path) -> pq.FileMetaData:
@@ -216,9 +197,7 @@ def _checked(path: Path) -> pq.FileMetaData:
         metadata = pq.read_metadata(path)
     except (pa.ArrowException, OSError) as error:
         raise UnreadableScansError(f"is not a Parquet file: {error}", argument=str(path)) from None
-    schema = metadata.schema.to_arrow_schema()
-    wrong = next((told for told in _faults(schema)), None)
-    if wrong is not None:
+    for wrong in _faults(metadata.schema.to_arrow_schema()):
         raise UnreadableScansError(wrong, argument=str(path))
     return metadata
 
@@ -229,22 +208,6 @@ def _faults(schema: pa.Schema) -> Iterator[str]:
     if "ranges" in schema.names:
         yield from (f"expected a column {name} in addition to ranges" for name in LASER if name not in schema.names)
     for field in schema:
-        kind = field.type
-        listed = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
-        number = pa.types.is_floating(kind) or pa.types.is_integer(kind)
-        if field.name == "ranges" and not (listed and _is_number(kind.value_type)):
-            yield f"expected a list of numbers in ranges, found {kind}"
-        elif field.name == "segments" and not listed:
-            yield f"expected lists of four numbers in segments, found {kind}"
-        elif field.name == "stamp" and not (pa.types.is_integer(kind) or pa.types.is_timestamp(kind)):
-            yield f"expected nanoseconds or points in time in stamp, found {kind}"
-        elif field.name in WORDS and not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-            yield f"expected text in {field.name}, found {kind}"
-        elif field.name == "flipped" and not pa.types.is_boolean(kind):
-            yield f"expected true or false in flipped, found {kind}"
-        elif field.name in (*LASER[:2], *MOTION, "range_min", "range_max", "sigma") and not number:
-            yield f"expected numbers in {field.name}, found {kind}"
-
-
-def _is_number(kind: pa.DataType) -> bool:
-    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+        fits, expected = COLUMNS.get(field.name, (None, ""))
+        if fits is not None and not fits(field.type):
+            yield f"expected {expected} in {field.name}, found {field.type}"

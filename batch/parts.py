@@ -46,7 +46,7 @@ class Parts:
 
     def keep(self, block: Block, rows: pa.Table) -> None:
         """Write the rows of a block; they outlive a kill and a power loss from then on."""
-        path = self.poses / f"{block.number:06d}-{block.start:012d}-{block.stop:012d}.parquet"
+        path = self._path(block.number, block.start, block.stop)
         begun = path.with_suffix(".begun")
         with begun.open("wb") as file:
             pq.write_table(rows, file)
@@ -66,8 +66,8 @@ class Parts:
         begun = out.with_name(out.name + ".begun")
         with pq.ParquetWriter(begun, POSES) as writer:
             gathered: list[pa.Table] = []
-            for number, start, stop in self._kept():
-                gathered.append(pq.read_table(self.poses / f"{number:06d}-{start:012d}-{stop:012d}.parquet"))
+            for kept in self._kept():
+                gathered.append(pq.read_table(self._path(*kept)))
                 yield gathered[-1]
                 if sum(map(len, gathered)) >= ROWS:
                     writer.write_table(pa.concat_tables(gathered))
@@ -78,6 +78,9 @@ class Parts:
             os.fsync(file.fileno())
         begun.replace(out)
         shutil.rmtree(self.folder)
+
+    def _path(self, number: int, start: int, stop: int) -> Path:
+        return self.poses / f"{number:06d}-{start:012d}-{stop:012d}.parquet"
 
     def _kept(self) -> list[tuple[int, int, int]]:
         found = (_NAME.fullmatch(path.name) for path in self.poses.iterdir())

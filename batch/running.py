@@ -12,13 +12,11 @@ from typing import Any, Literal
 import pyarrow as pa
 
 from .blocks import Block
-from .engine import Engine, Lost
+from .engine import Engine, Lost, Processes
 from .errors import UnreadableScansError
 from .logs import Layout, LogNote, lay_out, layout_of, merged_notes
-from .maps import MapShelf
 from .parts import Parts, opened
-from .processes import Processes
-from .searching import BlockSearch, FleetOptions, lost_row
+from .searching import BlockSearch, FleetOptions, MapShelf, lost_row
 
 PathLike = str | os.PathLike[str]
 

@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pyarrow as pa
 
 LASER = ("angle_min", "angle_increment", "ranges")
 MOTION = ("time_increment", "vx", "vy", "omega")
 FORMS = ("ranges", "segments")
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+
+
+def _is_text(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _is_list(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
+
+
+NUMBER, TEXT = (_is_number, "numbers"), (_is_text, "text")
+
+# The columns of input that are read: the test of their type, and what is expected.
+COLUMNS: dict[str, tuple[Callable[[pa.DataType], bool], str]] = {
+    "stamp": (lambda kind: pa.types.is_integer(kind) or pa.types.is_timestamp(kind), "nanoseconds or points in time"),
+    "ranges": (lambda kind: _is_list(kind) and _is_number(kind.value_type), "a list of numbers"),
+    "segments": (_is_list, "lists of four numbers"),
+    "flipped": (pa.types.is_boolean, "true or false"),
+    **dict.fromkeys(("map_id", "error"), TEXT),
+    **dict.fromkeys((*LASER[:2], *MOTION, "range_min", "range_max", "sigma"), NUMBER),
+}
 
 # A log of another tool, laid out as Parquet.
 SCANS = pa.schema(

@@ -19,8 +19,8 @@ import numpy as np
 import linefix
 from registration import IDENTITY, InputError, RigidTransform, Segments, wrap_angle
 from ros2.agreement import Agreement, Event, Observation
-from ros2.locating import OPTIONS, Located
 from ros2.messages import Time
+from ros2.searching import OPTIONS, Located
 from simulation import Scanner, scan
 
 from .outcomes import progress

@@ -22,25 +22,7 @@ from numpy.typing import NDArray
 
 from registration import IDENTITY, RigidTransform, wrap_angle
 
-from .tuning import (
-    AGREEING_CHI_SQUARE,
-    CLOCK_BACK_NS,
-    FORGOTTEN_NS,
-    MAX_HYPOTHESES,
-    MOVED,
-    ODOMETRY_ANGLE,
-    ODOMETRY_ANGLE_PER_ANGLE,
-    ODOMETRY_ANGLE_PER_METRE,
-    ODOMETRY_DISTANCE,
-    ODOMETRY_DISTANCE_PER_METRE,
-    RESTED_NS,
-    SEPARATE_ANGLE,
-    SEPARATE_DISTANCE,
-    SEPARATE_NS,
-    TURNED,
-    UNKNOWN_SPEED,
-    UNKNOWN_TURN_RATE,
-)
+from . import tuning
 
 Floats = NDArray[np.float64]
 
@@ -128,9 +110,9 @@ class _Hypothesis:
         self.turned = max(self.turned, abs(whole.theta))
         since = step_between(self.counted, scan) or IDENTITY
         if (
-            math.hypot(since.x, since.y) >= SEPARATE_DISTANCE
-            or abs(since.theta) >= SEPARATE_ANGLE
-            or scan.stamp - self.counted.stamp >= SEPARATE_NS
+            math.hypot(since.x, since.y) >= tuning.SEPARATE_DISTANCE
+            or abs(since.theta) >= tuning.SEPARATE_ANGLE
+            or scan.stamp - self.counted.stamp >= tuning.SEPARATE_NS
         ):
             self.supporting += 1
             self.counted = scan
@@ -139,8 +121,8 @@ class _Hypothesis:
     def agreed(self, needed: int) -> bool:
         if self.supporting - self.against < needed:
             return False
-        rested = self.against == 0 and self.latest.stamp - self.first.stamp >= RESTED_NS
-        return needed == 1 or self.moved >= MOVED or self.turned >= TURNED or rested
+        rested = self.against == 0 and self.latest.stamp - self.first.stamp >= tuning.RESTED_NS
+        return needed == 1 or self.moved >= tuning.MOVED or self.turned >= tuning.TURNED or rested
 
 
 @dataclass(slots=True)
@@ -185,12 +167,14 @@ class Agreement:
         Scans that are older than the last one are left out; where the clock was set back, everything is forgotten.
         """
         if self._newest is not None and scan.stamp < self._newest:
-            if self._newest - scan.stamp <= CLOCK_BACK_NS:
+            if self._newest - scan.stamp <= tuning.CLOCK_BACK_NS:
                 return Event.NOTHING
             self.reset()
         self._newest = scan.stamp
         self._hypotheses = [
-            one for one in self._hypotheses if one is self._agreed or scan.stamp - one.latest.stamp <= FORGOTTEN_NS
+            one
+            for one in self._hypotheses
+            if one is self._agreed or scan.stamp - one.latest.stamp <= tuning.FORGOTTEN_NS
         ]
         # Without odometry a robot rests or not since the first scan: from scan to scan a slow one always seems to.
         known = scan.odometry is not None
@@ -208,7 +192,7 @@ class Agreement:
 
     def _begin(self, scan: Observation) -> None:
         self._hypotheses.append(_Hypothesis(scan, scan, scan))
-        if len(self._hypotheses) > MAX_HYPOTHESES:
+        if len(self._hypotheses) > tuning.MAX_HYPOTHESES:
             self._hypotheses.remove(
                 min((one for one in self._hypotheses if one is not self._agreed), key=lambda one: one.latest.stamp)
             )
@@ -262,9 +246,9 @@ def predict(begin: Observation, step: RigidTransform, unknown_s: float = 0.0) ->
     predicted = begin.pose.compose(step)
     known = np.zeros((3, 3)) if begin.covariance is None else begin.pose.carry(begin.covariance, step)
     distance, angle = math.hypot(step.x, step.y), abs(step.theta)
-    place = ODOMETRY_DISTANCE + ODOMETRY_DISTANCE_PER_METRE * distance + UNKNOWN_SPEED * unknown_s
-    turn = ODOMETRY_ANGLE + ODOMETRY_ANGLE_PER_ANGLE * angle + ODOMETRY_ANGLE_PER_METRE * distance
-    turn += UNKNOWN_TURN_RATE * unknown_s
+    place = tuning.ODOMETRY_DISTANCE + tuning.ODOMETRY_DISTANCE_PER_METRE * distance + tuning.UNKNOWN_SPEED * unknown_s
+    turn = tuning.ODOMETRY_ANGLE + tuning.ODOMETRY_ANGLE_PER_ANGLE * angle + tuning.ODOMETRY_ANGLE_PER_METRE * distance
+    turn += tuning.UNKNOWN_TURN_RATE * unknown_s
     return predicted, known + np.diag([place**2, place**2, turn**2])
 
 
@@ -287,9 +271,9 @@ def _verdict(begin: Observation, scan: Observation) -> bool | None:
         return False
     if scan.usable:
         both = covariance + (0.0 if scan.covariance is None else scan.covariance)
-        return chi_square(predicted, scan.pose, both) <= AGREEING_CHI_SQUARE
+        return chi_square(predicted, scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
     if not scan.conclusive:
         return None
     places = [one.pose for one in (Place(scan.pose, scan.map_id), *scan.others) if one.map_id == begin.map_id]
-    near = any(chi_square(predicted, pose, covariance) <= AGREEING_CHI_SQUARE for pose in places)
+    near = any(chi_square(predicted, pose, covariance) <= tuning.AGREEING_CHI_SQUARE for pose in places)
     return None if near else False

@@ -9,17 +9,16 @@ from collections.abc import Callable
 from formats.logs.tuning import MOST_GAP_NS
 
 from .agreement import Agreement, Event, Observation
-from .correcting import MapToOdom
-from .deciding import InitialPose
+from .deciding import InitialPose, MapToOdom
 from .frames import Frames
 from .health import Health, State, current_time
-from .locating import Located
 from .maps import UNNAMED, Maps
 from .messages import PoseWithCovarianceStamped, String, Time
 from .odometry import OdometryHistory, nanoseconds
 from .options import NodeOptions
 from .reporting import at_least, map_marker, stamped_pose, transform_of
 from .requests import Requests
+from .searching import Located
 from .topics import Topics
 from .transforms import NS
 from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS

@@ -25,7 +25,7 @@ import linefix
 
 from .maps import UNNAMED, Maps
 from .messages import Header, MapMetaData, OccupancyGrid, SerializedGrid
-from .names import MAX_NAME
+from .options import MAX_NAME
 from .tuning import CONVERSION_BYTES, CONVERSION_IDLE, CONVERSION_PATIENCE, CONVERSION_SECONDS, MAX_GRID_BYTES
 
 

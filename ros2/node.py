@@ -13,19 +13,17 @@ from registration import IDENTITY
 
 from .connecting import connect
 from .frames import Frames
-from .gathering import Gathering, looks_of
 from .health import Health, State, current_time
 from .inputs import Inputs
 from .localization import Localization
-from .locating import search_options
+from .looking import Gathering, looks_of
 from .map_conversion import MapConverter
 from .maps import Maps
 from .messages import LaserScan, Odometry
-from .names import quoted
 from .odometry import OdometryHistory
-from .options import NodeOptions
+from .options import NodeOptions, quoted
 from .reporting import answer_marker, stamped_pose, values_of, verdict_of
-from .searching import Found, Searcher
+from .searching import Found, Searcher, search_options
 from .topics import Topics
 from .transforms import NS, FrameError, planar
 from .tuning import END_SECONDS, ODOMETRY_SECONDS, SAME_MAP, TRANSFORM_PERIOD_NS

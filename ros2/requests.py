@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 from .messages import DiagnosticStatus, PoseWithCovarianceStamped, String
-from .names import MAX_NAME
+from .options import MAX_NAME
 from .reporting import ERROR, OK, status_of
 from .tuning import RESULT_SECONDS
 from .wire import Publisher, Subscription

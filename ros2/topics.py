@@ -7,22 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from cyclonedds.domain import DomainParticipant
+from cyclonedds.qos import Qos
 
-from .messages import (
-    DiagnosticArray,
-    DiagnosticStatus,
-    Empty,
-    LaserScan,
-    MarkerArray,
-    Odometry,
-    PoseWithCovarianceStamped,
-    SerializedGrid,
-    SerializedTransforms,
-    String,
-    TFMessage,
-)
+from . import messages as ros
 from .options import NodeOptions
-from .wire import LATCHED, NEWEST, RELIABLE, SENSOR, STREAM, Publisher, Subscription, undecodable
+from .wire import LATCHED, NEWEST, RELIABLE, SENSOR, STREAM, Message, Publisher, Subscription, undecodable
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,26 +20,26 @@ class Transforms:
 
     Attributes
     ----------
-    subscription : Subscription of SerializedTransforms
+    subscription : Subscription of ros.SerializedTransforms
     static : bool
     prefix : str
         Of the robot's frames, where other robots publish on this topic as well; empty: all frames are its own.
     """
 
-    subscription: Subscription[SerializedTransforms]
+    subscription: Subscription[ros.SerializedTransforms]
     static: bool
     prefix: str
 
-    def take(self) -> Sequence[TFMessage]:
+    def take(self) -> Sequence[ros.TFMessage]:
         """Return the messages that came, those of other robots left out before they are decoded."""
         own = self.prefix.encode()
         found = []
         for message in self.subscription.take():
             if own in message.serialized:
                 try:
-                    found.append(TFMessage.deserialize(message.serialized))
+                    found.append(ros.TFMessage.deserialize(message.serialized))
                 except Exception as error:  # whatever decoding raises for bytes that are no such message
-                    self.subscription.problem(f"{self.subscription.name}: {undecodable(TFMessage, error)}")
+                    self.subscription.problem(f"{self.subscription.name}: {undecodable(ros.TFMessage, error)}")
         return found
 
 
@@ -66,53 +55,37 @@ class Topics:
     """
 
     def __init__(self, participant: DomainParticipant, options: NodeOptions, problem: Callable[[str], None]) -> None:
-        def subscribe(name: str, kind: Any, *profiles: Any) -> Any:
-            return Subscription(participant, options.topic(name), kind, *profiles, problem=problem)
+        self.subscriptions: list[Subscription[Any]] = []
 
-        def publish(name: str, kind: Any, profile: Any) -> Any:
+        def subscribe(name: str, kind: type[Message], *profiles: Qos) -> Subscription[Message]:
+            found = Subscription(participant, options.topic(name), kind, *profiles, problem=problem)
+            self.subscriptions.append(found)
+            return found
+
+        def publish(name: str, kind: type[Message], profile: Qos) -> Publisher[Message]:
             return Publisher(participant, options.topic(name), kind, profile)
 
-        self.scans: list[Subscription[LaserScan]] = [subscribe(name, LaserScan, SENSOR) for name in options.scans]
-        self.odometry: Subscription[Odometry] = subscribe(options.odom, Odometry, STREAM)
-        self.maps: list[Subscription[SerializedGrid]] = (
-            [subscribe(options.map_topic, SerializedGrid, LATCHED, RELIABLE)] if options.map_topic else []
-        )
-        self.transforms = self._transforms(options, subscribe)
-        self.requests: Subscription[Empty] = subscribe("linefix/locate", Empty, RELIABLE)
-        self.named_requests: Subscription[String] = subscribe("linefix/locate_request", String, RELIABLE)
-        self.amcl: Subscription[PoseWithCovarianceStamped] = subscribe(
-            "amcl_pose", PoseWithCovarianceStamped, LATCHED, RELIABLE
-        )
-        self.initial: Publisher[PoseWithCovarianceStamped] = publish("initialpose", PoseWithCovarianceStamped, RELIABLE)
-        self.pose: Publisher[PoseWithCovarianceStamped] = publish("linefix/pose", PoseWithCovarianceStamped, RELIABLE)
-        self.agreed: Publisher[PoseWithCovarianceStamped] = publish(
-            "linefix/agreed_pose", PoseWithCovarianceStamped, RELIABLE
-        )
-        # On a topic of its own: behind robots the map would be no longer latched.
-        self.walls: Publisher[MarkerArray] = publish("linefix/map_markers", MarkerArray, NEWEST)
-        self.markers: Publisher[MarkerArray] = publish("linefix/markers", MarkerArray, NEWEST)
-        self.map_id: Publisher[String] = publish("linefix/map_id", String, NEWEST)
-        self.status: Publisher[DiagnosticStatus] = publish("linefix/status", DiagnosticStatus, NEWEST)
-        self.results: Publisher[DiagnosticStatus] = publish("linefix/locate_result", DiagnosticStatus, LATCHED)
-        self.diagnostics: Publisher[DiagnosticArray] = publish("/diagnostics", DiagnosticArray, RELIABLE)
-        name = "tf" if options.namespace and not options.frame_prefix else "/tf"
-        self.tf: Publisher[TFMessage] | None = publish(name, TFMessage, RELIABLE) if options.publish_tf else None
-
-    @staticmethod
-    def _transforms(options: NodeOptions, subscribe: Callable[..., Any]) -> list[Transforms]:
-        found = [
-            Transforms(subscribe("/tf_static", SerializedTransforms, LATCHED, RELIABLE), True, options.prefix),
-            Transforms(subscribe("/tf", SerializedTransforms, STREAM), False, options.prefix),
+        self.scans = [subscribe(name, ros.LaserScan, SENSOR) for name in options.scans]
+        self.odometry = subscribe(options.odom, ros.Odometry, STREAM)
+        self.maps = [subscribe(options.map_topic, ros.SerializedGrid, LATCHED, RELIABLE)] if options.map_topic else []
+        above = [("/", options.prefix), *([("", "")] if options.namespace else [])]
+        self.transforms = [
+            Transforms(subscribe(f"{start}{name}", ros.SerializedTransforms, *profiles), static, prefix)
+            for start, prefix in above
+            for name, static, profiles in (("tf_static", True, (LATCHED, RELIABLE)), ("tf", False, (STREAM,)))
         ]
-        if options.namespace:
-            found.append(Transforms(subscribe("tf_static", SerializedTransforms, LATCHED, RELIABLE), True, ""))
-            found.append(Transforms(subscribe("tf", SerializedTransforms, STREAM), False, ""))
-        return found
-
-    @property
-    def subscriptions(self) -> list[Subscription[Any]]:
-        """All that is subscribed to."""
-        return [
-            *self.scans, self.odometry, *self.maps, *(one.subscription for one in self.transforms),
-            self.requests, self.named_requests, self.amcl,
-        ]  # fmt: skip
+        self.requests = subscribe("linefix/locate", ros.Empty, RELIABLE)
+        self.named_requests = subscribe("linefix/locate_request", ros.String, RELIABLE)
+        self.amcl = subscribe("amcl_pose", ros.PoseWithCovarianceStamped, LATCHED, RELIABLE)
+        self.initial = publish("initialpose", ros.PoseWithCovarianceStamped, RELIABLE)
+        self.pose = publish("linefix/pose", ros.PoseWithCovarianceStamped, RELIABLE)
+        self.agreed = publish("linefix/agreed_pose", ros.PoseWithCovarianceStamped, RELIABLE)
+        # On a topic of its own: behind robots the map would be no longer latched.
+        self.walls = publish("linefix/map_markers", ros.MarkerArray, NEWEST)
+        self.markers = publish("linefix/markers", ros.MarkerArray, NEWEST)
+        self.map_id = publish("linefix/map_id", ros.String, NEWEST)
+        self.status = publish("linefix/status", ros.DiagnosticStatus, NEWEST)
+        self.results = publish("linefix/locate_result", ros.DiagnosticStatus, LATCHED)
+        self.diagnostics = publish("/diagnostics", ros.DiagnosticArray, RELIABLE)
+        name = "tf" if options.namespace and not options.frame_prefix else "/tf"
+        self.tf = publish(name, ros.TFMessage, RELIABLE) if options.publish_tf else None

@@ -15,7 +15,7 @@ from formats.logs.tuning import MOST_TILT
 from registration import RigidTransform
 
 from .messages import TransformStamped
-from .names import MAX_NAME, quoted
+from .options import MAX_NAME, quoted
 from .tuning import LEVEL_TILT, MAX_MOUNT
 
 Floats = NDArray[np.float64]

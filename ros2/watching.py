@@ -10,18 +10,12 @@ from numpy.typing import NDArray
 
 from registration import RigidTransform
 
+from . import tuning
 from .agreement import Observation, chi_square
 from .frames import Frames
 from .messages import PoseWithCovarianceStamped
 from .odometry import OdometryHistory, nanoseconds
 from .transforms import matrix_of, planar
-from .tuning import (
-    AGREEING_CHI_SQUARE,
-    LOCALIZER_SIGMA,
-    LOCALIZER_SIGMA_THETA,
-    LOST_SCANS,
-    MAX_COVARIANCE,
-)
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +46,7 @@ class Watch:
     @property
     def lost(self) -> bool:
         """Return whether the localizer disagreed with the last scans that confirmed the pose."""
-        return self._against >= LOST_SCANS
+        return self._against >= tuning.LOST_SCANS
 
     def reset(self) -> None:
         """Forget what was compared, as after a new pose was published."""
@@ -81,8 +75,8 @@ class Watch:
         if estimate is None or scan.pose is None:
             return None
         both = estimate.covariance + (0.0 if scan.covariance is None else scan.covariance)
-        both = both + np.diag([LOCALIZER_SIGMA**2, LOCALIZER_SIGMA**2, LOCALIZER_SIGMA_THETA**2])
-        agrees = chi_square(estimate.pose, scan.pose, both) <= AGREEING_CHI_SQUARE
+        both = both + np.diag([tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA_THETA**2])
+        agrees = chi_square(estimate.pose, scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
         self._against = 0 if agrees else self._against + 1
         return agrees
 
@@ -103,7 +97,7 @@ class Watch:
 
 def _valid(covariance: Floats) -> Floats:
     """Return a covariance without what is none: negative, not finite or too large numbers."""
-    if not (np.isfinite(covariance).all() and (np.abs(covariance) <= MAX_COVARIANCE).all()):
+    if not (np.isfinite(covariance).all() and (np.abs(covariance) <= tuning.MAX_COVARIANCE).all()):
         return np.diag([1.0, 1.0, math.pi])
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     valid: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T

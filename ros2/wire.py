@@ -15,7 +15,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from .discovery import Endpoints
+from .connecting import Endpoints
 
 Message = TypeVar("Message", bound=IdlStruct)
 

@@ -9,8 +9,7 @@ import pytest
 
 from registration import RigidTransform
 from ros2.agreement import Event, Observation
-from ros2.correcting import MapToOdom
-from ros2.deciding import InitialPose
+from ros2.deciding import InitialPose, MapToOdom
 from ros2.reporting import at_least
 
 SECOND = 1_000_000_000

@@ -12,11 +12,10 @@ import linefix
 from registration import IDENTITY
 from ros2 import messages
 from ros2.frames import Frames
-from ros2.gathering import looks_of
-from ros2.locating import locate
-from ros2.looking import Look, look_of, motion_of
+from ros2.looking import Look, look_of, looks_of, motion_of
 from ros2.odometry import OdometryHistory, Speed
 from ros2.options import NodeOptions
+from ros2.searching import locate
 from ros2.transforms import Mount
 from ros2.wire import SENSOR, Publisher
 

@@ -14,7 +14,7 @@ from cli.options import UsableOptions
 from cli.ros2 import RobotOptions
 from cli.ros2_parameters import parameters_of
 from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
-from ros2.names import absolute_name
+from ros2.options import absolute_name
 
 
 def test_the_command_has_the_defaults_of_the_node() -> None:

@@ -11,10 +11,10 @@ import pytest
 import linefix
 from ros2 import messages
 from ros2.frames import Frames
-from ros2.gathering import Gathering, looks_of
-from ros2.locating import locate
+from ros2.looking import Gathering, looks_of
 from ros2.odometry import OdometryHistory
 from ros2.options import NodeOptions
+from ros2.searching import locate
 from ros2.wire import SENSOR, Publisher
 
 from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, quaternion
