@@ -75,7 +75,7 @@ def _analyzed(body: Json, places: PlaceOptions, server: str | None) -> Json:
     """Return the answer of ``POST /v1/analyze``: of a server, or worked out here on all cores."""
     if places.deadline_ms is not None and not places.deadline_ms >= 0.0:
         raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {places.deadline_ms:g}")
-    body |= {name: value for name, value in asdict(places).items() if name != "point" or value is not None}
+    body |= asdict(places) | {"point": None if places.point is None else list(places.point)}
     body["landmark"] = [] if places.landmark is None else read_map_file(places.landmark).get("segments", [])
     if server is not None:
         return ask("analyze", server, body)

@@ -2,7 +2,7 @@
 
 # Annotations are read while the program runs, so they are no strings here.
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Any
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import array, float32, float64, int8, int32, sequence, uint8, uint32
@@ -17,17 +17,11 @@ def _type(package: str, name: str) -> str:
     return f"{package}::msg::dds_::{name}_"
 
 
-class Serialized:
-    """A message that stays as the bytes that came, in `serialized`; its fields are empty."""
-
-    serialized = b""
-
-    @classmethod
-    def deserialize(cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Self:
-        """Return the message with its bytes."""
-        message = cls()
-        message.serialized = bytes(data)
-        return message
+def _unread(cls: Any, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Any:
+    """Return a message with its bytes in `serialized`, and its fields empty."""
+    message = cls()
+    message.serialized = bytes(data)
+    return message
 
 
 @dataclass
@@ -145,10 +139,13 @@ class TFMessage(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
 
 
 @dataclass
-class SerializedTransforms(Serialized, IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
+class SerializedTransforms(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
     """A TFMessage that stays as the bytes that came: most of those on a topic that robots share are of others."""
 
     transforms: sequence[TransformStamped] = field(default_factory=list)
+
+    serialized = b""
+    deserialize = classmethod(_unread)
 
 
 @dataclass
@@ -182,12 +179,15 @@ class OccupancyGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
 
 
 @dataclass
-class SerializedGrid(Serialized, IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
+class SerializedGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
     """An OccupancyGrid that stays as the bytes that came: four million cells take too long to decode at once."""
 
     header: Header = field(default_factory=Header)
     info: MapMetaData = field(default_factory=MapMetaData)
     data: sequence[int8] = field(default_factory=list)
+
+    serialized = b""
+    deserialize = classmethod(_unread)
 
 
 @dataclass
