@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,6 +20,16 @@ class Ended:
     code: int
     out: str
     err: str
+
+    @property
+    def answer(self) -> Any:
+        """The document that was printed."""
+        return json.loads(self.out)
+
+    @property
+    def lines(self) -> list[dict[str, Any]]:
+        """The documents that were printed, one a line."""
+        return [json.loads(line) for line in self.out.splitlines()]
 
 
 class Linefix:
@@ -42,6 +54,12 @@ class Linefix:
         assert "Traceback" not in told.err
         assert "defect" not in told.err
         return Ended(code, told.out, told.err)
+
+    def done(self, *arguments: str, **environment: str) -> Ended:
+        """Run a command that ends well."""
+        ended = self(*arguments, **environment)
+        assert ended.code == 0, ended.err
+        return ended
 
 
 def refused(ended: Ended, code: int) -> str:

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from tests.batch.logs import ROOM
 from tests.running import RunningService
 
 from .running import Linefix, refused
-from .test_asking import ROOM
 
 BOX = [[1, 1, 1, 2], [1, 2, 2, 2], [2, 2, 2, 1], [2, 1, 1, 1]]
 TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
@@ -29,7 +29,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService, linefix: Linefix) -> None:
     """Enough places for several processes."""
-    asked = (
+    asked = [
         "analyze",
         "two.json",
         "--spacing",
@@ -41,12 +41,12 @@ def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningS
         "--landmark",
         "box.json",
         "--json",
-    )
+    ]
     here = linefix(*asked, LINEFIX_SEARCHES="2")
     assert (here.code, here.err) == (0, "")
-    answer = json.loads(here.out)
+    answer = here.answer
     assert len(answer["places"]) == answer["summary"]["similar_pose"] > 30
-    there = json.loads(linefix(*asked, "--server", service.url).out)
+    there = linefix.done(*asked, "--server", service.url).answer
     for name in ("places", "summary", "complete", "spacing", "map"):
         assert answer[name] == there[name]
     assert answer["summary"]["resolved_within"] == 0
@@ -55,8 +55,7 @@ def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningS
 
 def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     asked = ("analyze", "room.json", "--spacing", "1", "--out", "a.geojson", "--picture", "a.png")
-    ended = linefix(*asked, "--drive", "2", "--landmark", "box.json")
-    assert ended.code == 0, ended.err
+    ended = linefix.done(*asked, "--drive", "2", "--landmark", "box.json")
     assert "usable" in ended.out
     assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\), simulated", ended.out, re.MULTILINE)
     assert "at once or after a drive" in ended.out
@@ -72,9 +71,7 @@ def test_files_of_it(folder: Path, linefix: Linefix) -> None:
 
 
 def test_little_time(folder: Path, linefix: Linefix) -> None:
-    ended = linefix("analyze", "two.json", "--deadline-ms", "1", "--json")
-    assert ended.code == 0, ended.err
-    assert json.loads(ended.out)["complete"] is False
+    assert linefix.done("analyze", "two.json", "--deadline-ms", "1", "--json").answer["complete"] is False
 
 
 @pytest.mark.parametrize(

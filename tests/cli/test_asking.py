@@ -14,18 +14,12 @@ import pytest
 from examples.running import free_port
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
+from tests.batch.logs import ROOM, SEEN
 from tests.issuing import ADMIN
 from tests.running import RunningService
 
 from .running import Linefix, refused
 
-ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
-SEEN = [
-    [-1.01, 0.99, -0.99, -4.98],
-    [-1.00, -4.99, 0.98, -5.01],
-    [1.01, -2.99, 3.98, -3.01],
-    [4.01, -2.98, 3.99, 0.98],
-]
 POINTS = [[0.05 * k, 1.0] for k in range(60)]
 PER_REQUEST = ("request_id", "timing_ms")
 
@@ -48,14 +42,11 @@ def test_locate_answers_as_the_route_does_without_a_server_and_with_one(
     body = {"map": {"segments": ROOM}, "scan": {"segments": SEEN, "sigma": 0.02}}
     expected = lasting(service.client.post("/v1/associate", json=body).json())
     for where in ([], ["--server", service.url]):
-        ended = linefix("locate", "room.json", "scan.json", "--json", *where)
-        assert ended.code == 0
-        assert lasting(json.loads(ended.out)) == expected
+        assert lasting(linefix.done("locate", "room.json", "scan.json", "--json", *where).answer) == expected
 
 
 def test_locate_tells_people_the_verdict(linefix: Linefix, folder: Path) -> None:
-    ended = linefix("locate", "room.json", "scan.json")
-    assert ended.code == 0
+    ended = linefix.done("locate", "room.json", "scan.json")
     assert "ok, usable" in ended.out
     assert "x 0.999 m, y 1.001 m" in ended.out
 
@@ -63,26 +54,24 @@ def test_locate_tells_people_the_verdict(linefix: Linefix, folder: Path) -> None
 def test_a_verdict_that_is_no_answer_is_done_all_the_same(linefix: Linefix, folder: Path) -> None:
     (folder / "scan.json").write_text('{"segments": []}')
     ended = linefix("locate", "room.json", "scan.json", "--json")
-    assert (ended.code, json.loads(ended.out)["status"]) == (0, "no_match")
+    assert (ended.code, ended.answer["status"]) == (0, "no_match")
 
 
 def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
     ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
-    answer = json.loads(ended.out)
+    answer = ended.answer
     assert (answer["status"], answer["diagnostics"]["pairs"]) == ("ok", 4)
 
 
 def test_register_prints_the_fit(linefix: Linefix, folder: Path) -> None:
-    ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json")
-    assert ended.code == 0, ended.err
-    assert "4 pairs, chi2 " in ended.out
+    assert "4 pairs, chi2 " in linefix.done("register", "room.json", "scan.json", "--pairs", "pairs.json").out
 
 
 def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:
-    assert linefix("vectorize", "points.json", "--out", "found.json").code == 0
+    linefix.done("vectorize", "points.json", "--out", "found.json")
     found = json.loads((folder / "found.json").read_text())
     assert (len(found["segments"]), found["point_counts"], found["frame_id"]) == (1, [60], "front")
-    assert linefix("locate", "room.json", "found.json").code == 0
+    linefix.done("locate", "room.json", "found.json")
 
 
 def test_vectorize_says_that_points_are_in_no_order(linefix: Linefix, folder: Path) -> None:
@@ -117,7 +106,7 @@ def test_what_is_not_done_is_told_in_one_line(
 def test_a_key_comes_from_the_environment(linefix: Linefix, folder: Path, guarded: RunningService) -> None:
     asked = ("locate", "room.json", "scan.json", "--server", guarded.url)
     assert "LINEFIX_KEY" in refused(linefix(*asked), 4)
-    assert linefix(*asked, LINEFIX_KEY=ADMIN).code == 0
+    linefix.done(*asked, LINEFIX_KEY=ADMIN)
 
 
 def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix, folder: Path) -> None:
@@ -126,7 +115,7 @@ def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix,
     ended = linefix("locate", "corridor.json", "walls.json")
     assert "degenerate, not usable" in ended.out
     assert "probability" not in ended.out
-    assert json.loads(linefix("locate", "corridor.json", "walls.json", "--json").out)["probability"] is None
+    assert linefix.done("locate", "corridor.json", "walls.json", "--json").answer["probability"] is None
 
 
 LASER_YAML = """header:
@@ -163,14 +152,12 @@ def test_a_laser_scan_with_infinity_and_nan_is_read(linefix: Linefix, folder: Pa
     message = laser_message()
     known = [60.0 if r == math.inf else r if math.isfinite(r) else None for r in message["ranges"]]
     (folder / "known.json").write_text(json.dumps({"laser": message | {"ranges": known}}))
-    expected = lasting(json.loads(linefix("locate", "room.json", "known.json", "--json").out))
+    expected = lasting(linefix.done("locate", "room.json", "known.json", "--json").answer)
     assert expected["usable"]
     for form in (message, {"laser": message}):
         (folder / "laser.json").write_text(json.dumps(form))
         assert "Infinity" in (folder / "laser.json").read_text()
-        ended = linefix("locate", "room.json", "laser.json", "--json")
-        assert ended.code == 0, ended.err
-        assert lasting(json.loads(ended.out)) == expected
+        assert lasting(linefix.done("locate", "room.json", "laser.json", "--json").answer) == expected
 
 
 def echoed(ranges: list[str]) -> str:
@@ -188,9 +175,7 @@ def test_the_yaml_of_ros2_topic_echo_is_read(linefix: Linefix, folder: Path) -> 
     names = {math.inf: ".inf", -math.inf: "-.inf"}
     ranges = [".nan" if math.isnan(r) else names.get(r, repr(r)) for r in laser_message()["ranges"]]
     (folder / "scan.yaml").write_text(echoed(ranges) * 2)
-    ended = linefix("locate", "room.json", "scan.yaml", "--json")
-    assert ended.code == 0, ended.err
-    answer = json.loads(ended.out)
+    answer = linefix.done("locate", "room.json", "scan.yaml", "--json").answer
     assert answer["usable"]
     assert answer["pose"]["x"] == pytest.approx(1.0, abs=0.05)
     assert answer["stamp"] == {"sec": 12, "nanosec": 5}
@@ -208,9 +193,7 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
         ("bare.yaml", bare), ("lost.yaml", lost + bare), ("bridge.json", wrapped), ("fox.json", json.dumps(foxglove))
     ):  # fmt: skip
         (folder / name).write_text(content)
-        ended = linefix("locate", "room.json", name, "--json")
-        assert ended.code == 0, ended.err
-        assert json.loads(ended.out)["usable"], name
+        assert linefix.done("locate", "room.json", name, "--json").answer["usable"], name
     for name, content, said in (
         ("noarr.yaml", echoed([]).replace("ranges:", "ranges: '<array type: float32>'"), "without --noarr"),
         ("fox.json", json.dumps(foxglove | {"pose": {"position": {"x": 1}}}), "as a view"),

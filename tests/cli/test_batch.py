@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -45,7 +44,7 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> No
     process.wait()
     assert not (tmp_path / "poses.parquet").exists()
     ended = linefix(*asked, "--json")
-    told = json.loads(ended.out)
+    told = ended.answer
     assert (told["scans"], told["taken_over"] >= 5) == (400, True)
     assert [row["index"] for row in rows(tmp_path / "poses.parquet")] == list(range(400))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json"]

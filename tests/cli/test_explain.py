@@ -26,9 +26,7 @@ def _files(folder: Path) -> None:
 
 
 def explained(linefix: Linefix, *arguments: str) -> Any:
-    ended = linefix("explain", *arguments, "--json")
-    assert ended.code == 0, ended.err
-    return json.loads(ended.out)
+    return linefix.done("explain", *arguments, "--json").answer
 
 
 @pytest.mark.parametrize("command", [command for command, _ in SHOWN.findall(DOCUMENT.read_text())])
@@ -77,15 +75,13 @@ def test_without_an_answer_there_are_vetoes_only(linefix: Linefix, folder: Path)
     found = explained(linefix, "room.json", "nothing.json")
     assert found["answer"]["status"] == found["verdict"]["status"] == "no_match"
     assert found["verdict"]["features"] is None
-    printed = linefix("explain", "room.json", "nothing.json")
-    assert printed.code == 0
-    assert "status no_match, not usable" in printed.out
+    assert "status no_match, not usable" in linefix.done("explain", "room.json", "nothing.json").out
 
 
 def test_it_takes_what_locate_takes(linefix: Linefix) -> None:
     """A window that the scan contradicts is a veto."""
     near = ("--near", "12", "1", "1.57", "--radius", "0.5")
-    located = json.loads(linefix("locate", "room.json", "scan.json", *near, "--json").out)
+    located = linefix.done("locate", "room.json", "scan.json", *near, "--json").answer
     found = explained(linefix, "room.json", "scan.json", *near)
     assert {**found["answer"], "request_id": 0, "timing_ms": 0} == {**located, "request_id": 0, "timing_ms": 0}
     assert "better_elsewhere" in [veto["name"] for veto in found["verdict"]["vetoes"] if veto["applies"]]

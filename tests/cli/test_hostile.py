@@ -14,24 +14,18 @@ from linefix_client import Client, ProblemError, UnreachableError
 from linefix_client import asking as requests
 
 from cli import asking
+from tests.batch.logs import ROOM, SEEN
 from tests.formats.bags import BEGUN, Recording
 
 from .running import Linefix, refused
 
-ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
-WALLS = [
-    [-1.01, 0.99, -0.99, -4.98],
-    [-1.00, -4.99, 0.98, -5.01],
-    [1.01, -2.99, 3.98, -3.01],
-    [4.01, -2.98, 3.99, 0.98],
-]
 MARK = b"\xef\xbb\xbf"
 
 
 @pytest.fixture(autouse=True)
 def _files(folder: Path) -> None:
     (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (folder / "scan.json").write_text(json.dumps({"segments": WALLS}))
+    (folder / "scan.json").write_text(json.dumps({"segments": SEEN}))
 
 
 @contextmanager
@@ -152,10 +146,10 @@ def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: py
 def test_what_terminals_obey_is_escaped(linefix: Linefix, folder: Path) -> None:
     title = "\x9b31m\x7f\u202e\U000e0001end"
     (folder / "odd.json").write_text(json.dumps({"segments": ROOM, "meta": {"title": title}, "frame_id": title}))
-    assert linefix("map", "put", "odd", "odd.json").code == 0
+    linefix.done("map", "put", "odd", "odd.json")
     told = linefix("map", "get", "odd")
     assert told.out.strip().isprintable()
-    assert json.loads(told.out)["meta"] == {"title": title}
+    assert told.answer["meta"] == {"title": title}
     recording = Recording(folder / "a.mcap")
     recording.scans(2, f"/{title}")
     recording.scans(1, "/\x9bother")
@@ -169,12 +163,11 @@ def test_what_terminals_obey_is_escaped(linefix: Linefix, folder: Path) -> None:
 def test_a_byte_order_mark_is_passed_over(linefix: Linefix, folder: Path) -> None:
     for name in ("room.json", "scan.json"):
         (folder / name).write_bytes(MARK + (folder / name).read_bytes())
-    ended = linefix("locate", "room.json", "scan.json")
-    assert ended.code == 0, ended.err
+    linefix.done("locate", "room.json", "scan.json")
 
 
 def test_text_in_utf_16_is_named(linefix: Linefix, folder: Path) -> None:
-    (folder / "scan.json").write_text(json.dumps({"segments": WALLS}), encoding="utf-16")
+    (folder / "scan.json").write_text(json.dumps({"segments": SEEN}), encoding="utf-16")
     assert "scan.json: found text in UTF-16, expected UTF-8" in refused(linefix("locate", "room.json", "scan.json"), 3)
 
 

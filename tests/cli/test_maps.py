@@ -34,8 +34,7 @@ def _files(folder: Path) -> None:
 @pytest.mark.parametrize("where", ["here", "at a server"])
 def test_a_grid_becomes_a_map_file(linefix: Linefix, folder: Path, patient: RunningService, where: str) -> None:
     server = [] if where == "here" else ["--server", patient.url]
-    told = linefix("map", "import", "maps/room.yaml", "--out", "room.json", "--picture", "room.png", *server)
-    assert told.code == 0, told.err
+    told = linefix.done("map", "import", "maps/room.yaml", "--out", "room.json", "--picture", "room.png", *server)
     expected = read_map(folder / "maps" / "room.yaml").map
     assert json.loads((folder / "room.json").read_text())["segments"] == expected.segments.endpoints.tolist()
     assert [row.split()[0] for row in told.out.splitlines()[:3]] == ["from", "map", "read"]
@@ -47,9 +46,9 @@ def test_a_grid_becomes_a_map_file(linefix: Linefix, folder: Path, patient: Runn
 
 
 def test_what_a_drawing_does_not_say_is_said_by_options(linefix: Linefix) -> None:
-    undirected = json.loads(linefix("map", "import", "plan.csv", "--json").out)
+    undirected = linefix.done("map", "import", "plan.csv", "--json").answer
     assert (undirected["map"]["oriented"], undirected["report"]["format"]) == (False, "csv")
-    answer = json.loads(linefix("map", "import", "plan.csv", "--units", "ft", "--point", "0.3", "0.3", "--json").out)
+    answer = linefix.done("map", "import", "plan.csv", "--units", "ft", "--point", "0.3", "0.3", "--json").answer
     assert answer["map"]["oriented"]
     assert answer["check"]["size"]["length"] == pytest.approx(14 * 0.3048)
 
@@ -95,13 +94,13 @@ def test_maps_are_stored_listed_and_forgotten(
     (listed,) = stored()
     assert listed["segment_count"] == len(faces())
     assert "hall" in linefix("map", "list", *server).out
-    found = json.loads(linefix("map", "get", listed["map_id"], *server).out)
+    found = linefix.done("map", "get", listed["map_id"], *server).answer
     assert found["segments"] == faces().tolist()
-    assert linefix("map", "get", listed["map_id"], "--out", "hall.dxf", *server).code == 0
+    linefix.done("map", "get", listed["map_id"], "--out", "hall.dxf", *server)
     assert len(read_map(folder / "hall.dxf").map.segments) == len(faces())
     assert "walls" in linefix("map", "check", listed["map_id"], *server).out
-    assert linefix("map", "draw", listed["map_id"], "--out", "hall.png", *server).code == 0
-    assert linefix("map", "rm", listed["map_id"], *server).code == 0
+    linefix.done("map", "draw", listed["map_id"], "--out", "hall.png", *server)
+    linefix.done("map", "rm", listed["map_id"], *server)
     assert f"{listed['map_id']}: no such file" in refused(linefix("map", "rm", listed["map_id"], *server), 3)
     assert stored() == []
 
@@ -123,7 +122,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     features = [{"type": "Feature", "properties": {"thickness": 2 * THICK}, "geometry": wall} for wall in walls]
     (folder / "floor.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     asked = ("map", "import", "floor.geojson", "--local-metres", "--log", "drive.log")
-    answer = json.loads(linefix(*asked, "--json", **PATIENT).out)
+    answer = linefix.done(*asked, "--json", **PATIENT).answer
     assert float(answer["map"]["meta"]["thickness"]) == pytest.approx(THICK, abs=0.02)
     assert [note["code"] for note in answer["report"]["assumed"]] == ["thickness_found"]
     assert "from scans of drive.log" in answer["report"]["assumed"][0]["message"]
@@ -144,7 +143,7 @@ def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Pat
         ImageDraw.Draw(grid).rectangle([min(x1, x2) - 4, min(y1, y2) - 4, max(x1, x2) + 3, max(y1, y2) + 3], fill=0)
     ImageOps.flip(grid).save(folder / "thick.pgm")
     (folder / "thick.yaml").write_text("image: thick.pgm\nresolution: 0.05\norigin: [-1, -6, 0]\n")
-    answer = json.loads(linefix("map", "import", "thick.yaml", "--log", "drive.log", "--json", **PATIENT).out)
+    answer = linefix.done("map", "import", "thick.yaml", "--log", "drive.log", "--json", **PATIENT).answer
     assert float(answer["map"]["meta"]["surface"]) == pytest.approx(2.0, abs=0.3)
     assert "from scans of drive.log" in answer["report"]["assumed"][-1]["message"]
     told = linefix("map", "import", "thick.yaml", "--log", "drive.log", "--surface", "0").out

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 import linefix as library
+from tests.batch.logs import ROOM
 from tests.formats.bags import BEGUN, GRID, SECOND, Laser, Recording, grid_bytes, scan_bytes
 
 from .running import Linefix, refused
 
-ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
 BEAMS = 360
 SCANNER = library.simulation.Scanner(beams=BEAMS, angle_increment=math.tau / BEAMS, sigma=0.01, range_max=12.0)
 WALLS = library.Segments.from_array(np.array(ROOM, dtype=float))
@@ -44,8 +44,7 @@ BATCH = ("batch", "drive.mcap", "--maps", "room.json", "--out", "poses.parquet",
 
 def test_scans_whose_greatest_range_says_nothing_are_located(linefix: Linefix, folder: Path) -> None:
     write(folder, [laser.but(range_max=math.nan) for laser in seen(4)])
-    ended = linefix(*REPLAY)
-    assert ended.code == 0
+    ended = linefix.done(*REPLAY)
     assert "ok, usable      4" in ended.out
     assert "range_max is nan m" in ended.out
     assert "range_max is nan m" in linefix(*CHECK).err
@@ -65,11 +64,10 @@ def test_where_no_scan_is_left_it_is_said_why(linefix: Linefix, folder: Path) ->
 def test_some_scans_that_cannot_be_used_cost_no_others(linefix: Linefix, folder: Path) -> None:
     good, (bad,) = seen(3), seen(1)
     write(folder, [*good, bad.but(angle_increment=0.0)])
-    ended = linefix(*REPLAY)
-    assert ended.code == 0
+    ended = linefix.done(*REPLAY)
     assert "ok, usable      3" in ended.out
     assert "(1)" in next(line for line in ended.out.splitlines() if "angle_increment 0 rad" in line)
-    summary = json.loads(linefix(*BATCH, "--json").out)
+    summary = linefix.done(*BATCH, "--json").answer
     notes = {note["code"]: (note["kind"], note["count"]) for note in summary.pop("notes")}
     assert notes == {"no_odometry": ("assumed", 0), "broken_scan": ("dropped", 1)}
     assert summary == {"scans": 4, "taken_over": 0, "usable": 3, "errors": 1, "statuses": {"ok": 3}}
@@ -79,8 +77,7 @@ def test_a_batch_keeps_what_was_assumed_of_its_logs(linefix: Linefix, folder: Pa
     write(folder, [laser.but(range_max=0.0) for laser in seen(3)])
     (folder / "drive.mcap").rename(folder / "one.mcap")
     write(folder, [laser.but(range_max=0.0) for laser in seen(2)])
-    ended = linefix(*BATCH[:1], "one.mcap", *BATCH[1:])
-    assert ended.code == 0, ended.err
+    ended = linefix.done(*BATCH[:1], "one.mcap", *BATCH[1:])
     assert "usable   5" in ended.out
     line = next(line for line in ended.out.splitlines() if "range_max is 0 m" in line)
     assert line.startswith("assumed")
@@ -101,8 +98,7 @@ def test_the_grid_of_a_recording_that_is_the_map_is_named(linefix: Linefix, fold
     (folder / "points.json").write_text(json.dumps({"segments": [[0, -1, 2, -1], [2, -1, 2, 1]]}))
     replay = ("replay", "drive.mcap", "--map", "maps.mcap", "--picture", "poses.png")
     for command in (("locate", "maps.mcap", "points.json"), replay):
-        ended = linefix(*command)
-        assert ended.code == 0, ended.err
+        ended = linefix.done(*command)
         assert ended.err.count("the grid of /map (140 x 120 cells of 0.1 m) is the map; not /local_costmap") == 1
         assert ended.err.count("grids of /map, of which the last is used (1)") == 1
     assert "the grid of" not in linefix("locate", "room.json", "points.json").err

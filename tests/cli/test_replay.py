@@ -19,7 +19,7 @@ from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
 from .drives import ODOM_FROM_MAP, write_log
-from .running import Ended, Linefix, refused
+from .running import Linefix, refused
 
 SCANS = 12
 
@@ -28,11 +28,6 @@ SCANS = 12
 def truth(tmp_path: Path) -> list[RigidTransform]:
     (tmp_path / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
     return write_log(tmp_path / "drive.log", SCANS)
-
-
-def lines(ended: Ended) -> list[dict[str, Any]]:
-    assert ended.code == 0, ended.err
-    return [json.loads(line) for line in ended.out.splitlines()]
 
 
 def assert_right(found: list[dict[str, Any]], truth: list[RigidTransform]) -> None:
@@ -48,8 +43,8 @@ def lasting(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("mode", ["global", "track"])
 def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str) -> None:
-    ended = linefix("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
-    found = lines(ended)
+    ended = linefix.done("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
+    found = ended.lines
     assert [line["stamp"] for line in found] == [100 + 0.5 * k for k in range(SCANS)]
     told = ["stamp", "status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms", "child_frame_id"]
     assert list(found[0]) == [*told, "error"]
@@ -64,16 +59,15 @@ def test_a_server_answers_as_the_process_does(
     linefix: Linefix, folder: Path, truth: list[RigidTransform], service: RunningService
 ) -> None:
     asked = ("replay", "drive.log", "--map", "floor.json", "--every", "4", "--json")
-    here, there = lines(linefix(*asked)), lines(linefix(*asked, "--server", service.url))
+    here, there = linefix.done(*asked).lines, linefix.done(*asked, "--server", service.url).lines
     assert len(here) == SCANS // 4
     assert lasting(here) == lasting(there)
 
 
 def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, truth: list[RigidTransform]) -> None:
-    assert linefix("map", "put", "floor", "floor.json").code == 0
+    linefix.done("map", "put", "floor", "floor.json")
     asked = ("replay", "drive.log", "--map", "floor", "--out", "poses.tum", "--picture", "poses.png")
-    told = linefix(*asked)
-    assert told.code == 0, told.err
+    told = linefix.done(*asked)
     assert "ok, usable" in told.out
     assert "ROBOTLASER1" in told.out
     poses = [list(map(float, row.split())) for row in (folder / "poses.tum").read_text().splitlines()]
@@ -115,8 +109,7 @@ def test_poses_after_a_clock_was_set_back_are_in_a_file_of_their_own(
     linefix: Linefix, folder: Path, truth: list[RigidTransform]
 ) -> None:
     (folder / "twice.log").write_text(2 * (folder / "drive.log").read_text())
-    ended = linefix("replay", "twice.log", "--map", "floor.json", "--every", "2", "--out", "poses.tum")
-    assert ended.code == 0, ended.err
+    ended = linefix.done("replay", "twice.log", "--map", "floor.json", "--every", "2", "--out", "poses.tum")
     for name in ("poses.tum", "poses-2.tum"):
         stamps = [float(row.split()[0]) for row in (folder / name).read_text().splitlines()]
         assert len(stamps) >= SCANS // 4

@@ -16,7 +16,7 @@ from tests.formats.bags import SECOND, Laser, Robots
 from tests.running import RunningService
 from vectorization import Motion
 
-from .running import Ended, Linefix, refused
+from .running import Linefix, refused
 
 BEAMS = 400
 STEP = math.tau / BEAMS
@@ -67,11 +67,6 @@ def write_drive(folder: Path, *, odometry: bool, moving: bool = True) -> None:
     bag.done()
 
 
-def lines(ended: Ended) -> list[dict[str, Any]]:
-    assert ended.code == 0, ended.err
-    return [json.loads(line) for line in ended.out.splitlines()]
-
-
 def errors(found: list[dict[str, Any]]) -> list[tuple[float, float]]:
     """Return by how much each usable pose is wrong, metres and radians."""
     return [
@@ -92,8 +87,8 @@ def test_a_robot_that_turns_while_it_scans_is_where_odometry_takes_each_beam(
     linefix: Linefix, folder: Path, mode: str
 ) -> None:
     write_drive(folder, odometry=True)
-    ended = linefix(*ASKED, "--mode", mode)
-    found = errors(lines(ended))
+    ended = linefix.done(*ASKED, "--mode", mode)
+    found = errors(ended.lines)
     assert len(found) == COUNT
     assert max(metres for metres, _ in found) < 0.03
     assert max(radians for _, radians in found) < 0.01
@@ -102,8 +97,8 @@ def test_a_robot_that_turns_while_it_scans_is_where_odometry_takes_each_beam(
 
 def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Linefix, folder: Path) -> None:
     write_drive(folder, odometry=False)
-    ended = linefix(*ASKED, "--out", "poses.tum")
-    found = errors(lines(ended))
+    ended = linefix.done(*ASKED, "--out", "poses.tum")
+    found = errors(ended.lines)
     assert found
     assert max(radians for _, radians in found) < 0.1  # two standard deviations of 1 rad/s over 0.05 s
     assert "no odometry was found" in ended.err
@@ -115,7 +110,7 @@ def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Lin
 @pytest.mark.parametrize("odometry", [True, False])
 def test_a_server_answers_the_same(linefix: Linefix, folder: Path, service: RunningService, odometry: bool) -> None:
     write_drive(folder, odometry=odometry)
-    here, there = lines(linefix(*ASKED)), lines(linefix(*ASKED, "--server", service.url))
+    here, there = linefix.done(*ASKED).lines, linefix.done(*ASKED, "--server", service.url).lines
     for one in (*here, *there):
         one.pop("timing_ms")
     assert here == there
@@ -147,7 +142,7 @@ def test_a_frame_that_stands_leads_no_scan_to_the_room_before(linefix: Linefix, 
         put_scan(bag, begun, seen)
     bag.done()
     for mode in ("track", "global"):
-        found = lines(linefix("replay", "robot_mcap", "--map", "twins.json", "--json", "--mode", mode))
+        found = linefix.done("replay", "robot_mcap", "--map", "twins.json", "--json", "--mode", mode).lines
         assert all(line["pose"]["x"] > 12.0 for line in found[2:] if line["usable"])
 
 
@@ -163,15 +158,13 @@ def test_an_upright_scanner_is_refused_with_its_frame(linefix: Linefix, folder: 
     checked = linefix("map", "check", "room.json", "--log", "robot_mcap")
     assert checked.code == 3
     assert "camera_optical" in checked.err
-    (line,) = lines(linefix(*ASKED, "--mount", str(MOUNT.x), str(MOUNT.y), str(MOUNT.theta)))
+    (line,) = linefix.done(*ASKED, "--mount", str(MOUNT.x), str(MOUNT.y), str(MOUNT.theta)).lines
     assert errors([line, *[{"usable": False}] * (COUNT - 1)])[0] < (0.03, 0.01)
 
 
 def test_a_check_takes_the_motion_of_the_scans(linefix: Linefix, folder: Path) -> None:
     write_drive(folder, odometry=True)
-    ended = linefix("map", "check", "room.json", "--log", "robot_mcap", "--json")
-    assert ended.code == 0, ended.err
-    samples = json.loads(ended.out)["samples"]["scans"]
+    samples = linefix.done("map", "check", "room.json", "--log", "robot_mcap", "--json").answer["samples"]["scans"]
     for one, robot in zip(samples, robots(), strict=True):
         sensor = robot.compose(MOUNT)
         assert one["usable"]
@@ -184,9 +177,7 @@ def test_a_check_reports_what_was_left_out_of_the_log(linefix: Linefix, folder: 
     bag.transform("/tf", 0, "a", "b", (math.nan, 0.0, 0.0))
     put_scan(bag, SECOND, swept(ROOM, robots()[0], MOUNT, moving=False, seed=1))
     bag.done()
-    ended = linefix("map", "check", "room.json", "--log", "again/robot_mcap")
-    assert ended.code == 0
-    assert "invalid transforms" in ended.err
+    assert "invalid transforms" in linefix.done("map", "check", "room.json", "--log", "again/robot_mcap").err
 
 
 def test_a_scanner_that_is_mounted_upside_down_is_named(linefix: Linefix, folder: Path) -> None:
@@ -197,6 +188,6 @@ def test_a_scanner_that_is_mounted_upside_down_is_named(linefix: Linefix, folder
         seen = swept(ROOM, robot, RigidTransform(MOUNT.x, MOUNT.y, 0.0), moving=False, seed=k)
         put_scan(bag, (k + 1) * SECOND, seen[::-1].copy())
     bag.done()
-    ended = linefix(*ASKED)
-    assert sum(line["usable"] for line in lines(ended)) >= COUNT - 1
+    ended = linefix.done(*ASKED)
+    assert sum(line["usable"] for line in ended.lines) >= COUNT - 1
     assert "laser mounted upside down at (0.300, 0.100) m" in ended.err

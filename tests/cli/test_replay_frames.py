@@ -35,7 +35,7 @@ def truth(folder: Path) -> list[RigidTransform]:
 
 def lines(ended: Ended, code: int = 0) -> list[dict[str, Any]]:
     assert ended.code == code, ended.err
-    return [json.loads(line) for line in ended.out.splitlines()]
+    return ended.lines
 
 
 def assert_at(found: dict[str, Any], expected: RigidTransform) -> None:
@@ -98,8 +98,7 @@ def test_a_scan_that_a_server_refuses_is_a_row_and_the_replay_goes_on(
     assert [line["error"] is None for line in found] == [True, False, True, True]
     assert (found[1]["status"], found[1]["usable"], found[1]["pose"]) == (None, False, None)
     assert "ranges" in found[1]["error"]
-    told = linefix(*asked)
-    assert told.code == 0
+    told = linefix.done(*asked)
     assert "refused" in told.out
     assert "25.0 %" in told.out
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -23,9 +22,9 @@ CHECKOUT = Path(__file__).parents[2]
 @pytest.mark.xfail(strict=True, reason="95 of 174 scans are usable, not 157")
 def test_the_drive_is_found_in_its_map(linefix: Linefix, folder: Path) -> None:
     subprocess.run([sys.executable, "-m", "examples.sample", folder], cwd=CHECKOUT, check=True, capture_output=True)
-    assert linefix("map", "import", "hq.yaml", "--out", "hq.json").code == 0
+    linefix.done("map", "import", "hq.yaml", "--out", "hq.json")
     ended = linefix("replay", "drive.mcap", "--map", "hq.json", "--mode", "global", "--json")
-    found = [json.loads(line) for line in ended.out.splitlines()]
+    found = ended.lines
     way = way_through(offices(np.random.default_rng(SEED), OfficePlan(rooms=4, corridors=1)))
     usable = [(one["pose"], pose) for one, pose in zip(found, way, strict=True) if one["usable"]]
     assert len(usable) >= 0.9 * len(way)
@@ -43,9 +42,8 @@ def test_a_map_that_is_not_to_scale_is_hinted_at(
     resolution = (folder / "hq.yaml").read_text()
     for factor, warned in ((1.0, False), (1.03, True), (1.5, False)):
         (folder / "hq.yaml").write_text(resolution.replace("resolution: 0.05", f"resolution: {0.05 * factor}"))
-        assert linefix("map", "import", "hq.yaml", "--out", "hq.json").code == 0
-        ended = linefix("replay", "drive.mcap", "--map", "hq.json", "--every", "12")
-        assert ended.code == 0, ended.err
+        linefix.done("map", "import", "hq.yaml", "--out", "hq.json")
+        ended = linefix.done("replay", "drive.mcap", "--map", "hq.json", "--every", "12")
         assert ("map check" in ended.out) == (factor != 1.0)
         assert ("scale" in ended.out.partition("map check")[0]) == warned
         told = linefix("map", "check", "hq.json", "--log", "drive.mcap", LINEFIX_MAX_DEADLINE_MS="600000").out

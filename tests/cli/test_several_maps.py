@@ -33,15 +33,13 @@ def files(tmp_path: Path) -> Path:
 
 
 def test_a_scan_is_located_on_files_a_folder_and_stored_maps(linefix: Linefix, files: Path) -> None:
-    assert linefix("map", "put", "stored", "floors/room.json").code == 0
+    linefix.done("map", "put", "stored", "floors/room.json")
     for maps, name in [
         (("floors/hall.json", "floors/room.json"), "room"),
         (("floors",), "room"),
         (("floors/hall.json", "stored"), "stored"),
     ]:
-        ended = linefix("locate", *maps, "scan.json", "--json")
-        assert ended.code == 0, ended.err
-        answer = json.loads(ended.out)
+        answer = linefix.done("locate", *maps, "scan.json", "--json").answer
         assert (answer["usable"], answer["map"]["map_id"]) == (True, name)
         assert answer["map"]["revision"] == (1 if name == "stored" else None)
         assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
@@ -66,8 +64,8 @@ def test_the_table_of_maps_is_whole_in_a_narrow_terminal(
 
 def test_the_server_answers_as_this_process(linefix: Linefix, files: Path, service: RunningService) -> None:
     url = str(service.client.base_url)
-    here = json.loads(linefix("locate", "floors", "scan.json", "--json").out)
-    there = json.loads(linefix("locate", "floors", "scan.json", "--json", "--server", url).out)
+    here = linefix.done("locate", "floors", "scan.json", "--json").answer
+    there = linefix.done("locate", "floors", "scan.json", "--json", "--server", url).answer
     for name in ("request_id", "timing_ms"):
         del here[name], there[name]
     assert there == here
@@ -76,11 +74,11 @@ def test_the_server_answers_as_this_process(linefix: Linefix, files: Path, servi
 def test_weights_and_the_map_of_a_window_are_taken(linefix: Linefix, files: Path) -> None:
     (files / "twin.json").write_text((files / "room.json").read_text())
     both = ("floors/room.json", "floors/twin.json", "scan.json", "--json")
-    assert json.loads(linefix("locate", *both).out)["status"] == "ambiguous"
+    assert linefix.done("locate", *both).answer["status"] == "ambiguous"
     for name in ("room", "twin"):
-        weighed = json.loads(linefix("locate", *both, "--weight", f"{name}=0.9999").out)
+        weighed = linefix.done("locate", *both, "--weight", f"{name}=0.9999").answer
         assert weighed["map"]["map_id"] == name
-        near = json.loads(linefix("locate", *both, "--near", "1", "0.5", "1.57", "--near-map", name).out)
+        near = linefix.done("locate", *both, "--near", "1", "0.5", "1.57", "--near-map", name).answer
         assert near["map"]["map_id"] == name
     assert "MAP_ID=PROBABILITY" in refused(linefix("locate", *both, "--weight", "room"), 2)
     assert "/map_weights/roof" in refused(linefix("locate", *both, "--weight", "roof=0.5"), 3)
@@ -96,7 +94,7 @@ def test_the_map_of_a_window_needs_a_window_and_several_maps(linefix: Linefix, f
 def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None:
     (files.parent / "other").mkdir()
     (files.parent / "other" / "room.json").write_text(json.dumps({"segments": HALL}))
-    answer = json.loads(linefix("locate", "floors/room.json", "other/room.json", "scan.json", "--json").out)
+    answer = linefix.done("locate", "floors/room.json", "other/room.json", "scan.json", "--json").answer
     assert {one["map_id"] for one in answer["maps"]} == {"room", "room-2"}
 
 
@@ -107,7 +105,7 @@ def test_the_folder_of_a_bag_is_one_map(linefix: Linefix, files: Path) -> None:
     with Writer(files.parent / "bag", version=8) as writer:
         maps = writer.add_connection("/map", GRID, typestore=TYPES["cdr"])
         writer.write(maps, 0, grid_bytes(cells))
-    answer = json.loads(linefix("locate", "bag", "floors/hall.json", "scan.json", "--json").out)
+    answer = linefix.done("locate", "bag", "floors/hall.json", "scan.json", "--json").answer
     assert {one["map_id"] for one in answer["maps"]} == {"bag", "hall"}
 
 
@@ -120,17 +118,14 @@ def test_an_empty_folder_is_told(linefix: Linefix, files: Path) -> None:
 def test_a_log_is_replayed_on_several_maps(linefix: Linefix, files: Path, mode: str) -> None:
     write_log(files.parent / "drive.log", 8)
     (files / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
-    ended = linefix("replay", "drive.log", "--map", "floors", "--mode", mode, "--json")
-    assert ended.code == 0, ended.err
-    found = [json.loads(line) for line in ended.out.splitlines()]
+    found = linefix.done("replay", "drive.log", "--map", "floors", "--mode", mode, "--json").lines
     usable = [line for line in found if line["usable"]]
     assert len(usable) >= 4
     assert {line["map_id"] for line in usable} == {"floor"}
-    told = linefix(
+    told = linefix.done(
         "replay", "drive.log", "--map", "floors/floor.json", "--map", "floors/hall.json", "--mode", mode,
         "--picture", "way.png",
     )  # fmt: skip
-    assert told.code == 0, told.err
     row = next(line for line in told.out.splitlines() if line.startswith("floor "))
     assert int(row.split()[-1]) == len(usable)
     assert (files.parent / "way-floor.png").exists()

@@ -54,10 +54,9 @@ def _files(folder: Path) -> None:
 
 
 def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) -> None:
-    told = linefix(
+    told = linefix.done(
         "map", "update", "hall.json", "monday.log", "tuesday.log", "--out", "new.json", "--picture", "changes.png"
     )
-    assert told.code == 0, told.err
     rows = dict(row.split("  ", 1) for row in told.out.splitlines())
     assert rows["change 0"].strip().startswith("removed segments 12, 13, 14, 15: confidence 0.9")
     assert "2 visits" in rows["change 0"]
@@ -71,11 +70,10 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
 def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: RunningService) -> None:
     """Of a stored map; a change is refused there, too."""
     logs, server = ("monday.log", "tuesday.log", "--json"), ("--server", patient.url)
-    assert linefix("map", "put", "hall-u", "hall.json", *server).code == 0
-    here = json.loads(linefix("map", "update", "hall.json", *logs).out)
-    there = linefix("map", "update", "hall-u", *logs, "--refuse", "0", "--picture", "there.png", *server)
-    assert there.code == 0, there.err
-    found = json.loads(there.out)
+    linefix.done("map", "put", "hall-u", "hall.json", *server)
+    here = linefix.done("map", "update", "hall.json", *logs).answer
+    there = linefix.done("map", "update", "hall-u", *logs, "--refuse", "0", "--picture", "there.png", *server)
+    found = there.answer
     assert [one["code"] for one in found["changes"]] == [one["code"] for one in here["changes"]] == ["removed"]
     assert found["map"]["segments"] == HALL.endpoints.tolist()
     assert (folder / "there.png").stat().st_size > 1000
@@ -97,25 +95,23 @@ def test_odometry_of_the_logs_localizes_scans_in_rooms_that_look_alike(
     for odometry, expected in ((False, []), (True, [[32, 33, 34, 35]])):
         for k, log in enumerate(logs):
             write_visit(folder / log, today, k, places, odometry=odometry)
-        told = linefix("map", "update", name, *logs, *more)
-        assert told.code == 0, told.err
-        assert [one["segments"] for one in json.loads(told.out)["changes"]] == expected
+        told = linefix.done("map", "update", name, *logs, *more)
+        assert [one["segments"] for one in told.answer["changes"]] == expected
 
 
 def test_a_change_is_refused_by_its_number_or_for_its_confidence(linefix: Linefix, folder: Path) -> None:
     logs = ("hall.json", "monday.log", "tuesday.log")
     for more in (("--refuse", "0"), ("--accept", "1")):
-        told = linefix("map", "update", *logs, *more, "--out", "new.json", "--json")
-        assert told.code == 0, told.err
-        assert [one["accepted"] for one in json.loads(told.out)["changes"]] == [False]
+        told = linefix.done("map", "update", *logs, *more, "--out", "new.json", "--json")
+        assert [one["accepted"] for one in told.answer["changes"]] == [False]
         assert json.loads((folder / "new.json").read_text())["segments"] == HALL.endpoints.tolist()
 
 
 def test_a_stored_map_is_updated_and_stays_as_it_is(linefix: Linefix) -> None:
-    assert linefix("map", "put", "hall", "hall.json").code == 0
+    linefix.done("map", "put", "hall", "hall.json")
     told = linefix("map", "update", "hall", "monday.log", "tuesday.log", "--json")
-    assert json.loads(told.out)["based_on"] == {"map_id": "hall", "revision": 1}
-    assert json.loads(linefix("map", "get", "hall").out)["segments"] == HALL.endpoints.tolist()
+    assert told.answer["based_on"] == {"map_id": "hall", "revision": 1}
+    assert linefix.done("map", "get", "hall").answer["segments"] == HALL.endpoints.tolist()
 
 
 @pytest.mark.parametrize(
@@ -139,10 +135,9 @@ def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) ->
     lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
     (folder / "drive.log").write_text("".join(lines))
     plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
-    told = linefix(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
-    assert told.code == 0, told.err
+    told = linefix.done(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
     assert REMOVED in colours_of(folder / "changes.png")
-    answer = json.loads(told.out)
+    answer = told.answer
     assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
     assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
     wrong = linefix(*plain, "--update")

@@ -33,28 +33,21 @@ def _files(folder: Path) -> None:
 
 
 def located(linefix: Linefix, *options: str) -> Any:
-    ended = linefix("locate", "room.json", "scan.json", "--json", *options)
-    assert ended.code == 0, ended.err
-    return json.loads(ended.out)
+    return linefix.done("locate", "room.json", "scan.json", "--json", *options).answer
 
 
 def replayed(linefix: Linefix, *options: str) -> Any:
-    ended = linefix("replay", "drive.log", "--map", "floor.json", "--json", *options)
-    assert ended.code == 0, ended.err
-    return json.loads(ended.out)
+    return linefix.done("replay", "drive.log", "--map", "floor.json", "--json", *options).answer
 
 
 def explained(linefix: Linefix, *options: str) -> Any:
-    ended = linefix("explain", "room.json", "scan.json", "--json", *options)
-    assert ended.code == 0, ended.err
-    found = json.loads(ended.out)
+    found = linefix.done("explain", "room.json", "scan.json", "--json", *options).answer
     assert found["answer"]["usable"] == found["verdict"]["usable"]
     return found["answer"]
 
 
 def in_batch(linefix: Linefix, *options: str) -> Any:
-    ended = linefix("batch", "scans.parquet", "--maps", "room.json", "--out", "o.parquet", "--workers", "1", *options)
-    assert ended.code == 0, ended.err
+    linefix.done("batch", "scans.parquet", "--maps", "room.json", "--out", "o.parquet", "--workers", "1", *options)
     (row,) = rows(Path("o.parquet"))
     return row
 
