@@ -28,9 +28,10 @@ WALLS = linefix.Segments.from_array(ROOM)
 HEADER = Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp")
 MISSING = [tool for tool in ("fastddsgen", "g++") if shutil.which(tool) is None]
 
-pytestmark = pytest.mark.skipif(
-    bool(MISSING) or not HEADER.exists(), reason="apt-get install libfastrtps-dev fastddsgen g++"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(bool(MISSING) or not HEADER.exists(), reason="apt-get install libfastrtps-dev fastddsgen g++"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -265,6 +265,7 @@ def test_two_robots_with_namespaces_do_not_hear_each_other(domain: int, room: li
         assert other.poses.take() == other.initial.take() == []
 
 
+@pytest.mark.long
 def test_two_robots_with_prefixes_share_the_topics_of_transforms(domain: int, room: linefix.MapIndex) -> None:
     prefixes = "robot1/", "robot2/"
     first, second = (NodeOptions(domain=domain, namespace=f"/{p[:-1]}", frame_prefix=p) for p in prefixes)

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import linefix
 from ros2 import NodeOptions, messages
 from ros2.wire import LATCHED, RELIABLE, Publisher, Subscription
@@ -107,6 +109,7 @@ def has_frame(frame: str, message: Any) -> bool:
     return bool((headers or [message.header])[0].frame_id == frame)
 
 
+@pytest.mark.long
 def test_poses_have_the_frame_of_their_map(domain: int) -> None:
     with running(NodeOptions(domain=domain, namespace="/frames", publish_tf=True), floors(**{"hq-2": "upstairs"})):
         robot = Rider(domain, "/frames")
@@ -118,6 +121,7 @@ def test_poses_have_the_frame_of_their_map(domain: int) -> None:
             assert len(markers.markers[0].points) == 2 * len(FLOORS[floor])
 
 
+@pytest.mark.long
 def test_two_robots_on_two_floors_have_maps_of_their_own(domain: int) -> None:
     """One takes the lift; its topic is remapped."""
     first = NodeOptions(domain=domain, namespace="/robot1", remappings={"linefix/map_id": "/floor_of_robot1"})
@@ -135,6 +139,7 @@ def test_two_robots_on_two_floors_have_maps_of_their_own(domain: int) -> None:
         assert (status.name, values(status)["map"]) == ("robot2/linefix: localization", "hq-2")
 
 
+@pytest.mark.long
 def test_a_request_is_answered_with_the_map(domain: int) -> None:
     with running(NodeOptions(domain=domain, namespace="/request", agree=1), floors()):
         robot = Rider(domain, "/request")
@@ -161,6 +166,7 @@ def test_a_file_of_parameters_names_the_maps(domain: int, tmp_path: Path) -> Non
         assert b"the map changed from hq-1 to hq-2" in started.logged
 
 
+@pytest.mark.long
 def test_a_single_map_is_named_too(domain: int, map_file: str) -> None:
     with bridge("--namespace", "single", "--map", map_file, "--agree", "1") as started:
         assert b"; map room; " in started.logged

@@ -136,6 +136,7 @@ def noise(cells: int) -> messages.OccupancyGrid:
     return messages.OccupancyGrid(messages.Header(frame_id="map"), info, data)
 
 
+@pytest.mark.long
 def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
     with bridge("--base", "laser", "--agree", "1") as program:
         robot = Robot(domain)
@@ -148,7 +149,9 @@ def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
         assert program.process.wait(PATIENCE) == 0
 
 
-@pytest.mark.parametrize("quality", [LATCHED, RELIABLE], ids=["transient local", "volatile"])
+@pytest.mark.parametrize(
+    "quality", [LATCHED, pytest.param(RELIABLE, marks=pytest.mark.long)], ids=["latched", "volatile"]
+)
 def test_a_map_is_taken_however_it_is_published(domain: int, quality: Any) -> None:
     with running(NodeOptions(agree=1, domain=domain, base="laser", map_topic="map"), None):
         robot = Robot(domain)

@@ -109,6 +109,7 @@ def test_on_localhost_nothing_goes_over_another_interface(machines: tuple[Machin
     assert here.packets == before
 
 
+@pytest.mark.long
 def test_other_machines_find_what_is_for_them(machines: tuple[Machine, Machine]) -> None:
     here, there = machines
     with speakers(here, only=ONLY, range=RANGE, off=OFF, open={}) as ours, speakers(there, other=SUBNET) as theirs:

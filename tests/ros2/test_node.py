@@ -32,6 +32,7 @@ def bag(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_bag_that_is_played_gives_an_initial_pose(domain: int, map_file: str, tmp_path: Path) -> None:
     kinds: dict[str, Any] = {"/tf_static": messages.TFMessage, "/scan": messages.LaserScan}
     with bridge("--map", map_file, "--agree", "1"):
