@@ -143,7 +143,7 @@ class Problem:
             start = self.angle
             if options.rotation == "mitsuta":
                 start += float(self.weights.used @ self.pairs.angles(start)) / float(self.weights.used.sum())
-            theta, between_x, between_y, _, _ = joint_solve(joint_record(sums), start, False)
+            theta, between_x, between_y, _, _ = joint_solve(joint_record(sums), start)
             between = RigidTransform(between_x, between_y, theta)
             return between.compose(RigidTransform(-x, -y, 0.0)), between, True
         return pose, pose.compose(RigidTransform(x, y, 0.0)), not observable
@@ -222,7 +222,7 @@ def _choose_rotation(pairs: Correspondences, weights: PairWeights) -> tuple[floa
     sums = joint_record(joint_terms(*joint_factors(pairs), pairs.spreads) @ judged)
     (one, cost), (other, other_cost) = (
         (theta, joint_cost(sums, theta, x, y))
-        for theta, x, y, _, _ in (joint_solve(sums, start + turn, False) for turn in (0.0, math.pi))
+        for theta, x, y, _, _ in (joint_solve(sums, start + turn) for turn in (0.0, math.pi))
     )
     rounding = ROUNDING * float(sums["cc"] + sums["ss"])
     only_one = abs(math.sin(0.5 * (other - one))) < 0.5 * SAME_ANGLE

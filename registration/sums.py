@@ -196,7 +196,7 @@ class JointSums(CompensatedSums):
         observable : bool
             False where all lines are parallel to rounding.
         """
-        theta, x, y, _, observable = joint_solve(joint_record(self.values), float(start), False)
+        theta, x, y, _, observable = joint_solve(joint_record(self.values), float(start))
         return theta, np.array([x, y]), observable
 
     def cost(self, theta: float, translation: ArrayLike) -> float:

@@ -5,7 +5,7 @@ packages may call.
 """
 
 from .arrays import keep_alive
-from .sums import MAX_DEVIATION, invert3, joint_add, joint_cost, joint_information, joint_solve, one_step_add
+from .sums import MAX_DEVIATION, invert3, joint_add, joint_cost, joint_information, joint_solve
 
 __all__ = [
     "MAX_DEVIATION",
@@ -15,5 +15,4 @@ __all__ = [
     "joint_information",
     "joint_solve",
     "keep_alive",
-    "one_step_add",
 ]

@@ -15,7 +15,7 @@ import math
 
 from compiled import kernel
 
-from ..layout import Record, Records
+from ..layout import Record
 
 MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
 PARALLEL_RATIO = 1e-12  # of two eigenvalues: below it rounding alone decides the direction of the smaller one
@@ -73,17 +73,16 @@ def joint_add(sums: Record, line: Record, seen: Record, weight: float, sign: flo
 
 
 @kernel
-def joint_solve(sums: Record, theta0: float, use_wahba: bool) -> tuple[float, float, float, float, bool]:
+def joint_solve(sums: Record, start: float) -> tuple[float, float, float, float, bool]:
     """Minimise ``x' Q x`` over the rigid transforms.
 
-    Returns ``(theta, t_x, t_y, cost, observable)``. The search for theta starts at Wahba's angle (or at `theta0`),
-    since Q cannot tell a direction from its opposite, and takes Newton steps on the unit circle. If all lines are
-    parallel `observable` is False and the translation is the shortest of those that fit.
+    Returns ``(theta, t_x, t_y, cost, observable)``. The search for theta begins at `start`, since Q cannot tell a
+    direction from its opposite, and takes Newton steps on the unit circle. If all lines are parallel `observable` is
+    False and the translation is the shortest of those that fit.
     """
     a = sums.xx
     b = sums.xy
     d = sums.yy
-    theta = math.atan2(sums.wahba_sin, sums.wahba_cos) if use_wahba else theta0
     half_trace = 0.5 * (a + d)
     root = math.sqrt(0.25 * (a - d) * (a - d) + b * b)
     big = half_trace + root
@@ -124,6 +123,7 @@ def joint_solve(sums: Record, theta0: float, use_wahba: bool) -> tuple[float, fl
     mss = sums.ss - (xs * kxs + ys * kys)
     ms1 = sums.s1 - (xs * kx1 + ys * ky1)
     m11 = sums.one - (x1 * kx1 + y1 * ky1)
+    theta = start
     c = math.cos(theta)
     s = math.sin(theta)
     for _ in range(MAX_STEPS):
@@ -206,57 +206,3 @@ def invert3(m: Record, out: Record) -> bool:
     out.yt = yt
     out.tt = tt
     return True
-
-
-@kernel
-def accumulated(value: float, error: float, high: float, low: float) -> tuple[float, float]:
-    """Return value and error of a sum after ``high + low`` was added to it."""
-    total = value + high
-    back = total - value
-    lost = (value - (total - back)) + (high - back) + (error + low)
-    result = total + lost
-    return result, lost - (result - total)
-
-
-@kernel
-def one_step_add(
-    sums: Records, line: Record, seen: Record, gap: float, alpha_ref: float, weight: float, sign: float
-) -> None:
-    """Add (`sign` 1) or remove (-1) one pair.
-
-    Parameters
-    ----------
-    sums : (2,) ONE_STEP_SUMS
-        Changed in place.
-    line, seen : records with the fields `dx` and `dy`
-        Directions of the map and the scan segment.
-    gap : float
-        ``r`` about the reference, metres.
-    alpha_ref : float
-        Angle of the reference, radians.
-    weight, sign : float
-    """
-    # The scan direction turned by alpha_ref, and the angle from there to the map's.
-    c = math.cos(alpha_ref)
-    s = math.sin(alpha_ref)
-    ex = c * seen.dx - s * seen.dy
-    ey = s * seen.dx + c * seen.dy
-    vx = line.dx
-    vy = line.dy
-    a = math.atan2(ex * vy - ey * vx, ex * vx + ey * vy)
-    half = math.sin(0.5 * a)
-    w = sign * weight
-    value = sums[0]
-    error = sums[1]
-    value.w, error.w = accumulated(value.w, error.w, w, 0.0)
-    value.x2, error.x2 = accumulated(value.x2, error.x2, w * vx * vx, 0.0)
-    value.y2, error.y2 = accumulated(value.y2, error.y2, w * vy * vy, 0.0)
-    value.xy, error.xy = accumulated(value.xy, error.xy, w * vx * vy, 0.0)
-    value.px, error.px = accumulated(value.px, error.px, -w * gap * vy, 0.0)
-    value.py, error.py = accumulated(value.py, error.py, w * gap * vx, 0.0)
-    value.gap2, error.gap2 = accumulated(value.gap2, error.gap2, w * gap * gap, 0.0)
-    value.angle, error.angle = accumulated(value.angle, error.angle, w * a, 0.0)
-    value.angle2, error.angle2 = accumulated(value.angle2, error.angle2, w * a * a, 0.0)
-    value.versine, error.versine = accumulated(value.versine, error.versine, 2.0 * w * half * half, 0.0)
-    value.sine, error.sine = accumulated(value.sine, error.sine, w * math.sin(a), 0.0)
-    value.count, error.count = accumulated(value.count, error.count, sign, 0.0)

@@ -280,7 +280,7 @@ def solve_pose(sums: Record, angles: Record, parallel: float, model: Record, pos
     at_x = c * model.sensor_x - s * model.sensor_y + pose.x
     at_y = s * model.sensor_x + c * model.sensor_y + pose.y
     hold_sensor(sums, model.sensor_x, model.sensor_y, at_x, at_y, SPRING)
-    theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
+    theta, tx, ty, _, _ = joint_solve(sums, pose.theta)
     joint_information(sums, theta, solution)
     moved_x = math.cos(theta) * model.sensor_x - math.sin(theta) * model.sensor_y + tx - at_x
     moved_y = math.sin(theta) * model.sensor_x + math.cos(theta) * model.sensor_y + ty - at_y
