@@ -10,18 +10,17 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-NOT_PARAMETERS = ("params_file", "ros_args", "remap", "help")
-
 
 def parameters() -> Iterator[tuple[str, str, str, str]]:
     """Give name, type, default and meaning of each parameter."""
     from typer.main import get_command
 
     from cli.program import app
+    from cli.ros2 import NOT_IN_FILES
 
     command: Any = get_command(app).commands["ros2"]  # type: ignore[attr-defined]
     for option in command.params:
-        if option.name in NOT_PARAMETERS:
+        if option.name in NOT_IN_FILES:
             continue
         if option.name == "on":
             yield "map", "text", "", "The same as `maps` with one map."
