@@ -117,7 +117,8 @@ def serialized(second: int, frame: str = "map", cell: int | None = None) -> mess
     grid.header.stamp = grid.info.map_load_time = messages.Time(second, 3)
     if cell is not None:
         grid.data[cell] = 100 - max(0, grid.data[cell])
-    return messages.SerializedGrid.deserialize(grid.serialize())
+    found: messages.SerializedGrid = messages.SerializedGrid.deserialize(grid.serialize())
+    return found
 
 
 def test_a_map_that_is_published_again_is_not_converted_again() -> None:
