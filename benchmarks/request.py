@@ -30,7 +30,7 @@ from linefix.documents.requests import AssociateRequest
 from linefix.operations import Stopwatch
 from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore
-from service.maps.lookup import FoundMap, MapLookup
+from service.maps.lookup import FoundMaps, MapLookup
 from service.parsing.child import Child
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
@@ -185,7 +185,7 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
         associator = Associator(lookup, Metrics())
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
         stored = store.load("m")
-        target = associator.target(wanted, FoundMap(stored.record, stored.document), deadline)
+        target = associator.target(wanted, FoundMaps({None: stored.record}, stored.document), deadline)
         answer = associator.find(target, wanted, wanted.options, deadline, Stopwatch())
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),

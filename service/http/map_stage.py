@@ -15,9 +15,9 @@ from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import AssociateRequest, BatchRequest
 
 from ..admission.errors import DeadlinePassedError, ForeignMapError
-from ..maps import CachedMap, CachedMaps
+from ..maps import CachedMap
 from ..maps.errors import StoreAwayError
-from ..maps.lookup import FoundMap, FoundMaps
+from ..maps.lookup import FoundMaps
 from .exchange import Exchange
 from .services import Services
 
@@ -29,7 +29,7 @@ STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others f
 @asynccontextmanager
 async def looking_up_map(
     exchange: Exchange, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
-) -> AsyncIterator[InlineMap | FoundMap]:
+) -> AsyncIterator[FoundMaps]:
     """Look a stored map up before its slot at the gate: a database server that hangs delays no other request.
 
     Its document counts as held until the block ends. `oriented` None: as the map states.
@@ -46,31 +46,30 @@ async def looking_up_map(
         When the deadline passes first.
     """
     if isinstance(asked, InlineMap):
-        yield asked
+        yield FoundMaps({None: asked})
         return
     if not asked.map_id.startswith(exchange.ticket.maps):
         raise ForeignMapError
     services = exchange.services
-    store, lookup = services.store, services.lookup
+    store = services.store
     record = store.record_at_once(asked.map_id)
-    if record is not None and lookup.is_cached(record, oriented=oriented):
-        yield FoundMap(record, None)
-        return
-    record = await ask_store(services, partial(store.record, asked.map_id), deadline)
-    if lookup.is_cached(record, oriented=oriented):
-        yield FoundMap(record, None)
+    if record is None:
+        record = await ask_store(services, partial(store.record, asked.map_id), deadline)
+    found = FoundMaps({None: record})
+    if services.lookup.is_cached(found, oriented=oriented):
+        yield found
         return
     with services.documents.account(exchange.ticket.holder) as account:
         account.take(record.size)
         stored = await ask_store(services, partial(store.load, asked.map_id), deadline)
         account.take(stored.record.size - record.size)  # another revision may have come
-        yield FoundMap(stored.record, stored.document)
+        yield FoundMaps({None: stored.record}, stored.document)
 
 
 @asynccontextmanager
 async def looking_up_maps(
     exchange: Exchange, asked: AssociateRequest | BatchRequest, deadline: Deadline
-) -> AsyncIterator[InlineMap | FoundMap | FoundMaps]:
+) -> AsyncIterator[FoundMaps]:
     """Look up the map of a request, or its maps; raises as `looking_up_map`, and `InvalidRequestError` for a prefix."""
     if asked.map is not None:
         async with looking_up_map(exchange, asked.map, deadline, oriented=asked.options.oriented) as source:
@@ -86,27 +85,19 @@ async def looking_up_maps(
 
 
 async def index_map(
-    exchange: Exchange, source: InlineMap | FoundMap | FoundMaps, deadline: Deadline, *, oriented: bool | None
-) -> CachedMap | CachedMaps | None:
+    exchange: Exchange, source: FoundMaps, deadline: Deadline, *, oriented: bool | None
+) -> CachedMap | None:
     """Index a map for which that takes long, or several, in a slot of another gate: its threads go behind all searches.
 
     None where it is left to the search's own slot.
     """
     services = exchange.services
-    call: Callable[[], CachedMap | CachedMaps]
-    held = 0
-    if isinstance(source, FoundMaps):
-        if services.lookup.are_cached(source, oriented=oriented):
-            return None
-        held = source.largest_document
-        call = partial(services.lookup.indexed_together, source, oriented=oriented, deadline=deadline)
-    elif services.lookup.takes_long(source):
-        call = partial(services.lookup.indexed, source, oriented=oriented, deadline=deadline)
-    else:
+    if not services.lookup.takes_long(source, oriented=oriented):
         return None
+    index = partial(services.lookup.indexed, source, oriented=oriented, deadline=deadline)
     with services.documents.account(exchange.ticket.holder) as account:
-        account.take(held)
-        return await services.indexing.run(call, deadline, exchange.ticket, lambda: False)
+        account.take(source.unread_bytes)
+        return await services.indexing.run(index, deadline, exchange.ticket, lambda: False)
 
 
 async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:

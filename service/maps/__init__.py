@@ -1,12 +1,11 @@
 """Maps stored by id: the store, the cache of those that are indexed, and the way from a request's map to its index."""
 
-from .cache import CachedMap, CachedMaps, IndexCache
+from .cache import CachedMap, IndexCache
 from .store import MapStore, Preconditions
 from .tables import MapOutline, MapPage, MapRecord, StoredMap
 
 __all__ = [
     "CachedMap",
-    "CachedMaps",
     "IndexCache",
     "MapOutline",
     "MapPage",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 from ..telemetry.metrics import Metrics
 from .errors import IndexNotReadyError
@@ -22,29 +22,19 @@ LOOK_SECONDS = 0.05  # between two checks, while waiting for another's index, th
 
 @dataclass(frozen=True, slots=True)
 class CachedMap:
-    """An indexed map with the frame that its poses are in."""
+    """An indexed map, or several that are indexed together.
 
-    index: MapIndex
-    frame_id: str
+    Attributes
+    ----------
+    maps : MapIndex or MapSet
+    frames : mapping
+        Frame that poses on each of several maps are in, by name; on the first, or on the single map, by None.
+    bytes : int
+    """
+
+    maps: MapIndex | MapSet
+    frames: Mapping[str | None, str]
     bytes: int
-
-    @property
-    def oriented(self) -> bool:
-        """Return whether directions of its segments mean anything; else the index lists each segment both ways."""
-        return len(self.index.segments) == self.index.directed
-
-
-@dataclass(frozen=True, slots=True)
-class CachedMaps:
-    """Several maps that are indexed together, with the frames that their poses are in."""
-
-    maps: MapSet
-    frame_ids: tuple[str, ...]
-    bytes: int
-
-
-Cached = CachedMap | CachedMaps
-C = TypeVar("C", CachedMap, CachedMaps)
 
 
 class IndexCache:
@@ -57,8 +47,8 @@ class IndexCache:
         self._max_bytes = max_bytes
         self._metrics = metrics
         self._lock = threading.Lock()
-        self._ready: OrderedDict[Hashable, Cached] = OrderedDict()
-        self._building: dict[Hashable, Future[Any]] = {}
+        self._ready: OrderedDict[Hashable, CachedMap] = OrderedDict()
+        self._building: dict[Hashable, Future[CachedMap]] = {}
         self.bytes = 0
 
     def __len__(self) -> int:
@@ -69,7 +59,7 @@ class IndexCache:
         with self._lock:
             return key in self._ready
 
-    def get(self, key: Hashable, build: Callable[[], C], deadline: Deadline) -> C:
+    def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
         """Return the map, or the maps, of a key, built by this caller or by the first one that requested it.
 
         Raises
@@ -82,14 +72,13 @@ class IndexCache:
             if found is not None:
                 self._ready.move_to_end(key)
                 self._metrics.cache_hits.inc()
-                return found  # type: ignore[return-value]  # a key is of one kind
+                return found
             promise = self._building.get(key)
             mine = promise is None
             if promise is None:
                 promise = self._building[key] = Future()
         if not mine:
-            made: C = _awaited(promise, deadline)
-            return made
+            return _awaited(promise, deadline)
         self._metrics.cache_misses.inc()
         return self._build(key, promise, build)
 
@@ -98,7 +87,7 @@ class IndexCache:
         with self._lock:
             self._drop_until(self._max_bytes - size)
 
-    def _build(self, key: Hashable, promise: Future[Any], build: Callable[[], C]) -> C:
+    def _build(self, key: Hashable, promise: Future[CachedMap], build: Callable[[], CachedMap]) -> CachedMap:
         try:
             made = build()
         except BaseException as error:
@@ -112,7 +101,7 @@ class IndexCache:
         promise.set_result(made)
         return made
 
-    def _keep(self, key: Hashable, made: Cached) -> None:
+    def _keep(self, key: Hashable, made: CachedMap) -> None:
         """Keep a map; one that is larger than the cache, by up to as much again, alone and until the next comes.
 
         It takes as much whenever it is built: to do so for each request would need no less memory.
@@ -129,7 +118,7 @@ class IndexCache:
             self.bytes -= dropped.bytes
 
 
-def _awaited(promise: Future[C], deadline: Deadline) -> C:
+def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
     """Return the map that another thread builds, if it is there in time; the waiting thread holds a slot."""
     while not deadline.passed:
         left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()

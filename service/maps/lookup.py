@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from association import Deadline, IndexingEndedError, MapIndex, MapSet
+from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
 from linefix.documents.inputs import index_of, part_of, require_map
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
@@ -15,7 +15,7 @@ from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 
 from ..parsing.child import LARGE, Child
-from .cache import CachedMap, CachedMaps, IndexCache
+from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .store import MapStore
 from .tables import MapOutline, MapRecord
@@ -28,28 +28,30 @@ INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
 
 @dataclass(frozen=True, slots=True)
-class FoundMap:
-    """A stored map that is to be searched; its document is None where the map was in the cache."""
-
-    record: MapRecord
-    document: bytes | None
-
-
-@dataclass(frozen=True, slots=True)
 class FoundMaps:
-    """Several maps that are to be searched, by name: those in the request, and the records of stored ones."""
+    """A map that is to be searched, or several.
 
-    maps: tuple[tuple[str, InlineMap | MapRecord], ...]
+    Attributes
+    ----------
+    maps : mapping
+        Those in the request, and the records of stored ones, by name; a single map by None.
+    document : bytes, or None
+        Of a single map that is stored; None where it was in the cache.
+    """
+
+    maps: Mapping[str | None, InlineMap | MapRecord]
+    document: bytes | None = None
 
     @property
-    def largest_document(self) -> int:
-        """The bytes of the largest stored map: one is read after another."""
-        return max((one.size for _, one in self.maps if isinstance(one, MapRecord)), default=0)
+    def unread_bytes(self) -> int:
+        """The bytes of the largest of several stored maps: one is read after another."""
+        stored = (one.size for name, one in self.maps.items() if name is not None and isinstance(one, MapRecord))
+        return max(stored, default=0)
 
-    def reference_to(self, map_id: str) -> dict[str, object]:
-        """Return id and revision of a map; the revision is None where the map came with the request."""
-        one = dict(self.maps)[map_id]
-        return {"map_id": map_id, "revision": one.revision if isinstance(one, MapRecord) else None}
+    @property
+    def references(self) -> dict[str | None, dict[str, object] | None]:
+        """Id and revision of each map; the revision, or all of a single map, is None where it came with the request."""
+        return {name: _reference(name, one) for name, one in self.maps.items()}
 
 
 class MapLookup:
@@ -70,39 +72,38 @@ class MapLookup:
         self._store = store
         self._parser = parser
 
-    def is_cached(self, record: MapRecord, *, oriented: bool | None) -> bool:
-        """Return whether a stored map is indexed; `oriented` None: as the map states."""
-        return self._cache.has((record, is_oriented(oriented, record.oriented)))
+    def is_cached(self, found: FoundMaps, *, oriented: bool | None) -> bool:
+        """Return whether maps are indexed already; `oriented` None: as each map states."""
+        return self._cache.has(_key(found, oriented))
 
-    def takes_long(self, asked: InlineMap | FoundMap) -> bool:
-        """Return whether it may take long until a map is ready to be searched."""
-        if isinstance(asked, InlineMap):
-            return len(asked.segments) + len(asked.points) > LONG_SEGMENTS
-        return asked.document is not None and len(asked.document) > LONG_BYTES
+    def takes_long(self, found: FoundMaps, *, oriented: bool | None) -> bool:
+        """Return whether it may take long until maps are ready to be searched."""
+        single = found.maps.get(None)
+        if single is None:
+            return not self.is_cached(found, oriented=oriented)
+        if isinstance(single, InlineMap):
+            return len(single.segments) + len(single.points) > LONG_SEGMENTS
+        return found.document is not None and len(found.document) > LONG_BYTES
 
-    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
-        """Return a map ready to be searched; runs off the event loop.
+    def indexed(self, found: FoundMaps, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
+        """Return maps ready to be searched, several by one index; runs off the event loop.
 
         Oriented and unoriented indices of a map are different ones, each with a place of its own in the cache.
-        `oriented` None: as the map states. If another request indexes the same map, wait for it until the deadline.
+        `oriented` None: as each map states. If another request indexes the same maps, wait for it until the deadline.
+        The index of a single map that is begun is finished. Several maps are named in errors by their place, as
+        ``maps.3.segments``.
 
         Raises
         ------
         StoreError
-            When a stored map has left the cache since it was found, and cannot be had again; when the index that
-            another builds is not there in time.
+            When a stored map has left the cache since it was found, and cannot be had again; when the index of several
+            maps, or one that another request builds, is not there in time.
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         InvalidSegmentsError, InvalidMapError
-            When the map of the request cannot be searched.
+            When a map of the request cannot be searched.
         """
-        if isinstance(asked, FoundMap):
-            directed = is_oriented(oriented, asked.record.oriented)
-            key: Hashable = asked.record, directed
-            return self._cache.get(key, lambda: self._index(self.document(asked), directed), deadline)
-        # Robots send the same map with every scan: its content is its name.
-        directed = is_oriented(oriented, asked.oriented)
-        return self._cache.get((*_content(asked), directed), lambda: self._index(asked, directed), deadline)
+        return self._cache.get(_key(found, oriented), partial(self._index, found, oriented, deadline), deadline)
 
     def find_together(self, asked: Sequence[NamedMap | StoredMap] | MapPrefix, prefix: str) -> FoundMaps:
         """Look several maps up, and count what is in them by their records; runs in a thread that may wait.
@@ -119,28 +120,13 @@ class MapLookup:
             When there is more in the maps than may be searched together.
         """
         if isinstance(asked, MapPrefix):
-            found = FoundMaps(tuple((one.map_id, one) for one in self._beginning(asked.prefix, prefix)))
+            found: list[NamedMap | MapRecord] = [*self._beginning(asked.prefix, prefix)]
         else:
-            records = (one if isinstance(one, NamedMap) else self._store.record(one.map_id) for one in asked)
-            found = FoundMaps(tuple((one.map_id, one) for one in records))
+            found = [one if isinstance(one, NamedMap) else self._store.record(one.map_id) for one in asked]
         for kind in ("segments", "points"):
-            if sum(_count(one, kind) for _, one in found.maps) > MOST_TOGETHER:
+            if sum(_count(one, kind) for one in found) > MOST_TOGETHER:
                 raise TooManyError("/maps", MOST_TOGETHER, f"{kind} of all maps together")
-        return found
-
-    def are_cached(self, asked: FoundMaps, *, oriented: bool | None) -> bool:
-        """Return whether several maps are indexed together already."""
-        return self._cache.has(_key_together(asked, oriented))
-
-    def indexed_together(self, asked: FoundMaps, *, oriented: bool | None, deadline: Deadline) -> CachedMaps:
-        """Return several maps ready to be searched together, by one index.
-
-        Runs off the event loop; raises as `indexed`, and `IndexNotReadyError` when the deadline passes first. Inline
-        maps are named in errors by their place, as ``maps.3.segments``.
-        """
-        return self._cache.get(
-            _key_together(asked, oriented), partial(self._index_together, asked, oriented, deadline), deadline
-        )
+        return FoundMaps({one.map_id: one for one in found})
 
     def index_once(self, asked: InlineMap, deadline: Deadline) -> MapIndex:
         """Return the index, with its directions, of a map that is not searched; it is not cached.
@@ -155,20 +141,21 @@ class MapLookup:
         self._cache.make_room(INDEXED_BYTES * (len(asked.segments) + len(asked.points)))
         return index_of(asked, oriented=True, deadline=deadline)
 
-    def document(self, found: FoundMap) -> MapDocument:
-        """Return the document of a stored map; runs off the event loop.
+    def document(self, source: InlineMap | MapRecord, document: bytes | None = None) -> MapDocument:
+        """Return the document of a map, stored ones by the bytes that were found; runs off the event loop.
 
         Raises
         ------
         StoreError
-            When it has changed since it was found, or cannot be had again.
+            When a stored map has changed since it was found, or cannot be had again.
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         """
-        document = found.document
+        if isinstance(source, InlineMap):
+            return source
         if document is None:
-            stored = self._store.load(found.record.map_id)
-            if stored.record != found.record:
+            stored = self._store.load(source.map_id)
+            if stored.record != source:
                 raise BusyStoreError  # changed since, and out of the cache meanwhile
             document = stored.document
         if len(document) > LARGE:
@@ -190,28 +177,34 @@ class MapLookup:
             raise UnknownMapError
         return page.maps
 
-    def _index_together(self, asked: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMaps:
-        parts, frame_ids = {}, []
-        for number, (name, one) in enumerate(asked.maps):
-            if deadline.passed:
+    def _index(self, found: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMap:
+        parts: dict[str | None, MapPart] = {}
+        frames: dict[str | None, str] = {}
+        for number, (name, one) in enumerate(found.maps.items()):
+            if number and deadline.passed:
                 raise IndexNotReadyError
-            document = one if isinstance(one, InlineMap) else self.document(FoundMap(one, None))
-            directed = is_oriented(oriented, document.oriented)
-            parts[name] = part_of(document, oriented=directed, path=f"maps.{number}.")
-            frame_ids.append(document.frame_id)
-        count = sum(len(part.segments) + len(part.points) for part in parts.values())
-        self._cache.make_room(2 * INDEXED_BYTES * count)
-        try:
-            maps = MapSet(parts, deadline)
-        except IndexingEndedError:
-            raise IndexNotReadyError from None
-        return CachedMaps(maps, tuple(frame_ids), maps.nbytes + OVERHEAD)
-
-    def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
+            document = self.document(one, found.document)
+            path = "map." if name is None else f"maps.{number}."
+            parts[name] = part_of(document, oriented=is_oriented(oriented, document.oriented), path=path)
+            frames[name] = document.frame_id
+            frames.setdefault(None, document.frame_id)
         # The old goes before the new comes: two of the largest at once would take too much.
-        self._cache.make_room(INDEXED_BYTES * (len(asked.segments) * (1 if oriented else 2) + len(asked.points)))
-        index = index_of(asked, oriented=oriented)
-        return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
+        each = 1 if all(part.oriented for part in parts.values()) else 2
+        count = sum(each * len(part.segments) + len(part.points) for part in parts.values())
+        single = parts.get(None)
+        self._cache.make_room(INDEXED_BYTES * count * (1 if single is not None else 2))
+        if single is None:
+            maps: MapIndex | MapSet = _together(parts, deadline)
+        else:
+            maps = MapIndex.build(single.segments, single.sigma, oriented=single.oriented, points=single.points)
+        return CachedMap(maps, frames, maps.nbytes + OVERHEAD)
+
+
+def _together(parts: Mapping[str | None, MapPart], deadline: Deadline) -> MapSet:
+    try:
+        return MapSet({str(name): part for name, part in parts.items()}, deadline)
+    except IndexingEndedError:
+        raise IndexNotReadyError from None
 
 
 def _count(one: InlineMap | MapRecord, kind: str) -> int:
@@ -219,12 +212,18 @@ def _count(one: InlineMap | MapRecord, kind: str) -> int:
     return int(getattr(one.outline, kind)) if isinstance(one, MapRecord) else len(getattr(one, kind))
 
 
-def _key_together(asked: FoundMaps, oriented: bool | None) -> Hashable:
-    """Return the name of the content of several maps, in their order."""
-    parts = (
-        (name, one) if isinstance(one, MapRecord) else (name, *_content(one), one.oriented) for name, one in asked.maps
+def _reference(name: str | None, one: InlineMap | MapRecord) -> dict[str, object] | None:
+    if isinstance(one, MapRecord):
+        return {"map_id": one.map_id, "revision": one.revision}
+    return None if name is None else {"map_id": name, "revision": None}
+
+
+def _key(found: FoundMaps, oriented: bool | None) -> Hashable:
+    """Return the name of the content of maps, in their order; robots send the same map with every scan."""
+    return tuple(
+        (name, one if isinstance(one, MapRecord) else _content(one), is_oriented(oriented, one.oriented))
+        for name, one in found.maps.items()
     )
-    return ("together", oriented, *parts)
 
 
 def _content(asked: InlineMap) -> tuple[Hashable, ...]:

@@ -10,13 +10,13 @@ import orjson
 
 from association import Deadline
 from linefix.documents.encoding import encode, encode_list
-from linefix.documents.parts import InlineMap, SearchOptions
+from linefix.documents.parts import SearchOptions
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
 from linefix.documents.updates import ApplyRequest
 from linefix.operations import Json, Stopwatch, Target, applied, find, registered, vectorized
 
-from ..maps import CachedMap, CachedMaps
-from ..maps.lookup import FoundMap, FoundMaps, MapLookup
+from ..maps import CachedMap
+from ..maps.lookup import FoundMaps, MapLookup
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
 from .job import Done, Job
@@ -52,13 +52,7 @@ class Associator:
     lookup: MapLookup
     metrics: Metrics
 
-    def answer(
-        self,
-        asked: AssociateRequest,
-        source: InlineMap | FoundMap | FoundMaps,
-        job: Job,
-        ready: CachedMap | CachedMaps | None = None,
-    ) -> Done:
+    def answer(self, asked: AssociateRequest, source: FoundMaps, job: Job, ready: CachedMap | None = None) -> Done:
         """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
         target = self.target(asked, source, job.deadline, ready)
         job.searching.set()
@@ -69,36 +63,14 @@ class Associator:
     def target(
         self,
         asked: AssociateRequest | BatchRequest,
-        source: InlineMap | FoundMap | FoundMaps,
+        source: FoundMaps,
         deadline: Deadline,
-        ready: CachedMap | CachedMaps | None = None,
+        ready: CachedMap | None = None,
     ) -> Target:
-        """Return a map, or several, indexed unless ready; one that is begun is finished, whenever the deadline passes.
-
-        Raises
-        ------
-        StoreError
-            When it is stored, and cannot be had, or another indexes it and is not done in time.
-        ParserEndedError
-            When it is large and could not be read.
-        InputError
-            When it cannot be searched.
-        """
-        oriented = asked.options.oriented
+        """Return a map, or several, indexed unless ready; raises as `MapLookup.indexed`."""
         with stage("index"):
-            if isinstance(source, FoundMaps):
-                together = ready or self.lookup.indexed_together(source, oriented=oriented, deadline=deadline)
-                assert isinstance(together, CachedMaps)  # several maps are ready as several
-                names = together.maps.ids
-                frames: dict[str | None, str] = {
-                    None: together.frame_ids[0],
-                    **dict(zip(names, together.frame_ids, strict=True)),
-                }
-                references: dict[str | None, Json | None] = {name: source.reference_to(name) for name in names}
-                return Target(together.maps, frames, references, asked.map_weights)
-            cached = ready or self.lookup.indexed(source, oriented=oriented, deadline=deadline)
-        assert isinstance(cached, CachedMap)
-        return Target(cached.index, {None: cached.frame_id}, {None: reference_to(source)})
+            cached = ready or self.lookup.indexed(source, oriented=asked.options.oriented, deadline=deadline)
+        return Target(cached.maps, cached.frames, source.references, asked.map_weights)
 
     def find(
         self,
@@ -153,10 +125,3 @@ def answer_apply(asked: ApplyRequest, job: Job) -> Done:
     """Return a map with the changes that are accepted; raises `InputError` where it could not be put."""
     accepted = sum(one.accepted for one in asked.changes)
     return job.done({**applied(asked, job.watch), "client_ref": asked.client_ref}, changes=accepted)
-
-
-def reference_to(source: InlineMap | FoundMap) -> Json | None:
-    """Return id and revision of a stored map."""
-    return (
-        {"map_id": source.record.map_id, "revision": source.record.revision} if isinstance(source, FoundMap) else None
-    )

@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from association import CancelledError, Deadline
-from linefix.documents.analysis import AnalyzeRequest
-from linefix.documents.parts import InlineMap, is_oriented
-from linefix.documents.requests import CheckRequest
-from linefix.documents.updates import UpdateRequest
-from linefix.operations import Json, Steps, analysis_steps, check_steps, update_steps
+from association import CancelledError, Deadline, MapIndex
+from linefix.operations import Json, Steps
 
-from ..maps.lookup import FoundMap, MapLookup
+from ..maps.lookup import FoundMaps, MapLookup
 from .job import Job
 
 TURN_SECONDS = 0.1  # of the gate, before others have theirs
-Begin = Callable[[MapLookup, InlineMap | FoundMap, Deadline], Steps]
-"""Index a map, and give the steps of an operation on it.
-
-Raises
-------
-StoreError
-    When the map cannot be had.
-ParserEndedError
-    When it is large and could not be read.
-"""
+Operation = Callable[[MapIndex, FoundMaps], Steps]
+"""Give the steps of an operation on a map, with its index."""
 
 
 @dataclass(slots=True)
@@ -52,7 +40,7 @@ class Work:
                 return True
 
 
-def begin(operation: Begin, lookup: MapLookup, source: InlineMap | FoundMap, job: Job) -> Work:
+def begin(operation: Operation, lookup: MapLookup, source: FoundMaps, job: Job, *, oriented: bool | None) -> Work:
     """Index a map and read the request, which is the first step; the others look at the deadline.
 
     Raises
@@ -64,41 +52,9 @@ def begin(operation: Begin, lookup: MapLookup, source: InlineMap | FoundMap, job
     DeadlinePassedError
         When the deadline has passed before.
     """
-    steps = operation(lookup, source, job.deadline)
+    index = lookup.indexed(source, oriented=oriented, deadline=job.deadline).maps
+    assert isinstance(index, MapIndex)
+    steps = operation(index, source)
     next(steps)
     job.begin_search()
     return Work(steps, job.deadline)
-
-
-def analysis_of(asked: AnalyzeRequest) -> Begin:
-    """Return the operation of an analysis."""
-
-    def begin_analysis(lookup: MapLookup, source: InlineMap | FoundMap, deadline: Deadline) -> Steps:
-        index = lookup.indexed(source, oriented=None, deadline=deadline).index
-        return analysis_steps(index, asked, deadline)
-
-    return begin_analysis
-
-
-def check_of(asked: CheckRequest | None) -> Begin:
-    """Return the operation of a check, of the map with its directions, whatever they mean."""
-
-    def begin_check(lookup: MapLookup, source: InlineMap | FoundMap, deadline: Deadline) -> Steps:
-        own = source.record.oriented if isinstance(source, FoundMap) else source.oriented
-        # Of its own: an index without directions, which a check may add to it, goes with the check, for the cache does
-        # not count it.
-        index = replace(lookup.indexed(source, oriented=True, deadline=deadline).index)
-        return check_steps(index, asked, deadline, oriented=is_oriented(None, own))
-
-    return begin_check
-
-
-def update_of(asked: UpdateRequest) -> Begin:
-    """Return the operation of an update."""
-
-    def begin_update(lookup: MapLookup, source: InlineMap | FoundMap, deadline: Deadline) -> Steps:
-        index = lookup.indexed(source, oriented=None, deadline=deadline).index
-        old = lookup.document(source) if isinstance(source, FoundMap) else source
-        return update_steps(index, old, asked, deadline)
-
-    return begin_update

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
+from association import MapIndex
 from linefix.documents import examples
 from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
 from linefix.documents.checks import CheckAnswer
-from linefix.documents.parts import InlineMap, StoredMap
+from linefix.documents.parts import InlineMap, StoredMap, is_oriented
 from linefix.documents.requests import CheckRequest
 from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
-from linefix.operations import Json
+from linefix.operations import Json, Steps, analysis_steps, check_steps, update_steps
 
-from ...work.association import answer_apply, reference_to
+from ...maps.lookup import FoundMaps
+from ...work.association import answer_apply
 from ...work.job import Done, Job
-from ...work.steps import Begin, analysis_of, begin, check_of, update_of
+from ...work.steps import Operation, begin
 from ..body_stage import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map
@@ -61,7 +64,11 @@ async def post_analyze_inline(exchange: Searching) -> Response:
 
 async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
     job, noted = exchange.job(asked.deadline_ms), {"places": lambda found: found["summary"]["places"]}
-    return await _in_turns(exchange, on, analysis_of(asked), job, noted, client_ref=asked.client_ref)
+
+    def steps(index: MapIndex, _: FoundMaps) -> Steps:
+        return analysis_steps(index, asked, job.deadline)
+
+    return await _in_turns(exchange, on, steps, job, noted, client_ref=asked.client_ref)
 
 
 @router.get(
@@ -102,7 +109,13 @@ async def post_check(exchange: Searching, map_id: MapIdPath) -> Response:
 async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Response:
     noted = {"findings": lambda found: [one["code"] for one in found["findings"]]}
     on, client_ref = StoredMap(map_id=map_id), None if asked is None else asked.client_ref
-    return await _in_turns(exchange, on, check_of(asked), job, noted, oriented=True, client_ref=client_ref)
+
+    def steps(index: MapIndex, source: FoundMaps) -> Steps:
+        # An index of its own: one without directions, which a check may add to it, goes with the check, for the cache
+        # does not count it.
+        return check_steps(replace(index), asked, job.deadline, oriented=is_oriented(None, source.maps[None].oriented))
+
+    return await _in_turns(exchange, on, steps, job, noted, oriented=True, client_ref=client_ref)
 
 
 @router.post(
@@ -118,7 +131,12 @@ async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
     asked = await read_request(exchange, UpdateRequest)
     on, job = StoredMap(map_id=map_id), exchange.job(asked.deadline_ms)
     noted = {"changes": lambda found: len(found["changes"])}
-    return await _in_turns(exchange, on, update_of(asked), job, noted, name="based_on", client_ref=asked.client_ref)
+
+    def steps(index: MapIndex, source: FoundMaps) -> Steps:
+        old = exchange.services.lookup.document(source.maps[None], source.document)
+        return update_steps(index, old, asked, job.deadline)
+
+    return await _in_turns(exchange, on, steps, job, noted, name="based_on", client_ref=asked.client_ref)
 
 
 @router.post(
@@ -138,7 +156,7 @@ async def post_apply(exchange: Searching) -> Response:
 async def _in_turns(
     exchange: Exchange,
     on: InlineMap | StoredMap,
-    operation: Begin,
+    operation: Operation,
     job: Job,
     noted: Mapping[str, Callable[[Json], Any]],
     *,
@@ -152,7 +170,8 @@ async def _in_turns(
         lookup, run = exchange.services.lookup, exchange.services.parse_threads.run
         async with looking_up_map(exchange, on, job.deadline, oriented=oriented) as source:
             await index_map(exchange, source, job.deadline, oriented=oriented)
-            beginning, reference = partial(begin, operation, lookup, source, job), reference_to(source)
+            reference = source.references[None]
+            beginning = partial(begin, operation, lookup, source, job, oriented=oriented)
             begun = await in_search_slot(exchange, beginning, job.deadline, job.searching.is_set)
         if not await in_short_slots(exchange, begun.take_turn, job.deadline):  # the rest then searches nothing
             while await run(begun.take_turn):

@@ -22,7 +22,7 @@ INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
 
 
 def a_map(size: int) -> CachedMap:
-    return CachedMap(INDEX, "map", size)
+    return CachedMap(INDEX, {None: "map"}, size)
 
 
 # Maps that are looked up, and room that is made before something is built; what was built; maps and bytes at the end.
@@ -102,7 +102,7 @@ def test_the_default_cache_keeps_the_largest_map() -> None:
     index = MapIndex.build(Segments.from_array(np.hstack([middles - half, middles + half])))
     cache = IndexCache(Settings().cache_bytes, Metrics())
     for _ in range(2):
-        cache.get("a", lambda: CachedMap(index, "map", index.nbytes), NO_END)
+        cache.get("a", lambda: CachedMap(index, {None: "map"}, index.nbytes), NO_END)
     assert cache.has("a")
     assert cache.bytes <= Settings().cache_bytes
 

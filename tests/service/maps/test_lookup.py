@@ -10,15 +10,15 @@ import numpy as np
 import orjson
 import pytest
 
-from association import Deadline, InvalidMapError
+from association import Deadline, InvalidMapError, MapIndex
 from linefix.documents import examples
 from linefix.documents.errors import TooManyError
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap
 from linefix.documents.several import MapPrefix, NamedMap
 from service.database_location import database_url
-from service.maps import CachedMap, IndexCache, MapOutline, MapStore
+from service.maps import CachedMap, IndexCache, MapOutline, MapRecord, MapStore
 from service.maps.errors import BusyStoreError, IndexNotReadyError
-from service.maps.lookup import OVERHEAD, FoundMap, MapLookup, outline_of
+from service.maps.lookup import OVERHEAD, FoundMaps, MapLookup, outline_of
 from service.parsing.child import LARGE, Child
 from service.telemetry.metrics import Metrics
 
@@ -35,17 +35,19 @@ class Lookup(MapLookup):
     def look(self, asked: InlineMap | StoredMap, *, oriented: bool | None) -> tuple[CachedMap, int | None]:
         """Find and index, as for one request."""
         if isinstance(asked, InlineMap):
-            return self.indexed(asked, oriented=oriented, deadline=Deadline()), None
+            return self.indexed(FoundMaps({None: asked}), oriented=oriented, deadline=Deadline()), None
         found = self.find(asked.map_id, oriented=oriented)
-        return self.indexed(found, oriented=oriented, deadline=Deadline()), found.record.revision
+        record = found.maps[None]
+        assert isinstance(record, MapRecord)
+        return self.indexed(found, oriented=oriented, deadline=Deadline()), record.revision
 
-    def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
+    def find(self, map_id: str, *, oriented: bool | None) -> FoundMaps:
         """Find a stored map, with its document where it is not indexed."""
-        record = self.store.record(map_id)
-        if self.is_cached(record, oriented=oriented):
-            return FoundMap(record, None)
+        found = FoundMaps({None: self.store.record(map_id)})
+        if self.is_cached(found, oriented=oriented):
+            return found
         stored = self.store.load(map_id)
-        return FoundMap(stored.record, stored.document)
+        return FoundMaps({None: stored.record}, stored.document)
 
     def put(self, map_id: str, **parts: Any) -> None:
         self.store.put(
@@ -80,17 +82,20 @@ def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, part
     plain, _ = lookup.look(inline(), oriented=True)
     other, _ = lookup.look(inline(**parts), oriented=True)
     assert other is not plain
-    assert other.frame_id == parts.get("frame_id", "map")
-    assert other.index.sigma == parts.get("sigma")
+    assert other.frames[None] == parts.get("frame_id", "map")
+    assert isinstance(other.maps, MapIndex)
+    assert other.maps.sigma == parts.get("sigma")
     assert lookup.look(inline(), oriented=True)[0] is plain
 
 
 def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) -> None:
     one, other, again = (lookup.look(inline(), oriented=oriented)[0] for oriented in (True, False, True))
-    assert len(other.index.segments) == 2 * len(one.index.segments)
+    assert isinstance(one.maps, MapIndex)
+    assert isinstance(other.maps, MapIndex)
+    assert len(other.maps.segments) == 2 * len(one.maps.segments)
     assert again is one
-    assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes + 2 * OVERHEAD
-    assert other.index.undirected is other.index
+    assert lookup.cache.bytes == one.maps.nbytes + other.maps.nbytes + 2 * OVERHEAD
+    assert other.maps.undirected is other.maps
 
 
 def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
@@ -104,7 +109,7 @@ def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup)
 
     lookup.store.load = changing  # type: ignore[method-assign]
     found, revision = lookup.look(StoredMap(map_id="m"), oriented=True)
-    assert (found.frame_id, revision) == ("change 1", 3)
+    assert (found.frames[None], revision) == ("change 1", 3)
 
 
 def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(lookup: Lookup) -> None:
@@ -113,7 +118,7 @@ def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(
     found = lookup.find("m", oriented=True)
     assert found.document is None
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
-    assert lookup.indexed(found, oriented=True, deadline=Deadline()).frame_id == "map"  # read again
+    assert lookup.indexed(found, oriented=True, deadline=Deadline()).frames[None] == "map"  # read again
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
     lookup.put("m", segments=examples.WALLS, frame_id="other")
     with pytest.raises(BusyStoreError):
@@ -128,7 +133,7 @@ def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
     assert len(lookup.store.load("large").document) > LARGE
     lookup.look(StoredMap(map_id="small"), oriented=True)
     assert lookup.parser.pid is None
-    assert lookup.look(StoredMap(map_id="large"), oriented=True)[0].index.nbytes > 0
+    assert lookup.look(StoredMap(map_id="large"), oriented=True)[0].maps.nbytes > 0
     assert lookup.parser.pid is not None
 
 
@@ -143,8 +148,10 @@ def test_several_maps_are_counted_by_their_records(lookup: Lookup, monkeypatch: 
             with pytest.raises(TooManyError, match=kind) as caught:
                 lookup.find_together(asked, "")
             assert caught.value.pointer == "/maps"
-    found = lookup.find_together([StoredMap(map_id="points-0"), NamedMap(map_id="x", segments=examples.WALLS)], "")
-    assert found.largest_document == 2
+    found = lookup.find_together(
+        [StoredMap(map_id="points-0"), NamedMap.model_validate({"map_id": "x", "segments": examples.WALLS})], ""
+    )
+    assert found.unread_bytes == 2
 
 
 def test_several_maps_are_loaded_for_as_long_as_somebody_waits(lookup: Lookup, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,7 +166,7 @@ def test_several_maps_are_loaded_for_as_long_as_somebody_waits(lookup: Lookup, m
 
     monkeypatch.setattr(lookup.store, "load", last)
     with pytest.raises(IndexNotReadyError):
-        lookup.indexed_together(lookup.find_together(MapPrefix(prefix="m-"), ""), oriented=None, deadline=deadline)
+        lookup.indexed(lookup.find_together(MapPrefix(prefix="m-"), ""), oriented=None, deadline=deadline)
     assert loaded == ["m-0"]
 
 
