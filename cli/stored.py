@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map, read_stored
+from service.errors import CorruptMapError, StoreError, UnknownMapError
 from service.maps import MapStore
-from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.maps.lookup import outline_of
 from service.settings import Settings
 

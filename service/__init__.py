@@ -14,5 +14,5 @@ Each room imports only from those below it; import-linter holds them to that (`p
     parsing/               from the bytes of a body to a checked request, large ones in another process
     telemetry/             counts, traces and the log
     page/                  the files of the page at /, built
-    database_location, memory, thread_pool, version
+    database_location, errors, memory, thread_pool, version
 """

@@ -17,13 +17,13 @@ from compiled import compiled_fraction, is_complete
 from linefix.compiling import start_compiler
 from linefix.warmup import warm_up
 
+from .errors import StoreError
 from .http.middleware import RequestMiddleware
 from .http.openapi import Contract, describe
 from .http.problems import handle_errors
 from .http.routes import batch, importing, maps, operations, pages, quality, scans
 from .http.services import Services
 from .importing.folders import remove_abandoned
-from .maps.errors import StoreError
 from .memory import return_free_pages
 from .settings import Settings
 from .thread_pool import Threads

@@ -6,7 +6,7 @@ import threading
 from collections import Counter
 from types import TracebackType
 
-from .errors import ShareHeldError, TooMuchHeldError
+from ..errors import ShareHeldError, TooMuchHeldError
 from .key_file import Holder
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from linefix.documents.errors import BodyTooLargeError
 
-from .errors import ForeignMapError, MissingRoleError
+from ..errors import MissingRoleError, UnknownMapError
 from .gate import Gate, Ticket
 from .key_file import EVERY_ROLE, Grant, Role
 from .keys import Keyring
@@ -40,7 +40,7 @@ class Entrance:
             When the request may come from a web page in a browser, and the service has no keys.
         MissingKeyError, UnknownKeyError
             When the path requires a key.
-        MissingRoleError, ForeignMapError
+        MissingRoleError, UnknownMapError
             When the key lacks the role for the request, or no such map exists for the key.
         BodyTooLargeError
             When the body is too long by the length that the head states.
@@ -72,4 +72,4 @@ def _require(grant: Grant, method: str, path: str) -> None:
         raise MissingRoleError(f"the key lacks the role `{role}`; send a key that has it")
     # An id ends where a prefix cannot go on, so that the rest of the path begins like the id.
     if path.startswith(MAPS) and not path.startswith(MAPS + grant.maps):
-        raise ForeignMapError
+        raise UnknownMapError

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
 
-from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
+from ..errors import DeadlinePassedError, QueueFullError, ShareUsedError
 from .key_file import Holder
 
 T = TypeVar("T")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic import SecretStr
 
-from .errors import MissingKeyError, UnknownKeyError
+from ..errors import MissingKeyError, UnknownKeyError
 from .key_file import Grant, Holder, KeyFileError, read_keys, state_of
 
 logger = logging.getLogger("linefix")

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from urllib.parse import urlsplit
 
-from .errors import ForeignHostError, ForeignOriginError
+from ..errors import ForeignHostError, ForeignOriginError
 
 _READ = frozenset((b"host", b"origin", b"sec-fetch-site"))
 _HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .errors import NotReadyError
+from ..errors import ENDING, NotReadyError
 
 
 class Readiness:
@@ -39,7 +39,5 @@ class Readiness:
     def require_all(self) -> None:
         """Raise `NotReadyError` when requests should go elsewhere."""
         if self.draining:
-            raise NotReadyError(
-                "the service is shutting down; send the request to another instance, or again after its restart"
-            )
+            raise NotReadyError(ENDING)
         self.require_warm()

@@ -18,7 +18,7 @@ from linefix.documents.errors import BodyTooLargeError
 
 from ..admission.budget import ByteAccount, ByteBudget
 from ..admission.key_file import Holder
-from .errors import BodyTooSlowError, EncodingError, MediaTypeError
+from ..errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"
 DROP_SECONDS = 3.0  # s that the rest of a body may take to come

@@ -14,9 +14,8 @@ from association import Deadline
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import AssociateRequest, BatchRequest
 
-from ..admission.errors import DeadlinePassedError, ForeignMapError
+from ..errors import DeadlinePassedError, StoreAwayError, UnknownMapError
 from ..maps import CachedMap
-from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMaps
 from .exchange import Exchange
 from .services import Services
@@ -36,7 +35,7 @@ async def looking_up_map(
 
     Raises
     ------
-    ForeignMapError
+    UnknownMapError
         When there is no such map for this caller.
     StoreError
         When it cannot be had.
@@ -49,7 +48,7 @@ async def looking_up_map(
         yield FoundMaps({None: asked})
         return
     if not asked.map_id.startswith(exchange.ticket.maps):
-        raise ForeignMapError
+        raise UnknownMapError
     services = exchange.services
     store = services.store
     record = store.record_at_once(asked.map_id)
@@ -80,7 +79,7 @@ async def looking_up_maps(
     if isinstance(asked.maps, list) and any(
         isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked.maps
     ):
-        raise ForeignMapError
+        raise UnknownMapError
     yield await ask_store(services, partial(services.lookup.find_together, asked.maps, prefix), deadline)
 
 

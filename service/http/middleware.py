@@ -19,9 +19,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from linefix.documents.errors import RequestError
 
-from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
+from ..errors import ControlCharacterError, MissingKeyError, NotHttpError, ServiceError, ShareUsedError, UnknownKeyError
 from .bodies import Intake
-from .errors import ControlCharacterError, HttpError, NotHttpError
 from .exchange import KEY, Exchange
 from .problems import RAISED, problem_of, problem_or_defect
 from .services import Services
@@ -72,7 +71,7 @@ class RequestMiddleware:
         try:
             _require_plain(scope)
             exchange.ticket = self._services.entrance.admit(scope)
-        except (AdmissionError, HttpError, RequestError) as error:
+        except (ServiceError, RequestError) as error:
             await self._refuse(error, exchange, intake, scope, send)
             return
         traces = self._services.traces

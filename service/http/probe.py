@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
-from ..admission.errors import NotReadyError
+from ..errors import BusyStoreError, NotReadyError, ReadOnlyStoreError, StoreAwayError, StoreError
 from ..maps import MapStore
-from ..maps.errors import BusyStoreError, ReadOnlyStoreError, StoreAwayError, StoreError
 from ..thread_pool import Threads
 
 ANSWERS_WITHIN = 2.0  # s

@@ -33,11 +33,7 @@ from linefix.documents.limits import MAX_FAULTS
 from linefix.operations import TooLateError
 from registration import InputError
 
-from ..admission import errors as admission
-from ..importing import errors as importing
-from ..maps import errors as maps
-from ..parsing import errors as parsing
-from . import errors as http
+from .. import errors
 from .etags import etag
 from .exchange import exchange_of
 from .search_stage import HangUpError
@@ -63,38 +59,38 @@ class Kind:
     raised_as: tuple[type[Exception], ...] = ()
 
 
-NOT_HTTP = (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError)
-STRANGE = (admission.UnknownKeyError, admission.ForeignHostError, admission.ForeignOriginError)
-WRONG_KIND = (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError)
-BUSY = (admission.QueueFullError, admission.TooMuchHeldError, maps.BusyStoreError)
-LATE = (admission.DeadlinePassedError, TooLateError, maps.IndexNotReadyError, importing.TooLateError)
-TOO_LARGE = (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
+NOT_HTTP = (errors.NotHttpError, errors.ControlCharacterError, errors.BodyBrokenError)
+STRANGE = (errors.UnknownKeyError, errors.ForeignHostError, errors.ForeignOriginError)
+WRONG_KIND = (errors.MediaTypeError, errors.EncodingError, errors.FormatsMissingError, errors.UnknownFormatError)
+BUSY = (errors.QueueFullError, errors.TooMuchHeldError, errors.BusyStoreError)
+LATE = (errors.DeadlinePassedError, TooLateError, errors.IndexNotReadyError, errors.ImportTooLateError)
+TOO_LARGE = (TooManyError, BodyTooLargeError, errors.FileTooLargeError)
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),
     Kind("invalid_http", 400, "The request is not HTTP", NOT_HTTP),
-    Kind("unauthorized", 401, "A key is required", (admission.MissingKeyError,)),
-    Kind("forbidden", 403, "The request is not permitted", (*STRANGE, admission.MissingRoleError)),
-    Kind("not_found", 404, "No resource has this path", (http.NotFoundError,)),
-    Kind("unknown_map", 404, "No map has this id", (maps.UnknownMapError, admission.ForeignMapError)),
-    Kind("method_not_allowed", 405, "This path does not support the method", (http.MethodNotAllowedError,)),
-    Kind("request_timeout", 408, "The request did not arrive in time", (http.BodyTooSlowError,)),
-    Kind("map_corrupt", 409, "The stored map is damaged", (maps.CorruptMapError,)),
-    Kind("revision_conflict", 412, "The precondition on the map's revision failed", (maps.RevisionConflictError,)),
+    Kind("unauthorized", 401, "A key is required", (errors.MissingKeyError,)),
+    Kind("forbidden", 403, "The request is not permitted", (*STRANGE, errors.MissingRoleError)),
+    Kind("not_found", 404, "No resource has this path", (errors.NotFoundError,)),
+    Kind("unknown_map", 404, "No map has this id", (errors.UnknownMapError,)),
+    Kind("method_not_allowed", 405, "This path does not support the method", (errors.MethodNotAllowedError,)),
+    Kind("request_timeout", 408, "The request did not arrive in time", (errors.BodyTooSlowError,)),
+    Kind("map_corrupt", 409, "The stored map is damaged", (errors.CorruptMapError,)),
+    Kind("revision_conflict", 412, "The precondition on the map's revision failed", (errors.RevisionConflictError,)),
     Kind("too_large", 413, "The request exceeds a limit", TOO_LARGE),
     Kind("unsupported_media_type", 415, "The media type is not supported", WRONG_KIND),
-    Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, http.RefusedError)),
+    Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, errors.RefusedError)),
     Kind(
         "rate_limited",
         429,
         "This key exceeds its part of the queue",
-        (admission.ShareUsedError, admission.ShareHeldError),
+        (errors.ShareUsedError, errors.ShareHeldError),
     ),
     Kind("internal", 500, "The service has a defect"),
-    Kind("not_ready", 503, "The service is not ready", (admission.NotReadyError, maps.StoreAwayError, CancelledError)),
-    Kind("overloaded", 503, "The service is busy", (*BUSY, parsing.ParserEndedError, importing.NoRoomError)),
-    Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
+    Kind("not_ready", 503, "The service is not ready", (errors.NotReadyError, errors.StoreAwayError, CancelledError)),
+    Kind("overloaded", 503, "The service is busy", (*BUSY, errors.ParserEndedError, errors.NoRoomError)),
+    Kind("read_only", 503, "The store cannot be written", (errors.ReadOnlyStoreError,)),
     Kind("deadline_exceeded", 504, "The deadline passed", LATE),
-    Kind("storage_full", 507, "The store is full", (maps.StoreFullError,)),
+    Kind("storage_full", 507, "The store is full", (errors.StoreFullError,)),
 )
 KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})
 RAISED: Mapping[type[Exception], Kind] = MappingProxyType({error: kind for kind in TABLE for error in kind.raised_as})
@@ -137,7 +133,6 @@ INTERNAL = Problem(
     KINDS["internal"], "the service failed because of a defect; report it with the log entry that has this request id"
 )
 """The answer to a defect, without any detail of it."""
-ENDING = "the service is shutting down; send the request to another instance, or again after its restart"
 
 
 def problem_of(error: Exception) -> Problem | None:
@@ -147,7 +142,7 @@ def problem_of(error: Exception) -> Problem | None:
         return None
     match error:
         case CancelledError():
-            return Problem(kind, ENDING)
+            return Problem(kind, errors.ENDING)
         case InputError():
             fault = fault_of(error)
             return Problem(kind, str(fault), (fault,))
@@ -190,15 +185,15 @@ def _own(request: Request, error: Exception) -> Exception:
         case RequestValidationError():
             return InvalidRequestError(faults_of(error.errors()))
         case ClientDisconnect():  # while the body was received; from the server, malformed chunks look the same
-            return http.BodyBrokenError()
+            return errors.BodyBrokenError()
         case HTTPException(status_code=404):
-            return http.NotFoundError()
+            return errors.NotFoundError()
         case HTTPException(status_code=405):  # the framework names the methods of one route only
             matching = (route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE)
             methods = {method for route in matching for method in getattr(route, "methods", ())}
-            return http.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+            return errors.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
         case HTTPException():
-            return http.RefusedError()
+            return errors.RefusedError()
     return error
 
 
@@ -209,14 +204,14 @@ def _bounded(pointer: str) -> str:
 def _headers_of(error: Exception) -> Mapping[str, str]:
     """Return the headers that belong to an error."""
     match error:
-        case admission.MissingKeyError():
+        case errors.MissingKeyError():
             return {"WWW-Authenticate": 'Bearer realm="linefix"'}
-        case BodyTooLargeError() | admission.TooMuchHeldError() | admission.ShareHeldError() | http.BodyTooSlowError():
+        case BodyTooLargeError() | errors.TooMuchHeldError() | errors.ShareHeldError() | errors.BodyTooSlowError():
             return CLOSE
-        case maps.RevisionConflictError(revision=int(revision)):
+        case errors.RevisionConflictError(revision=int(revision)):
             return {"ETag": etag(revision)}
-        case http.MethodNotAllowedError(allowed=allowed):
+        case errors.MethodNotAllowedError(allowed=allowed):
             return {"Allow": ", ".join(allowed)}
-        case http.EncodingError():
+        case errors.EncodingError():
             return {"Accept-Encoding": "gzip"}
     return {}

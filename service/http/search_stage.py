@@ -10,7 +10,7 @@ from starlette.types import Receive
 
 from association import CancelledError, Deadline
 
-from ..admission.errors import DeadlinePassedError
+from ..errors import DeadlinePassedError
 from ..telemetry.traces import queued
 from .exchange import Exchange
 

@@ -14,9 +14,15 @@ import orjson
 from association import CancelledError, Deadline
 from linefix.documents.errors import Fault, InvalidRequestError
 
+from ..errors import (
+    FileTooLargeError,
+    FormatsMissingError,
+    ImportTooLateError,
+    NoRoomError,
+    ParserEndedError,
+    UnknownFormatError,
+)
 from ..parsing.child import Child, ChildBounds
-from ..parsing.errors import ParserEndedError
-from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
 from .folders import own_folder
 from .reader import Bounds, read_form_apart
 
@@ -69,7 +75,7 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
 
     Raises
     ------
-    ImportingError, InvalidRequestError
+    ServiceError, InvalidRequestError
         When it is not read.
     CancelledError
         When no caller waits for it any longer.
@@ -99,7 +105,7 @@ def _read(
             if deadline.cancelled:
                 raise CancelledError from None
             if deadline.passed:
-                raise TooLateError from None
+                raise ImportTooLateError from None
             raise _cause(ended.status, bounds) from None
     first, _, rest = said.partition(b"\n")
     head = orjson.loads(first)

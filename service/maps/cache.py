@@ -10,8 +10,8 @@ from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..errors import IndexNotReadyError
 from ..telemetry.metrics import Metrics
-from .errors import IndexNotReadyError
 
 if TYPE_CHECKING:  # the store comes without what computes
     from association import Deadline, MapIndex, MapSet

@@ -15,7 +15,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from ..database_location import file_of, make_file
-from .errors import BusyStoreError, CorruptMapError, ReadOnlyStoreError, StoreAwayError, StoreError, StoreFullError
+from ..errors import BusyStoreError, CorruptMapError, ReadOnlyStoreError, StoreAwayError, StoreError, StoreFullError
 
 BUSY_SECONDS = 5.0
 RESERVE = 1 << 17  # bytes of a file next to the database's: on a full disk, the journal of a deletion takes its room

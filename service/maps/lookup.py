@@ -14,9 +14,9 @@ from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_orient
 from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 
+from ..errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from ..parsing.child import LARGE, Child
 from .cache import CachedMap, IndexCache
-from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .store import MapStore
 from .tables import MapOutline, MapRecord
 

@@ -12,8 +12,7 @@ from sqlalchemy import URL, Connection, Row, Select, Table, bindparam, delete, f
 from sqlalchemy.exc import IntegrityError
 
 from ..database_location import file_of
-from .database import DatabaseFile, damaged, failures_as_store_errors, open_engine
-from .errors import (
+from ..errors import (
     CorruptMapError,
     ReadOnlyStoreError,
     RevisionConflictError,
@@ -21,6 +20,7 @@ from .errors import (
     StoreFullError,
     UnknownMapError,
 )
+from .database import DatabaseFile, damaged, failures_as_store_errors, open_engine
 from .tables import (
     ABSENT,
     NOTHING,

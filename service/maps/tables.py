@@ -28,8 +28,8 @@ from sqlalchemy import (
     text,
 )
 
+from ..errors import StoreAwayError
 from .database import damaged, failures_as_store_errors
-from .errors import StoreAwayError
 
 VERSION = 1  # of the tables; a change of them is a new one
 ABSENT = ""  # the sha256 of a map that was deleted

@@ -29,8 +29,8 @@ from typing import Any, TypeVar
 
 import orjson
 
+from ..errors import ParserEndedError
 from ..memory import return_large_blocks
-from .errors import ParserEndedError
 
 T = TypeVar("T")
 LARGE = 100_000  # bytes of JSON; parsing more would hold up everything else for some milliseconds

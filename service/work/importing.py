@@ -11,7 +11,7 @@ from linefix.documents.parts import InlineMap, is_oriented
 from linefix.documents.results import check_json
 from map_quality import check_map
 
-from ..admission.errors import DeadlinePassedError
+from ..errors import DeadlinePassedError
 from ..importing.bounded import ReadMap, ReadScans
 from ..maps.lookup import MapLookup, outline_of
 from .job import Done, Job

@@ -10,7 +10,7 @@ from association import Deadline
 from linefix.documents.encoding import encode
 from linefix.operations import Stopwatch
 
-from ..admission.errors import DeadlinePassedError
+from ..errors import DeadlinePassedError
 
 
 @dataclass(frozen=True, slots=True)

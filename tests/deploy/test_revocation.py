@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import yaml
 
-from service.admission.errors import UnknownKeyError
 from service.admission.key_file import Role
 from service.admission.keys import Keyring
+from service.errors import UnknownKeyError
 from tests.issuing import key_lines
 
 DEPLOY = Path(__file__).parents[2] / "deploy"

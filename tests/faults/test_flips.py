@@ -12,8 +12,8 @@ import pytest
 
 from linefix.documents import examples
 from service.database_location import database_url
+from service.errors import CorruptMapError, StoreAwayError, StoreError, UnknownMapError
 from service.maps import MapOutline, MapStore
-from service.maps.errors import CorruptMapError, StoreAwayError, StoreError, UnknownMapError
 
 NAMED = (CorruptMapError, StoreAwayError)  # the second where the flip is in the version of the tables, or their names
 BOX = MapOutline(4, 2, (-1.5, 0.0, 1.0, 1e5))

@@ -12,7 +12,7 @@ from linefix.documents.encoding import encode
 from linefix.documents.reading import read_batch
 from linefix.documents.requests import BatchItem, BatchRequest
 
-from ...admission.errors import ShareHeldError, TooMuchHeldError
+from ...errors import ShareHeldError, TooMuchHeldError
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..answers import BatchAnswer

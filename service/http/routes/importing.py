@@ -11,9 +11,8 @@ from fastapi import APIRouter, Response
 from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
 
-from ...admission.errors import DeadlinePassedError
+from ...errors import DeadlinePassedError, ImportTooLateError
 from ...importing.bounded import ReadMap, ReadScans, read_apart, read_scans_apart
-from ...importing.errors import TooLateError
 from ...importing.fields import MAP_FORM, SCANS_FORM
 from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
@@ -88,4 +87,4 @@ async def _import(exchange: Exchange, reader: Callable[..., R], work: Callable[[
         try:
             return await answer(exchange, whole(reading, job), job.deadline)
         except DeadlinePassedError:  # it is no search that has not begun
-            raise TooLateError from None
+            raise ImportTooLateError from None

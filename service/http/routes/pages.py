@@ -12,7 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
-from ..errors import NotFoundError
+from ...errors import NotFoundError
 from ..sending import JSON, PiecewiseResponse
 
 router = APIRouter(include_in_schema=False)

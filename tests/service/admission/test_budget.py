@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from service.admission.budget import ByteBudget
-from service.admission.errors import ShareHeldError, TooMuchHeldError
+from service.errors import ShareHeldError, TooMuchHeldError
 
 
 def test_all_together_hold_no_more_than_allowed() -> None:

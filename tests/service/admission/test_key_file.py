@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from cli.entry import run
-from service.admission.errors import UnknownKeyError
 from service.admission.key_file import EVERY_ROLE, KeyFileError, Role, read_keys
 from service.admission.keys import Keyring
+from service.errors import UnknownKeyError
 from tests.issuing import key_lines
 
 DIGEST = hashlib.sha256(b"sesame").hexdigest()

@@ -14,8 +14,8 @@ from starlette.requests import Request
 
 from linefix.documents import examples
 from service.admission.budget import ByteBudget
+from service.errors import BodyTooSlowError
 from service.http.bodies import BodyReceiver
-from service.http.errors import BodyTooSlowError
 from tests.running import RunningService
 
 PACKED = {"content-encoding": "gzip"}

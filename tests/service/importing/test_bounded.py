@@ -15,9 +15,9 @@ import pytest
 from PIL import Image
 
 from association import CancelledError, Deadline
+from service.errors import FileTooLargeError, FormatsMissingError, ImportTooLateError
 from service.importing import folders
 from service.importing.bounded import ReadMap, read_apart
-from service.importing.errors import FileTooLargeError, FormatsMissingError, TooLateError
 from service.importing.folders import PREFIX, remove_abandoned
 from service.importing.reader import Bounds
 from tests.running import children_of, until
@@ -59,7 +59,7 @@ def test_more_of_a_processor_than_it_may_have() -> None:
 
 
 def test_it_ends_when_nobody_waits_or_the_time_is_over() -> None:
-    with pytest.raises(TooLateError):
+    with pytest.raises(ImportTooLateError):
         read({"a.csv": SQUARE}, deadline=Deadline(time.monotonic()))
     gone = Deadline()
     Timer(0.1, gone.cancel).start()

@@ -12,8 +12,8 @@ import pytest
 
 from association import Deadline, MapIndex
 from registration import Segments
+from service.errors import IndexNotReadyError
 from service.maps import CachedMap, IndexCache
-from service.maps.errors import IndexNotReadyError
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
 

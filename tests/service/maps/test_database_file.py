@@ -10,8 +10,8 @@ import pytest
 
 from service.app import create_app
 from service.database_location import database_url
+from service.errors import StoreAwayError
 from service.maps import MapStore
-from service.maps.errors import StoreAwayError
 from service.settings import Settings
 
 from .stores import BOX

@@ -16,8 +16,8 @@ from linefix.documents.errors import TooManyError
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap
 from linefix.documents.several import MapPrefix, NamedMap
 from service.database_location import database_url
+from service.errors import BusyStoreError, IndexNotReadyError
 from service.maps import CachedMap, IndexCache, MapOutline, MapRecord, MapStore
-from service.maps.errors import BusyStoreError, IndexNotReadyError
 from service.maps.lookup import OVERHEAD, FoundMaps, MapLookup, outline_of
 from service.parsing.child import LARGE, Child
 from service.telemetry.metrics import Metrics

@@ -16,9 +16,9 @@ import psycopg
 import pytest
 
 from service.database_location import database_url
+from service.errors import BusyStoreError, UnknownMapError
 from service.maps import MapStore
 from service.maps import database as connections
-from service.maps.errors import BusyStoreError, UnknownMapError
 
 from .stores import BOX
 

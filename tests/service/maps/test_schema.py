@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from sqlalchemy import inspect, text
 
+from service.errors import CorruptMapError, StoreAwayError
 from service.maps import MapStore
-from service.maps.errors import CorruptMapError, StoreAwayError
 
 from .stores import BOX, engine_of, on_every, opened
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from service.database_location import database_url
-from service.maps import MapOutline, MapRecord, MapStore, Preconditions
-from service.maps.errors import (
+from service.errors import (
     CorruptMapError,
     ReadOnlyStoreError,
     RevisionConflictError,
     StoreFullError,
     UnknownMapError,
 )
+from service.maps import MapOutline, MapRecord, MapStore, Preconditions
 from service.maps.tables import row_of
 
 from .stores import ANY, BOX, alter, opened

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from service.maps import database as connections
-from service.maps.errors import (
+from service.errors import (
     BusyStoreError,
     CorruptMapError,
     ReadOnlyStoreError,
     StoreAwayError,
     StoreFullError,
 )
+from service.maps import database as connections
 
 from .stores import ANY, BOX, alter, engine_of, on_every, opened
 

@@ -18,8 +18,8 @@ import registration
 from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError, NotJsonError, TooManyError
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map, read_model
+from service.errors import ParserEndedError
 from service.parsing.child import NICE, Child, receive, send
-from service.parsing.errors import ParserEndedError
 
 from .bodies import LIMITS, large_map
 

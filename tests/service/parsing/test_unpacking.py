@@ -8,7 +8,7 @@ import tracemalloc
 import pytest
 
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
-from service.admission.errors import TooMuchHeldError
+from service.errors import TooMuchHeldError
 from service.parsing.unpacking import unpack as unpack_counted
 
 MEGABYTE = 1 << 20
