@@ -121,7 +121,7 @@ def test_settings_and_metrics_are_the_services() -> None:
     probes = {container[f"{kind}Probe"]["httpGet"]["path"] for kind in ("startup", "liveness", "readiness")}
     assert probes == {"/livez", "/readyz"}
     metric = manifest("HorizontalPodAutoscaler")["spec"]["metrics"][0]["pods"]["metric"]["name"]
-    assert f'"{metric}"' in (DEPLOY.parent / "service" / "app.py").read_text()
+    assert any(f'"{metric}"' in path.read_text() for path in (DEPLOY.parent / "service").rglob("*.py"))
 
 
 def test_compose_file_is_valid() -> None:
