@@ -63,7 +63,7 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
         app.router.routes.extend(module.router.routes)
     for route in app.router.routes:
         if isinstance(route, APIRoute):
-            route.operation_id = route.operation_id or route.name  # generated clients name their functions so
+            route.operation_id = route.name  # generated clients name their functions so
     handle_errors(app)
     routes = frozenset(getattr(route, "path", "") for route in app.routes)
     app.add_middleware(RequestMiddleware, services=services, routes=routes)

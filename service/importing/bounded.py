@@ -34,35 +34,26 @@ class ReaderFailedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class ReadMap:
-    """The map that was read from the files.
+class ReadFiles:
+    """The content of the files in a form.
 
     Attributes
     ----------
-    map : bytes
-        A map file of our own, JSON; not checked yet.
-    report : dict
-        The data that was read, merged, dropped and assumed.
-    picture : dict or None
-        Of the grid that the map comes from.
+    head : dict
+        `report`: the data that was read, merged, dropped and assumed. Of a map also the `picture` of the grid that it
+        comes from, or None; of a log the `count` of its scans.
+    content : bytes
+        JSON: a map file of our own, not checked yet; or an object with a list of scans.
     """
 
-    map: bytes
-    report: dict[str, Any]
-    picture: dict[str, Any] | None = None
+    head: dict[str, Any]
+    content: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class ReadScans:
-    """Scans of a log: JSON, an object with a list; the number of scans in the log; the report of reading it."""
-
-    scans: bytes
-    count: int
-    report: dict[str, Any]
-
-
-def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline) -> ReadMap:
-    """Read the map in a form; takes a while.
+def read_apart(
+    content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline, *, scans: bool = False
+) -> ReadFiles:
+    """Read the map in a form, or the scans of a log; takes a while.
 
     Parameters
     ----------
@@ -72,6 +63,8 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
         With its boundary.
     bounds : Bounds
     deadline : Deadline
+    scans : bool
+        True for a log.
 
     Raises
     ------
@@ -80,20 +73,6 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     CancelledError
         When no caller waits for it any longer.
     """
-    head, line_map = _read(content, content_type, bounds, deadline, scans=False)
-    return ReadMap(line_map, head["report"], head["picture"])
-
-
-def read_scans_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline) -> ReadScans:
-    """Read the scans of the log in a form; otherwise as `read_apart`."""
-    head, scans = _read(content, content_type, bounds, deadline, scans=True)
-    return ReadScans(scans, int(head["count"]), head["report"])
-
-
-def _read(
-    content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline, *, scans: bool
-) -> tuple[dict[str, Any], bytes]:
-    """Return the first line of the answer, and the rest, which is not parsed."""
     of_child = ChildBounds(
         bounds.memory_bytes, bounds.cpu_seconds, bounds.file_bytes, answer_bytes=bounds.file_bytes + HEAD
     )
@@ -110,7 +89,7 @@ def _read(
     first, _, rest = said.partition(b"\n")
     head = orjson.loads(first)
     _require_report(head)
-    return head, rest
+    return ReadFiles(head, rest)
 
 
 def _cause(status: int | None, bounds: Bounds) -> Exception:

@@ -1,4 +1,4 @@
-"""The program of the child of an import: it turns a form into a map and a report.
+"""The program of the child of an import: it turns a form into a map, or scans of a log, and a report.
 
 The files come from untrusted senders, and the libraries that read them are many and large. So the child has no more
 memory and time than it was given and no keys in its environment. Its answer is JSON, which is checked.
@@ -10,6 +10,7 @@ import base64
 import errno
 import io
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,15 +19,16 @@ import orjson
 
 from linefix.documents.errors import InvalidRequestError
 
+from .fields import SCANS_FIELDS, options_of, read_fields
 from .own_files import Lines, OwnFiles, read_own
-from .scans import read_scans
 
 if TYPE_CHECKING:
-    from formats import GridPicture, ImportedMap
+    from formats import GridPicture, ImportedMap, LoggedScan
 
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
 MOST_PIXELS = 2048  # of a picture, each way
 CPU_SECONDS = 20  # of a processor
+DEFAULT_SCANS = 100  # of a log, evenly spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,6 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
     """
     from formats import MAP_SUFFIXES, read_map
 
-    from .fields import options_of
     from .form import read_form
 
     form = read_form(content, content_type)
@@ -138,3 +139,44 @@ def picture_json(picture: GridPicture) -> dict[str, Any]:
         },
         "resolution": factor * picture.resolution,
     }
+
+
+def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
+    """Return a report and scans, or an error for which there is another status than 422.
+
+    Raises
+    ------
+    InvalidRequestError
+        When the form, an option or a file is wrong.
+    """
+    from formats import LOG_SUFFIXES, LogOptions, read_log, scan_json
+
+    from .form import read_form
+
+    form = read_form(content, content_type)
+    options = read_fields(form.fields, SCANS_FIELDS)
+
+    def read(files: OwnFiles) -> Lines:
+        log = read_log(files.map, LogOptions(topic=options.get("topic")))
+        chosen, count = spread(log, options.get("max_scans", DEFAULT_SCANS))
+        report = asdict(log.report)
+        report["files"] = tuple(map(files.as_sent, report["files"]))
+        return [{"report": report, "count": count}, {"scans": list(map(scan_json, chosen))}]
+
+    return read_own(form, folder, read, LOG_SUFFIXES, "log", "one log, or a bag with its metadata.yaml")
+
+
+def spread(scans: Iterable[LoggedScan], most: int) -> tuple[list[LoggedScan], int]:
+    """Return at most `most` scans that are evenly spread over a log, the first among them, and how many it has."""
+    kept: list[LoggedScan] = []
+    step, count = 1, 0
+    for number, one in enumerate(scans):
+        count = number + 1
+        if number % step:
+            continue
+        if len(kept) == most:
+            kept, step = kept[::2], 2 * step
+            if number % step:
+                continue
+        kept.append(one)
+    return kept, count

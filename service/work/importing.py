@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
@@ -12,7 +10,7 @@ from linefix.documents.results import check_json
 from map_quality import check_map
 
 from ..errors import DeadlinePassedError
-from ..importing.bounded import ReadMap, ReadScans
+from ..importing.bounded import ReadFiles
 from ..maps.lookup import MapLookup, outline_of
 from .job import Done, Job
 
@@ -36,7 +34,7 @@ def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> 
         raise CancelledError if deadline.cancelled else DeadlinePassedError from None
 
 
-def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job) -> Done:
+def answer_import(index: MapIndex, line_map: InlineMap, read: ReadFiles, job: Job) -> Done:
     """Return a map that could be put as it is, the report of its import, and its doubtful parts.
 
     Raises
@@ -46,18 +44,18 @@ def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job)
     """
     found = check_map(index, job.deadline, oriented=is_oriented(None, line_map.oriented))
     job.watch.lap("check")
-    answer: dict[str, Any] = {
-        "map": orjson.Fragment(read.map),
-        "report": read.report,
-        "picture": read.picture,
+    report = read.head["report"]
+    answer = {
+        "map": orjson.Fragment(read.content),
+        "report": report,
+        "picture": read.head["picture"],
         "check": check_json(found),
     }
-    return job.done(answer, format=read.report["format"], findings=[one.code for one in found.findings])
+    return job.done(answer, format=report["format"], findings=[one.code for one in found.findings])
 
 
-def answer_scans(read: ReadScans, job: Job) -> Done:
+def answer_scans(read: ReadFiles, job: Job) -> Done:
     """Return scans that may be sent as they are, and the report of reading them."""
     job.watch.lap("read")
-    scans = orjson.Fragment(read.scans.removeprefix(b'{"scans":').removesuffix(b"}\n"))
-    answer: dict[str, Any] = {"scans": scans, "count": read.count, "report": read.report}
-    return job.done(answer, format=read.report["format"])
+    scans, report = orjson.Fragment(read.content.removeprefix(b'{"scans":').removesuffix(b"}\n")), read.head["report"]
+    return job.done({"scans": scans, "count": int(read.head["count"]), "report": report}, format=report["format"])

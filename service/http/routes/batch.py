@@ -29,12 +29,11 @@ router = APIRouter(tags=["associate"])
 
 @router.post(
     "/v1/associate:batch",
-    operation_id="associate_batch",
     response_model=BatchAnswer,
     summary="Find several scans in one map",
     **searches(BatchRequest, {"two scans": examples.BATCH}, "unknown_map", "map_corrupt"),
 )
-async def post_batch(exchange: Searching) -> Response:
+async def associate_batch(exchange: Searching) -> Response:
     """Estimate the poses of several scans in one map, or on several; an invalid scan yields one problem item."""
     asked, items = await read(exchange, read_batch)
     job = exchange.job(asked.options.deadline_ms)

@@ -37,13 +37,12 @@ _STORED = ("unknown_map", "map_corrupt", "read_only")
 
 @router.post(
     "/v1/maps/{map_id}:analyze",
-    operation_id="analyze_map",
     tags=["maps"],
     response_model=AnalyzeAnswer,
     summary="Analyze a stored map",
     **searches(AnalyzeRequest, {"a robot": examples.ANALYZE}, *_STORED),
 )
-async def post_analyze(exchange: Searching, map_id: MapIdPath) -> Response:
+async def analyze_map(exchange: Searching, map_id: MapIdPath) -> Response:
     """Simulate scans on a grid of poses and report where localization succeeds."""
     asked = await read_request(exchange, AnalyzeRequest)
     return await _analyze(exchange, StoredMap(map_id=map_id), asked)
@@ -51,12 +50,11 @@ async def post_analyze(exchange: Searching, map_id: MapIdPath) -> Response:
 
 @router.post(
     "/v1/analyze",
-    operation_id="analyze",
     response_model=AnalyzeAnswer,
     summary="Analyze a map that comes with the request",
     **searches(MapAnalyzeRequest, {"a room": examples.ANALYZE_ROOM}, *_STORED),
 )
-async def post_analyze_inline(exchange: Searching) -> Response:
+async def analyze(exchange: Searching) -> Response:
     """Simulate scans on a grid of poses of a map in the request."""
     asked = await read_request(exchange, MapAnalyzeRequest)
     return await _analyze(exchange, asked.map, asked)
@@ -73,13 +71,12 @@ async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: Analyze
 
 @router.get(
     "/v1/maps/{map_id}:check",
-    operation_id="check_map",
     tags=["maps"],
     response_model=CheckAnswer,
     responses=problems(*EVERYWHERE, *SEARCHES, *_STORED, "invalid_request"),
     summary="Check a map",
 )
-async def get_check(
+async def check_map(
     exchange: Searching,
     map_id: MapIdPath,
     deadline_ms: Annotated[
@@ -94,13 +91,12 @@ async def get_check(
 
 @router.post(
     "/v1/maps/{map_id}:check",
-    operation_id="check_map_with_scans",
     tags=["maps"],
     response_model=CheckAnswer,
     summary="Check a map with sample scans",
     **searches(CheckRequest, {"two scans": examples.CHECK}, *_STORED),
 )
-async def post_check(exchange: Searching, map_id: MapIdPath) -> Response:
+async def check_map_with_scans(exchange: Searching, map_id: MapIdPath) -> Response:
     """Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved."""
     asked = await read_request(exchange, CheckRequest)
     return await _check(exchange, map_id, asked, exchange.job(asked.deadline_ms))
@@ -120,13 +116,12 @@ async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, jo
 
 @router.post(
     "/v1/maps/{map_id}:update",
-    operation_id="update_map",
     tags=["maps"],
     response_model=UpdateAnswer,
     summary="Propose changes of a stored map",
     **searches(UpdateRequest, {"two visits": examples.UPDATE}, *_STORED),
 )
-async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
+async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
     """Propose changes of a map that scans of several visits show; nothing is stored."""
     asked = await read_request(exchange, UpdateRequest)
     on, job = StoredMap(map_id=map_id), exchange.job(asked.deadline_ms)
@@ -141,13 +136,12 @@ async def post_update(exchange: Searching, map_id: MapIdPath) -> Response:
 
 @router.post(
     "/v1/maps:apply",
-    operation_id="apply_changes",
     tags=["maps"],
     response_model=ApplyAnswer,
     summary="Apply the accepted changes of an update",
     **searches(ApplyRequest, {"a rack is gone": examples.APPLY}),
 )
-async def post_apply(exchange: Searching) -> Response:
+async def apply_changes(exchange: Searching) -> Response:
     """Return a map with those changes of an update that are accepted; nothing is searched or stored."""
     asked = await read_request(exchange, ApplyRequest)
     return await answer_in_slot(exchange, partial(answer_apply, asked))

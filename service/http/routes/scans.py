@@ -29,13 +29,12 @@ _EXAMPLES = {
 
 @router.post(
     "/v1/associate",
-    operation_id="associate",
     tags=["associate"],
     response_model=AssociateAnswer,
     summary="Find the pose without knowing correspondences",
     **searches(AssociateRequest, _EXAMPLES, "unknown_map", "map_corrupt"),
 )
-async def post_associate(exchange: Searching) -> Response:
+async def associate(exchange: Searching) -> Response:
     """Estimate the pose of a scan in a map, or on one of several, with a verdict and its probability."""
     asked = await read_request(exchange, AssociateRequest)
     job = exchange.job(asked.options.deadline_ms)
@@ -53,13 +52,12 @@ async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
 
 @router.post(
     "/v1/register",
-    operation_id="register",
     tags=["register"],
     response_model=RegisterAnswer,
     summary="Find the pose from known correspondences",
     **searches(RegisterRequest, {"a corner": examples.REGISTER}),
 )
-async def post_register(exchange: Searching) -> Response:
+async def register(exchange: Searching) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
     asked = await read_request(exchange, RegisterRequest)
     return await answer_in_slot(exchange, partial(answer_registration, asked))
@@ -67,13 +65,12 @@ async def post_register(exchange: Searching) -> Response:
 
 @router.post(
     "/v1/vectorize",
-    operation_id="vectorize",
     tags=["vectorize"],
     response_model=VectorizeAnswer,
     summary="Find the segments in ranges or points",
     **searches(VectorizeRequest, {"a corner": examples.VECTORIZE}),
 )
-async def post_vectorize(exchange: Searching) -> Response:
+async def vectorize(exchange: Searching) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
     asked = await read_request(exchange, VectorizeRequest)
     return await answer_in_slot(exchange, partial(answer_vectorization, asked))

@@ -17,7 +17,7 @@ from PIL import Image
 from association import CancelledError, Deadline
 from service.errors import FileTooLargeError, FormatsMissingError, ImportTooLateError
 from service.importing import folders
-from service.importing.bounded import ReadMap, read_apart
+from service.importing.bounded import ReadFiles, read_apart
 from service.importing.folders import PREFIX, remove_abandoned
 from service.importing.reader import Bounds
 from tests.running import children_of, until
@@ -42,7 +42,7 @@ def _nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> object:
     assert children_of(os.getpid()) <= before
 
 
-def read(files: dict[str, bytes], bounds: Bounds = BOUNDS, deadline: Deadline | None = None) -> ReadMap:
+def read(files: dict[str, bytes], bounds: Bounds = BOUNDS, deadline: Deadline | None = None) -> ReadFiles:
     return read_apart(form(files), TYPE, bounds, deadline or Deadline())
 
 
@@ -73,7 +73,7 @@ def test_what_stands_in_the_working_folder_is_not_taken_for_the_service(
     (tmp_path / "service").mkdir()
     (tmp_path / "service" / "__init__.py").write_text("raise SystemExit(3)")
     monkeypatch.chdir(tmp_path)
-    assert read({"a.csv": SQUARE}).report["format"] == "csv"
+    assert read({"a.csv": SQUARE}).head["report"]["format"] == "csv"
 
 
 def test_where_the_extra_is_missing_it_is_named_and_no_secret_is_read(

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from linefix.documents.errors import InvalidRequestError
-from service.importing.reader import Bounds, read_files
-from service.importing.scans import read_scans
+from service.importing.reader import Bounds, read_files, read_scans
 
 from .forms import SQUARE, TYPE, YAML, form
 

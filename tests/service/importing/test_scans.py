@@ -13,8 +13,7 @@ from PIL import Image
 
 from formats import GridPicture
 from registration import RigidTransform
-from service.importing.reader import MOST_PIXELS, picture_json
-from service.importing.scans import spread
+from service.importing.reader import MOST_PIXELS, picture_json, spread
 
 
 @pytest.mark.parametrize("most", [1, 2, 3, 7, 100])
