@@ -15,6 +15,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+MOST_NAMED = 4  # wrong places in one line
+
 
 class CommandError(Exception):
     """A command ends; the message is all that is shown."""
@@ -96,11 +98,10 @@ NOTHING = Asked()
 
 
 def refused_at(faults: Sequence[tuple[str, str]], asked: Asked = NOTHING) -> RefusedError:
-    """Return the error for places that are wrong, each a pointer and a message: the first is named, others counted."""
-    pointer, message = faults[0]
-    place = asked.place(pointer)
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return RefusedError(f"{place}: {message}{more}" if place else f"{message}{more}", pointer)
+    """Return the error for places that are wrong, each a pointer and a message: the first are named, others counted."""
+    named = [f"{place}: {message}" if (place := asked.place(pointer)) else message for pointer, message in faults]
+    more = f" (and {len(named) - MOST_NAMED} more)" if len(named) > MOST_NAMED else ""
+    return RefusedError("; ".join(named[:MOST_NAMED]) + more, faults[0][0])
 
 
 @contextmanager

@@ -41,7 +41,14 @@ class NearOptions:
     near: Annotated[tuple[float, float, float] | None, option("Search only near this pose.", "X Y THETA")] = None
     radius: Annotated[float, option("Maximum distance from --near.", "METRES")] = 1.0
     angle: Annotated[float, option("Maximum rotation from --near.", "RADIANS")] = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class SeveralOptions:
+    """What is known of several maps, as options."""
+
     near_map: Annotated[Text, option("Of several maps the one of --near.", "MAP_ID")] = None
+    weight: Annotated[Texts, option("Probability of one of several maps; repeatable.", f"MAP_ID={LIKELY}")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +56,6 @@ class SearchChoice:
     """How to search, as options."""
 
     undirected: Undirected = False
-    weight: Annotated[Texts, option("Probability of one of several maps; repeatable.", f"MAP_ID={LIKELY}")] = None
     deadline_ms: Annotated[Number, option("Time limit of the search.", "MS")] = None
 
 
@@ -58,13 +64,14 @@ def locate(
     on: MapsArgument,
     scan: ScanArgument,
     window: NearOptions,
+    several: SeveralOptions,
     search: SearchChoice,
     usable: UsableOptions,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Find the pose of a scan on a map, or on one of several; the answer is that of /v1/associate."""
-    answer = ask("associate", server, _request(on, scan, window, search, usable))
+    answer = ask("associate", server, _request(on, scan, window, search, usable, several))
     if as_json:
         print_json(answer)
         return
@@ -78,18 +85,26 @@ def locate(
         print_table(("map", *columns[1:], "pose"), maps)
 
 
-def _request(on: Sequence[str], scan: str, window: NearOptions, search: SearchChoice, usable: UsableOptions) -> Json:
+def _request(
+    on: Sequence[str],
+    scan: str,
+    window: NearOptions,
+    search: SearchChoice,
+    usable: UsableOptions,
+    several: SeveralOptions | None = None,
+) -> Json:
     """Return the request of ``/v1/associate`` for the arguments and options of a command."""
+    several = several or SeveralOptions()
     body: Json = {**read_target(on), "scan": read_scan(scan), "options": asdict(usable)}
     if window.near is not None:
         pose = dict(zip(("x", "y", "theta"), window.near, strict=True))
         body["prior"] = pose | {"radius": window.radius, "angle": window.angle}
-        if window.near_map is not None:
-            body["prior"]["map_id"] = window.near_map
-    elif window.near_map is not None:
+        if several.near_map is not None:
+            body["prior"]["map_id"] = several.near_map
+    elif several.near_map is not None:
         raise WrongUseError("--near-map: found no --near, expected the pose on that map; add --near X Y THETA")
-    if search.weight:
-        body["map_weights"] = dict(map(_weight, search.weight))
+    if several.weight:
+        body["map_weights"] = dict(map(_weight, several.weight))
     if search.undirected:
         body["options"]["oriented"] = False
     if search.deadline_ms is not None:

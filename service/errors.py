@@ -121,7 +121,7 @@ class ForeignOriginError(ServiceError):
 
     message = (
         "a page of another site sent the request, which a service without keys rejects; send it from "
-        "the service's own page, or set up keys"
+        "the service's own page, name that site in LINEFIX_CORS_ORIGINS, or set up keys"
     )
 
 

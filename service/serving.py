@@ -8,6 +8,7 @@ import gc
 import math
 import os
 import signal
+import socket
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -77,9 +78,9 @@ def run(settings: Settings) -> int:
 
     from .telemetry.logs import log_config
 
-    wrong = cannot_keep_maps(settings)
+    wrong = cannot_keep_maps(settings) or cannot_listen(settings)
     if wrong is not None:
-        print(f"linefix: {wrong}; name another directory with --data-dir, or LINEFIX_DATA_DIR", file=sys.stderr)
+        print(f"linefix: {wrong}", file=sys.stderr)
         return 1
     # Before and after the server's own handlers, which it sets in `uvicorn.run` and then raises the signal again.
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
@@ -167,5 +168,21 @@ def cannot_keep_maps(settings: Settings) -> str | None:
         make_file(kept)
     except OSError as error:
         if error.errno not in AILING_DISK:
-            return f"maps cannot be stored in {kept.parent}: {error.strerror}"
+            return (
+                f"maps cannot be stored in {kept.parent}: {error.strerror}; name another directory with --data-dir, or "
+                "LINEFIX_DATA_DIR"
+            )
+    return None
+
+
+def cannot_listen(settings: Settings) -> str | None:
+    """Return why the service cannot listen at its address; None where it can. The server logs it as a defect."""
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as tried:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            tried.bind(address)
+    except OSError as error:
+        where = f"{settings.host}, port {settings.port}"
+        return f"cannot listen on {where}: {error.strerror}; name others with --host and --port"
     return None

@@ -264,8 +264,8 @@ def read_settings(arguments: Sequence[str]) -> Settings:
         raise SettingsError("; ".join(wrong)) from error
     if not settings.guarded and not settings.allow_anonymous and not is_loopback(settings.host):
         raise SettingsError(
-            f"refusing to listen on {settings.host} without keys: set LINEFIX_KEYS, or LINEFIX_ALLOW_ANONYMOUS=1 to "
-            "let anyone who reaches the port use the service"
+            f"refusing to listen on {settings.host} without keys: set LINEFIX_KEYS_FILE or LINEFIX_KEYS, or "
+            "LINEFIX_ALLOW_ANONYMOUS=1 to let anyone who reaches the port use the service"
         )
     _require_usable_keys(settings)
     _require_usable_certificate(settings)

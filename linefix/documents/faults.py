@@ -9,6 +9,7 @@ from typing import Any
 from .errors import Fault
 from .limits import MAX_FAULTS
 from .parts import TAGS
+from .strict import nearest_name
 
 _PLAIN = re.compile(r"^[A-Za-z0-9_.-]{1,40}$")
 # pydantic's own messages for these types repeat the request, or use terms of Python.
@@ -57,7 +58,11 @@ def faults_of(items: Iterable[Mapping[str, Any]]) -> list[Fault]:
 
 def _message(item: Mapping[str, Any]) -> str:
     message = _MESSAGES.get(item["type"])
-    return item["msg"] if message is None else message.format_map(item.get("ctx", {}))
+    if message is None:
+        return str(item["msg"])
+    name = str(item["loc"][-1]) if item["type"] == "extra_forbidden" else ""
+    known = nearest_name(name) if _PLAIN.match(name) else None
+    return message.format_map(item.get("ctx", {})) + (f"; a similar name is {known}" if known else "")
 
 
 def _pointer(parts: Sequence[object]) -> str:

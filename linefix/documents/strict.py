@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from difflib import get_close_matches
 from itertools import chain, islice
 from typing import Annotated, Any, Self
 
@@ -16,12 +17,24 @@ from .limits import MAX_FAULTS
 MAX_MAGNITUDE = 1e9
 MAX_FREE_BYTES = 16_384
 MAX_FREE_DEPTH = 32
+LIKE = 0.7  # of two names, 0 to 1; from there on one is taken for the other misspelt
+_names: set[str] = set()
+
+
+def nearest_name(name: str) -> str | None:
+    """Return the field of the contract with the most similar name; None where none is similar, or it is one itself."""
+    return None if name in _names else next(iter(get_close_matches(name, sorted(_names), 1, LIKE)), None)
 
 
 class Strict(BaseModel):
     """Takes numbers for numbers only, and no field that it does not know."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Note the names of the fields."""
+        _names.update(cls.model_fields)
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         """Return itself: it is frozen, and as a default it would be copied for every request that leaves it out."""

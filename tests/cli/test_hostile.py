@@ -175,3 +175,10 @@ def test_a_description_that_stands_for_too_much_is_refused(linefix: Linefix, fol
     lines = ["a0: &a0 {k: v}"] + [f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 9)}]}}" for k in range(1, 12)]
     (folder / "map.yaml").write_text("\n".join([*lines, "image: map.pgm", "resolution: 0.05", "origin: [0, 0, 0]"]))
     assert "expected at most 100000 values" in refused(linefix("map", "import", "map.yaml"), 3)
+
+
+def test_all_misspelt_names_are_listed_with_the_names_that_are_meant(linefix: Linefix, folder: Path) -> None:
+    (folder / "wrong.json").write_text(json.dumps({"segmnts": ROOM, "sgima": 0.1}))
+    line = refused(linefix("locate", "wrong.json", "scan.json"), 3)
+    for named in ("/map/segments: expected this field", "a similar name is segments", "a similar name is sigma"):
+        assert named in line

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,16 @@ def test_a_start_loads_nothing_that_waits_and_then_collects_garbage(tmp_path: Pa
 def start(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "service", "--port", str(free_port()), *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_port_in_use_ends_the_start_in_one_line(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        ended = start("--data-dir", str(tmp_path), "--port", str(port))
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
+    assert f"cannot listen on 127.0.0.1, port {port}" in line
+    assert "--port" in line
 
 
 def test_a_directory_that_cannot_be_made_ends_the_start(tmp_path: Path) -> None:
