@@ -39,7 +39,7 @@ def key(
     maps: Annotated[Text, option("Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX")] = None,
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
-    from service.admission.key_file import parse_keys
+    from service.admission.keys import parse_keys
 
     made = secrets.token_urlsafe(32)
     described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}

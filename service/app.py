@@ -114,7 +114,7 @@ async def _get_ready(services: Services) -> None:
 
 async def _prepare(services: Services) -> None:
     try:
-        await services.probe.open()
+        await services.readiness.open_store()
     except StoreError as error:
         # readyz goes on trying; meanwhile it reports the error.
         where = services.settings.url.render_as_string(hide_password=True)

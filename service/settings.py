@@ -17,7 +17,7 @@ from sqlalchemy import URL
 
 from linefix.documents.limits import Limits
 
-from .admission.key_file import KeyFileError, read_keys
+from .admission.keys import KeyFileError, read_keys
 from .database_location import database_url
 
 Finite = Annotated[float, AllowInfNan(False)]

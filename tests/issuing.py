@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 
-from service.admission.key_file import Role
+from service.admission.keys import Role
 
 ADMIN, OPEN = "sesame-that-may-do-everything", "open-sesame-to-all"
 PREFIX = "hq-"

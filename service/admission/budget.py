@@ -7,7 +7,7 @@ from collections import Counter
 from types import TracebackType
 
 from ..errors import ShareHeldError, TooMuchHeldError
-from .key_file import Holder
+from .keys import Holder
 
 
 class ByteBudget:

@@ -9,8 +9,7 @@ from linefix.documents.errors import BodyTooLargeError
 
 from ..errors import MissingRoleError, UnknownMapError
 from .gate import Gate, Ticket
-from .key_file import EVERY_ROLE, Grant, Role
-from .keys import Keyring
+from .keys import EVERY_ROLE, Grant, Keyring, Role
 from .origins import Origins
 
 GUARDED = "/v1/"

@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 from association import CancelledError, Deadline
 
 from ..errors import DeadlinePassedError, QueueFullError, ShareUsedError
-from .key_file import Holder
+from .keys import Holder
 
 T = TypeVar("T")
 HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end

@@ -1,21 +1,131 @@
-"""Identification of callers: by a key, or by an address where the service has no keys."""
+"""Identification of callers: by a key, or by an address where the service has no keys.
+
+A file of keys has their digests alone, what each may do, and which maps it sees.
+
+::
+
+    [[key]]
+    name = "robots"
+    sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
+    roles = ["associate"]
+    maps = "hq-"          # how the ids of its maps begin; left out: all of them. Empty is refused
+
+`linefix key robots` makes a key and these lines.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import ipaddress
 import logging
+import tomllib
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import SecretStr
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, StringConstraints, ValidationError
 
 from ..errors import MissingKeyError, UnknownKeyError
-from .key_file import Grant, Holder, KeyFileError, read_keys, state_of
 
 logger = logging.getLogger("linefix")
 Client = tuple[str, int] | None
+Holder = bytes | None
+"""Whose request it is: the digest of a key, or an address where the service has no keys; None where unknown."""
+
+
+class Role(StrEnum):
+    """A permission of a key; none includes another."""
+
+    READ = "read"
+    ASSOCIATE = "associate"
+    WRITE = "write"
+
+
+EVERY_ROLE = frozenset(Role)
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The permissions of a caller: its roles, and the prefix of the ids of its maps. No other maps exist for it."""
+
+    holder: Holder = None
+    roles: frozenset[Role] = EVERY_ROLE
+    maps: str = ""
+
+
+class KeyFileError(Exception):
+    """The file cannot be used; the message gives the reason, and repeats nothing of it."""
+
+
+class Key(BaseModel):
+    """A key, by its digest."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(min_length=1, max_length=64)
+    sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+    roles: frozenset[Role] = Field(EVERY_ROLE, min_length=1)
+    maps: str = Field("", min_length=1, max_length=128, pattern="^[A-Za-z0-9._-]+$")
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    key: tuple[Key, ...] = ()
+
+
+def parse_keys(text: str) -> tuple[Key, ...]:
+    """Return the keys that a file's text describes; raises `ValueError` where it is not as it has to be."""
+    return _File.model_validate(tomllib.loads(text)).key
+
+
+def read_keys(path: Path) -> dict[bytes, Grant]:
+    """Return the digests of a file's keys, with what each may do; of a directory all of its files together.
+
+    Raises
+    ------
+    KeyFileError
+        When a file cannot be read, is no TOML, or not as described above; when it names a key twice.
+    """
+    keys = [key for file in _files(path) for key in _read(file)]
+    digests = [bytes.fromhex(key.sha256) for key in keys]
+    if len(set(digests)) < len(keys):
+        raise KeyFileError(f"{path}: contains a key twice; remove one")
+    return {digest: Grant(digest, key.roles, key.maps) for digest, key in zip(digests, keys, strict=True)}
+
+
+def state_of(path: Path) -> object:
+    """Return values that differ between contents, found without reading them."""
+    try:
+        stats = [file.stat() for file in _files(path)]
+    except (KeyFileError, OSError):
+        return None
+    return [(stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for stat in stats]
+
+
+def _files(path: Path) -> list[Path]:
+    try:
+        if not path.is_dir():
+            return [path]
+        return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
+    except OSError as error:
+        raise KeyFileError(f"{path}: {error.strerror}") from None
+
+
+def _read(file: Path) -> tuple[Key, ...]:
+    try:
+        return parse_keys(file.read_text("utf-8-sig"))
+    except OSError as error:
+        raise KeyFileError(f"{file}: {error.strerror}") from None
+    except ValidationError as error:
+        # A key in the place of its digest must not appear in a log.
+        where = "; ".join(".".join(map(str, fault["loc"])) + ": " + fault["msg"] for fault in error.errors())
+        raise KeyFileError(f"{file}: {where}") from None
+    except ValueError:
+        raise KeyFileError(f"{file}: is not TOML in UTF-8") from None
 
 
 class Keyring:

@@ -17,6 +17,7 @@ from linefix.operations import Stopwatch
 from ..parsing.child import LARGE
 from ..parsing.unpacking import unpack
 from ..telemetry.traces import stage
+from .bodies import is_gzip, receive_body
 from .exchange import Exchange
 from .search_stage import unless_hung_up
 
@@ -47,18 +48,22 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
 @asynccontextmanager
 async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[bytearray]:
     """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends."""
-    services, holder = exchange.services, exchange.ticket.holder
-    async with services.bodies.receiving(exchange.request, exchange.arrived, holder, form=form) as body:
-        if exchange.request.method == "POST":
+    services, request, settings = exchange.services, exchange.request, exchange.services.settings
+    max_bytes = settings.max_body_bytes
+    gzipped = is_gzip(request, form=form, guarded=settings.guarded)
+    with services.bodies.account(exchange.ticket.holder) as account:
+        data = await receive_body(
+            request, exchange.arrived, account, max_bytes=max_bytes, timeout=settings.request_timeout_s
+        )
+        if request.method == "POST":
             services.gate.enter(exchange.ticket)
         exchange.watch = Stopwatch()
-        data = body.data
-        if body.gzipped:
-            packed, max_bytes = len(data), services.settings.max_body_bytes
-            call = partial(unpack, data, max_bytes, body.account.take)
+        if gzipped:
+            packed = data
+            call = partial(unpack, packed, max_bytes, account.take)
             data = await services.parsing.run(call, exchange.job().deadline, exchange.ticket)
-            body.data.clear()
-            body.account.take(-packed)
+            account.take(-len(packed))
+            packed.clear()
         yield data
 
 

@@ -16,8 +16,8 @@ from linefix.documents.encoding import encode
 from ..admission.entrance import GUARDED
 from ..thread_pool import Threads
 from .answers import Problem
+from .bodies import JSON
 from .problems import KINDS, MEDIA_TYPE, Kind
-from .sending import JSON
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`

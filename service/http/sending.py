@@ -17,12 +17,12 @@ from starlette.types import Receive, Scope, Send
 from association import Deadline
 
 from ..work.job import Done, Job
+from .bodies import JSON
 from .exchange import Exchange, exchange_of
 from .search_stage import in_search_slot, unless_hung_up
 
 PIECE = 32_768  # bytes; the server holds a few
 LARGE = 65_536  # bytes; smaller answers are handed over in one piece
-JSON = "application/json"
 
 
 class PiecewiseResponse(Response):

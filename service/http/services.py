@@ -7,7 +7,6 @@ from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
 from ..admission.origins import Origins
-from ..admission.readiness import Readiness
 from ..importing.reader import Bounds
 from ..maps import IndexCache, MapStore
 from ..maps.lookup import MapLookup
@@ -17,8 +16,7 @@ from ..telemetry.metrics import Metrics, RefusalTally
 from ..telemetry.traces import traces_of_environment
 from ..thread_pool import Threads
 from ..work.association import Associator
-from .bodies import BodyReceiver
-from .probe import StoreProbe
+from .readiness import Readiness
 
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
@@ -33,9 +31,9 @@ class Services:
         Slots of searches.
     parsing, indexing, importing : Gate
         Slots to parse large bodies, in another process; to index large maps; to read maps of other tools.
-    bodies : BodyReceiver
-    answers, documents : ByteBudget
-        Bytes of large answers that are being read, and of stored maps that wait to be indexed.
+    bodies, answers, documents : ByteBudget
+        Bytes of bodies that are being received or parsed, of large answers that are being read, and of stored maps that
+        wait to be indexed.
     parser : Child
         For large bodies.
     import_bounds : Bounds
@@ -50,7 +48,6 @@ class Services:
         self.limits = settings.limits()
         self.metrics = Metrics()
         self.refusals = RefusalTally(self.metrics)
-        self.readiness = Readiness()
         self.gate = Gate(searches, searches + settings.share(settings.queue))
         # The number that waits there is bounded by their bytes.
         self.parsing = Gate(1, None, "parsing", long_per_slot=0)
@@ -65,13 +62,12 @@ class Services:
         self.keyring = Keyring(settings.keys, settings.keys_file)
         origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
         self.entrance = Entrance(self.gate, self.keyring, origins, settings.max_body_bytes)
-        held = self._budget(settings.max_bodies_bytes)
-        self.bodies = BodyReceiver(settings.max_body_bytes, held, settings.request_timeout_s, guarded=settings.guarded)
+        self.bodies = self._budget(settings.max_bodies_bytes)
         self.answers = self._budget(settings.max_answers_bytes)
         self.documents = self._budget(settings.max_answers_bytes)
         self.parser = Child()
         self.store = MapStore(settings.url, may_make=settings.workers == 1, most_bytes=settings.max_stored_bytes)
-        self.probe = StoreProbe(self.store)
+        self.readiness = Readiness(self.store)
         cache = IndexCache(settings.share(settings.cache_bytes), self.metrics)
         self.lookup = MapLookup(cache, self.store, self.parser)
         self.associator = Associator(self.lookup, self.metrics)
@@ -84,7 +80,7 @@ class Services:
             ("searches_running", "Searches that run", lambda: self.gate.running),
             ("searches_waiting", "Searches that wait", lambda: self.gate.waiting),
             ("indexing_running", "Large maps that are indexed", lambda: self.indexing.running),
-            ("bodies_bytes", "Bytes of requests held", lambda: held.held),
+            ("bodies_bytes", "Bytes of requests held", lambda: self.bodies.held),
             ("map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes),
             ("map_cache_maps", "Indexed maps held", lambda: len(cache)),
         ):
@@ -111,7 +107,7 @@ class Services:
         for gate in self._gates:
             gate.close()
         self.parser.close()
-        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
+        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.readiness):
             threads.close()
         self.store.close()
         if self.traces is not None:

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from service.admission.key_file import Role
-from service.admission.keys import Keyring
+from service.admission.keys import Keyring, Role
 from service.errors import UnknownKeyError
 from tests.issuing import key_lines
 

@@ -29,9 +29,7 @@ async def livez() -> Response:
 )
 async def readyz(exchange: Admitted) -> Response:
     """Answer 200 while the kernels are loaded, the store responds, and the service is not shutting down."""
-    services = exchange.services
-    services.readiness.require_all()
-    await services.probe.check()
+    await exchange.services.readiness.require_all()
     return json_response(b'{"status":"ok"}')
 
 

@@ -13,7 +13,8 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
 from ...errors import NotFoundError
-from ..sending import JSON, PiecewiseResponse
+from ..bodies import JSON
+from ..sending import PiecewiseResponse
 
 router = APIRouter(include_in_schema=False)
 ASSETS = {

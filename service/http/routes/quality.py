@@ -21,8 +21,7 @@ from linefix.operations import Json, Steps, analysis_steps, check_steps, update_
 
 from ...maps.lookup import FoundMaps
 from ...work.association import answer_apply
-from ...work.job import Done, Job
-from ...work.steps import Operation, begin
+from ...work.job import Done, Job, Operation, begin
 from ..body_stage import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map

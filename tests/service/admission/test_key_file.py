@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from cli.entry import run
-from service.admission.key_file import EVERY_ROLE, KeyFileError, Role, read_keys
-from service.admission.keys import Keyring
+from service.admission.keys import EVERY_ROLE, KeyFileError, Keyring, Role, read_keys
 from service.errors import UnknownKeyError
 from tests.issuing import key_lines
 

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from linefix.documents import examples
 from service.admission.budget import ByteBudget
 from service.errors import BodyTooSlowError
-from service.http.bodies import BodyReceiver
+from service.http.bodies import receive_body
 from tests.running import RunningService
 
 PACKED = {"content-encoding": "gzip"}
@@ -33,8 +33,8 @@ def receive(timeout: float, pause: float = 0.0, waited: float = 0.0, worked: flo
     async def run() -> None:
         arrived = asyncio.get_running_loop().time() - waited
         request = Request({"type": "http", "method": "POST", "path": "/", "headers": []}, piece)
-        async with BodyReceiver(100, ByteBudget(1000), timeout).receiving(request, arrived) as body:
-            assert (bytes(body.data), body.gzipped) == (b"ab", False)
+        with ByteBudget(1000).account() as account:
+            assert await receive_body(request, arrived, account, max_bytes=100, timeout=timeout) == b"ab"
             await asyncio.sleep(worked)
             raise ZeroDivisionError
 

@@ -12,7 +12,7 @@ import pytest
 
 from linefix.documents import examples
 from service.admission.entrance import GUARDED
-from service.admission.key_file import Role
+from service.admission.keys import Role
 from tests.issuing import ADMIN, PREFIX, bearer, key_lines, key_of
 from tests.running import RunningService, until
 

@@ -9,8 +9,8 @@ import pytest
 from association import CancelledError, Deadline, MapIndex
 from linefix.documents.analysis import AnalyzeRequest
 from linefix.operations import analysis_steps
-from service.work import steps
-from service.work.steps import Work
+from service.work import job
+from service.work.job import Work
 from simulation import rectangle_room
 
 BOX = [[-2.5, -1.5, -2.5, 0.0], [-2.5, 0.0, -1.0, 0.0], [-1.0, 0.0, -1.0, -1.5], [-1.0, -1.5, -2.5, -1.5]]
@@ -20,7 +20,7 @@ ASKED = AnalyzeRequest.model_validate({"spacing": 2.5, "drive": 2.0, "landmark":
 @pytest.fixture
 def short_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     """End each turn after one step."""
-    monkeypatch.setattr(steps, "TURN_SECONDS", 0.0)
+    monkeypatch.setattr(job, "TURN_SECONDS", 0.0)
 
 
 def analysis(deadline: Deadline) -> Work:
@@ -50,7 +50,7 @@ def test_others_have_their_turn_within_a_drive() -> None:
 def test_turns_do_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = []
     for seconds in (0.0, 600.0):
-        monkeypatch.setattr(steps, "TURN_SECONDS", seconds)
+        monkeypatch.setattr(job, "TURN_SECONDS", seconds)
         work = analysis(Deadline())
         while work.take_turn():
             pass
