@@ -89,7 +89,7 @@ def import_map(
     rows = [*report_rows(answer), *check_rows(answer["check"])]
     if update and log is not None:
         updated = update_by_drive(answer["map"], log)
-        rows += update_rows(updated)
+        rows += update_rows(updated, answer["map"])
         if picture is not None:
             draw_changes(answer["map"], updated, picture)
         answer = {**answer, "map": updated.pop("map"), "update": updated}

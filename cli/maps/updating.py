@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 from typing import TYPE_CHECKING, Annotated
 
 from ..asking import ask, whole_map
@@ -76,7 +77,7 @@ def update(
     if as_json:
         print_json(answer)
     else:
-        print_rows(list(update_rows(answer)))
+        print_rows(list(update_rows(answer, whole_map(target, server), len(visits))))
 
 
 def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
@@ -131,23 +132,24 @@ def update_by_drive(document: Json, log: Path) -> Json:
     return ask("update", None, document, _request_of(halves, ChangeOptions()))
 
 
-def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
-    """Yield a proposal as text for people."""
+def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str, str]]:
+    """Yield a proposal of changes to a map, by so many visits, as text for people."""
     for one in answer["refused_visits"]:
         yield "visit", f"{one['visit']} gives no evidence: {one['message']}"
     for number, one in enumerate(answer["changes"]):
         told = one["evidence"]
         kept = "" if one["accepted"] else ", not accepted"
-        old = f" segments {', '.join(map(str, one['segments'][:8]))}{', ...' * (len(one['segments']) > 8)}"
-        new = f" {len(one['new'])} new"
+        before, after = [old["segments"][k] for k in one["segments"]], [new["segment"] for new in one["new"]]
+        x, y = (fmean(row[k] for row in (*before, *after) for k in (axis, axis + 2)) for axis in (0, 1))
+        which = f" (segments {', '.join(map(str, one['segments'][:8]))}{', ...' * (len(before) > 8)})" * bool(before)
         yield (
             f"change {number}",
-            f"{one['code']}{old * bool(one['segments'])}{new * bool(one['new'])}: confidence {one['confidence']:.4f}, "
-            f"{told['poses']} poses, {told['visits']} visits, {told['beams_through']} beams through, "
-            f"{told['beams_on']} on{kept}",
+            f"{one['code']} near ({x:.1f}, {y:.1f}): {_metres(before)}{which} before, {_metres(after)} after; "
+            f"confidence {one['confidence']:.4f}, {told['poses']} poses, {told['visits']} visits, "
+            f"{told['beams_through']} beams through, {told['beams_on']} on{kept}",
         )
     if not answer["changes"]:
-        yield "change", "none"
+        yield "change", "none" + ("; a change needs logs of two visits" if visits < 2 else "")
     sharp = answer["sharpened"]["sigma"]
     if sharp:
         yield "sharper", f"{len(sharp)} walls at better positions, sigma {1e3 * median(sharp):.1f} mm (median)"
@@ -155,6 +157,11 @@ def update_rows(answer: Json) -> Iterator[tuple[str, str]]:
         yield name, f"{of['usable_before']} of {of['scans']} usable before, {of['usable_after']} after{more}"
     if not answer["complete"]:
         yield "note", "the time limit ended the update; changes that were not verified are not proposed"
+
+
+def _metres(rows: Sequence[Sequence[float]]) -> str:
+    """Return the length of segments."""
+    return f"{sum(math.dist(row[:2], row[2:]) for row in rows):.2f} m"
 
 
 def draw_changes(old: Json, answer: Json, picture: Path) -> None:

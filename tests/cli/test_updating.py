@@ -58,13 +58,19 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
         "map", "update", "hall.json", "monday.log", "tuesday.log", "--out", "new.json", "--picture", "changes.png"
     )
     rows = dict(row.split("  ", 1) for row in told.out.splitlines())
-    assert rows["change 0"].strip().startswith("removed segments 12, 13, 14, 15: confidence 0.9")
+    assert rows["change 0"].strip().startswith("removed near (")
+    assert "(segments 12, 13, 14, 15) before, 0.00 m after; confidence 0.9" in rows["change 0"]
     assert "2 visits" in rows["change 0"]
     assert "of 16 usable before" in rows["scans"]
     new = json.loads((folder / "new.json").read_text())
     assert new["segments"] == TODAY.endpoints.tolist()
     assert (new["sigma"], new["meta"]) == (0.005, "A 3")
     assert REMOVED in colours_of(folder / "changes.png")
+
+
+def test_one_visit_shows_no_change_and_says_so(linefix: Linefix) -> None:
+    told = linefix.done("map", "update", "hall.json", "monday.log")
+    assert "change     none; a change needs logs of two visits" in told.out.splitlines()
 
 
 def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: RunningService) -> None:
