@@ -139,7 +139,6 @@ class Settings(BaseSettings):
         9.0,
         gt=0.0,
         le=3600.0,
-        allow_inf_nan=False,
         description="seconds for the body of a request, and between two requests of a connection",
     )
     drain_s: Finite = Field(

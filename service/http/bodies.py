@@ -1,4 +1,4 @@
-"""Receive a request's body, bounded in bytes and in time; drop the rest of a body that no route reads.
+"""Receive a request's body, bounded in bytes and in time, and unpack it; drop the rest of a body that no route reads.
 
 A server that closes a connection with bytes unread has the system reset it, and the reset overtakes the answer: the
 client sees a broken connection in place of a refusal.
@@ -7,19 +7,22 @@ client sees a broken connection in place of a refusal.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+import zlib
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from starlette.requests import Request
 from starlette.types import Message, Receive
 
-from linefix.documents.errors import BodyTooLargeError
+from linefix.documents.errors import BodyTooLargeError, NotJsonError
 
 from ..admission.budget import ByteAccount
 from ..errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"
 DROP_SECONDS = 3.0  # s that the rest of a body may take to come
+_PIECE = 1 << 20  # bytes that are unpacked at a time
+_GZIP = zlib.MAX_WBITS | 16
 
 
 async def receive_body(
@@ -57,6 +60,49 @@ async def receive_body(
     except TimeoutError:
         raise BodyTooSlowError(timeout) from None
     return data
+
+
+def unpack(packed: bytes | bytearray, max_bytes: int, take: Callable[[int], None]) -> bytearray:
+    """Return what one gzip member holds; takes a while for a large one.
+
+    Parameters
+    ----------
+    packed : bytes or bytearray
+    max_bytes : int
+        That it may unpack to; more is never held.
+    take : callable
+        Called with the number of further bytes, piece by piece; an exception from it ends this.
+
+    Raises
+    ------
+    NotJsonError
+        When it is not gzip, is cut short, or something follows it.
+    BodyTooLargeError
+        When it unpacks to more than is allowed.
+    """
+    unpacked = bytearray()
+    stream = zlib.decompressobj(wbits=_GZIP)
+    whole = memoryview(packed)
+    try:
+        for begin in range(0, len(whole), _PIECE):
+            rest: bytes | memoryview = whole[begin : begin + _PIECE]
+            while rest and not stream.eof:
+                piece = stream.decompress(rest, min(_PIECE, max_bytes + 1 - len(unpacked)))
+                take(len(piece))
+                unpacked += piece
+                rest = stream.unconsumed_tail
+                if len(unpacked) > max_bytes:
+                    raise BodyTooLargeError(max_bytes)
+            if stream.eof and (stream.unused_data or begin + _PIECE < len(whole)):
+                raise NotJsonError("more bytes follow the gzip body; expected a single gzip member")
+        unpacked += stream.flush()
+    except zlib.error:
+        raise NotJsonError(
+            "the body is not gzip, but Content-Encoding states it; send gzip, or omit the header"
+        ) from None
+    if not stream.eof:
+        raise NotJsonError("the gzip body is cut short; send it completely")
+    return unpacked
 
 
 class Intake:

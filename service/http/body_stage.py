@@ -15,9 +15,8 @@ from linefix.documents.reading import read_model
 from linefix.operations import Stopwatch
 
 from ..parsing.child import LARGE
-from ..parsing.unpacking import unpack
 from ..telemetry.traces import stage
-from .bodies import is_gzip, receive_body
+from .bodies import is_gzip, receive_body, unpack
 from .exchange import Exchange
 from .search_stage import unless_hung_up
 

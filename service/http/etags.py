@@ -44,11 +44,6 @@ def demands_of(request: Request) -> Preconditions:
     )
 
 
-def is_conditional(request: Request) -> bool:
-    """Return whether a reader names the revisions that it has."""
-    return "if-none-match" in request.headers
-
-
 def is_unchanged(request: Request, revision: int) -> bool:
     """Return whether a reader has this revision already."""
     none_match = _joined(request, "if-none-match")

@@ -12,12 +12,13 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from linefix.documents.encoding import encode
+from linefix.documents.errors import Fault
 
 from ..admission.entrance import GUARDED
 from ..thread_pool import Threads
-from .answers import Problem
+from . import answers
 from .bodies import JSON
-from .problems import KINDS, MEDIA_TYPE, Kind
+from .problems import KINDS, MEDIA_TYPE, Kind, Problem
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
@@ -86,19 +87,9 @@ def takes(model: type[BaseModel], examples: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _example(kind: Kind) -> dict[str, Any]:
-    example: dict[str, Any] = {
-        "type": f"urn:linefix:problem:{kind.code}",
-        "title": kind.title,
-        "status": kind.status,
-        "detail": kind.title,
-        "code": kind.code,
-        "request_id": "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
-    }
-    if kind.code == "invalid_request":
-        example["detail"] = "/scan/segments/3: expected 4 numbers, found 3"
-        example["errors"] = [{"pointer": "/scan/segments/3", "message": "expected 4 numbers, found 3"}]
-    return example
+def _example(kind: Kind) -> dict[str, object]:
+    faults = [Fault("/scan/segments/3", "expected 4 numbers, found 3")] if kind.code == "invalid_request" else []
+    return Problem(kind, kind.title, faults).as_json("0f1e2d3c4b5a69788796a5b4c3d2e1f0")
 
 
 def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
@@ -107,7 +98,7 @@ def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
         title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
     )
     _, asked = models_json_schema([(model, "validation") for model in _TAKEN.values()], ref_template=_REF)
-    _, failed = models_json_schema([(Problem, "serialization")], ref_template=_REF)
+    _, failed = models_json_schema([(answers.Problem, "serialization")], ref_template=_REF)
     components = document.setdefault("components", {})
     schemas = components.setdefault("schemas", {})
     schemas |= asked["$defs"] | failed["$defs"]

@@ -63,6 +63,7 @@ NOT_HTTP = (errors.NotHttpError, errors.ControlCharacterError, errors.BodyBroken
 STRANGE = (errors.UnknownKeyError, errors.ForeignHostError, errors.ForeignOriginError)
 WRONG_KIND = (errors.MediaTypeError, errors.EncodingError, errors.FormatsMissingError, errors.UnknownFormatError)
 BUSY = (errors.QueueFullError, errors.TooMuchHeldError, errors.BusyStoreError)
+SHARES = (errors.ShareUsedError, errors.ShareHeldError)
 LATE = (errors.DeadlinePassedError, TooLateError, errors.IndexNotReadyError, errors.ImportTooLateError)
 TOO_LARGE = (TooManyError, BodyTooLargeError, errors.FileTooLargeError)
 TABLE = (
@@ -79,12 +80,7 @@ TABLE = (
     Kind("too_large", 413, "The request exceeds a limit", TOO_LARGE),
     Kind("unsupported_media_type", 415, "The media type is not supported", WRONG_KIND),
     Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, errors.RefusedError)),
-    Kind(
-        "rate_limited",
-        429,
-        "This key exceeds its part of the queue",
-        (errors.ShareUsedError, errors.ShareHeldError),
-    ),
+    Kind("rate_limited", 429, "This key exceeds its part of the queue", SHARES),
     Kind("internal", 500, "The service has a defect"),
     Kind("not_ready", 503, "The service is not ready", (errors.NotReadyError, errors.StoreAwayError, CancelledError)),
     Kind("overloaded", 503, "The service is busy", (*BUSY, errors.ParserEndedError, errors.NoRoomError)),

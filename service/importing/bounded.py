@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import orjson
@@ -76,16 +74,18 @@ def read_apart(
     of_child = ChildBounds(
         bounds.memory_bytes, bounds.cpu_seconds, bounds.file_bytes, answer_bytes=bounds.file_bytes + HEAD
     )
-    with _folder() as folder, closing(Child(of_child, folder)) as child:
-        asked = content, content_type, str(folder), bounds, scans
-        try:
+    try:
+        with own_folder() as folder, closing(Child(of_child, folder)) as child:
+            asked = content, content_type, str(folder), bounds, scans
             said = child.call(read_form_apart, *asked, ends=lambda: deadline.cancelled or deadline.passed)
-        except ParserEndedError as ended:
-            if deadline.cancelled:
-                raise CancelledError from None
-            if deadline.passed:
-                raise ImportTooLateError from None
-            raise _cause(ended.status, bounds) from None
+    except OSError as error:
+        raise NoRoomError from error
+    except ParserEndedError as ended:
+        if deadline.cancelled:
+            raise CancelledError from None
+        if deadline.passed:
+            raise ImportTooLateError from None
+        raise _cause(ended.status, bounds) from None
     first, _, rest = said.partition(b"\n")
     head = orjson.loads(first)
     _require_report(head)
@@ -123,13 +123,3 @@ def _require_report(told: dict[str, Any]) -> None:
         case {"failed": str(kind)}:
             raise ReaderFailedError(kind)
     raise ReaderFailedError("the output has neither a report nor a known error")
-
-
-@contextmanager
-def _folder() -> Iterator[Path]:
-    """Give a folder for the files, which goes with all that is in it."""
-    try:
-        with own_folder() as folder:
-            yield folder
-    except OSError as error:
-        raise NoRoomError from error

@@ -122,27 +122,18 @@ def _count(values: Sequence[str]) -> int:
     return int(text)
 
 
-def _said(what: str) -> dict[str, Any]:
-    return {"type": "string", "description": what}
+def _said(what: str, *choices: str) -> dict[str, Any]:
+    return {"enum": [*choices], "description": what} if choices else {"type": "string", "description": what}
 
 
 FIELDS: Known = {
     "units": (_units, _said("of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit")),
     "layers": (_patterns, _said("patterns such as *WALL*, comma separated")),
     POINT: (_places, _said("a free place, `x y` in metres; may be repeated")),
-    "drawn": (
-        _text,
-        {
-            "enum": ["faces", "centres"],
-            "description": "whether lines of a drawing are faces or centre lines of walls",
-        },
-    ),
+    "drawn": (_text, _said("whether lines of a drawing are faces or centre lines of walls", "faces", "centres")),
     "thickness": (_number, _said("of walls drawn as centre lines, metres")),
-    "directions": (
-        _text,
-        {"enum": ["drawn", "none"], "description": "whether free space lies on the left of the lines"},
-    ),
-    "local_metres": (_truth, {"enum": ["true", "false"], "description": "whether a GeoJSON is in metres"}),
+    "directions": (_text, _said("whether free space lies on the left of the lines", "drawn", "none")),
+    "local_metres": (_truth, _said("whether a GeoJSON is in metres", "true", "false")),
     "topic": (_text, _said("of the grid in a bag")),
     "unknown": (
         _unknown,

@@ -52,9 +52,7 @@ class Form:
         self._require_room()
         value = part.value or b""
         if len(value) > MOST_FIELD_BYTES:
-            raise InvalidRequestError(
-                [Fault("", f"expected fields of at most {MOST_FIELD_BYTES} bytes, found {len(value)}")]
-            )
+            raise _refused(f"expected fields of at most {MOST_FIELD_BYTES} bytes, found {len(value)}")
         self.fields.setdefault(_decoded(part.field_name or b""), []).append(_decoded(value))
 
     def _require_room(self) -> None:

@@ -2,15 +2,6 @@
 
 from .cache import CachedMap, IndexCache
 from .store import MapStore, Preconditions
-from .tables import MapOutline, MapPage, MapRecord, StoredMap
+from .tables import MapOutline, MapRecord
 
-__all__ = [
-    "CachedMap",
-    "IndexCache",
-    "MapOutline",
-    "MapPage",
-    "MapRecord",
-    "MapStore",
-    "Preconditions",
-    "StoredMap",
-]
+__all__ = ["CachedMap", "IndexCache", "MapOutline", "MapRecord", "MapStore", "Preconditions"]

@@ -74,13 +74,12 @@ class IndexCache:
                 self._metrics.cache_hits.inc()
                 return found
             promise = self._building.get(key)
-            mine = promise is None
             if promise is None:
-                promise = self._building[key] = Future()
-        if not mine:
+                own = self._building[key] = Future()
+        if promise is not None:
             return _awaited(promise, deadline)
         self._metrics.cache_misses.inc()
-        return self._build(key, promise, build)
+        return self._build(key, own, build)
 
     def make_room(self, size: int) -> None:
         """Drop the maps used the longest ago until so much more would fit; before something large is built."""

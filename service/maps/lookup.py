@@ -178,33 +178,30 @@ class MapLookup:
         return page.maps
 
     def _index(self, found: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMap:
-        parts: dict[str | None, MapPart] = {}
+        parts: dict[str, MapPart] = {}
         frames: dict[str | None, str] = {}
         for number, (name, one) in enumerate(found.maps.items()):
             if number and deadline.passed:
                 raise IndexNotReadyError
             document = self.document(one, found.document)
             path = "map." if name is None else f"maps.{number}."
-            parts[name] = part_of(document, oriented=is_oriented(oriented, document.oriented), path=path)
+            parts[name or ""] = part_of(document, oriented=is_oriented(oriented, document.oriented), path=path)
             frames[name] = document.frame_id
             frames.setdefault(None, document.frame_id)
         # The old goes before the new comes: two of the largest at once would take too much.
         each = 1 if all(part.oriented for part in parts.values()) else 2
         count = sum(each * len(part.segments) + len(part.points) for part in parts.values())
-        single = parts.get(None)
+        single = parts.get("")
         self._cache.make_room(INDEXED_BYTES * count * (1 if single is not None else 2))
-        if single is None:
-            maps: MapIndex | MapSet = _together(parts, deadline)
-        else:
+        maps: MapIndex | MapSet
+        if single is not None:
             maps = MapIndex.build(single.segments, single.sigma, oriented=single.oriented, points=single.points)
+        else:
+            try:
+                maps = MapSet(parts, deadline)
+            except IndexingEndedError:
+                raise IndexNotReadyError from None
         return CachedMap(maps, frames, maps.nbytes + OVERHEAD)
-
-
-def _together(parts: Mapping[str | None, MapPart], deadline: Deadline) -> MapSet:
-    try:
-        return MapSet({str(name): part for name, part in parts.items()}, deadline)
-    except IndexingEndedError:
-        raise IndexNotReadyError from None
 
 
 def _count(one: InlineMap | MapRecord, kind: str) -> int:

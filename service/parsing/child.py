@@ -96,11 +96,6 @@ class Child:
         """The process's id, None while there is none."""
         return None if self._process is None else self._process.pid
 
-    def start(self) -> None:
-        """Start the process, if there is none."""
-        with self._lock:
-            self._started()
-
     def call(self, function: Callable[..., T], *arguments: Any, ends: Callable[[], bool] = lambda: False) -> T:
         """Return the result of a module's function there, or raise its exception.
 

@@ -81,10 +81,6 @@ class Metrics:
         self.requests.labels(route, name, str(status)).inc()
         self.request_seconds.labels(route).observe(seconds)
 
-    def count_refusals(self, route: str, method: str, status: int, count: int) -> None:
-        """Count requests that were refused before the application saw them."""
-        self.requests.labels(route, method, str(status)).inc(count)
-
     def observe_association(self, status: str, usable: bool, seconds: float, hypotheses: int) -> None:
         """Count one answered search."""
         self.verdicts.labels(status, str(usable).lower()).inc()
@@ -138,7 +134,7 @@ class RefusalTally:
     def report(self) -> None:
         """Count and log the refusals since the last time."""
         for (route, method, code, status), count in self._refused.items():
-            self._metrics.count_refusals(route, method, status, count)
+            self._metrics.requests.labels(route, method, str(status)).inc(count)
             logger.warning("refused", extra={"route": route, "code": code, "count": count})
         self._refused.clear()
 

@@ -15,7 +15,7 @@ from linefix.documents.reading import read_map
 from ...maps.lookup import outline_of
 from ..answers import MapList, MapSummaryAnswer
 from ..body_stage import read
-from ..etags import demands_of, etag, is_conditional, is_unchanged
+from ..etags import demands_of, etag, is_unchanged
 from ..exchange import Admitted
 from ..map_stage import ask_store
 from ..openapi import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
@@ -82,7 +82,7 @@ async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
 async def get_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Return a map as it was stored."""
     services = exchange.services
-    if is_conditional(exchange.request):
+    if "if-none-match" in exchange.request.headers:
         record = await ask_store(services, partial(services.store.record, map_id))
         if is_unchanged(exchange.request, record.revision):
             return Response(status_code=304, headers={"ETag": etag(record.revision)})

@@ -9,7 +9,7 @@ import pytest
 
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
 from service.errors import TooMuchHeldError
-from service.parsing.unpacking import unpack as unpack_counted
+from service.http.bodies import unpack as unpack_counted
 
 MEGABYTE = 1 << 20
 
