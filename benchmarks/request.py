@@ -34,7 +34,7 @@ from service.maps.lookup import FoundMaps, MapLookup
 from service.parsing.child import Child
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
-from service.work.association import Associator
+from service.work.results import Associator
 
 from .load import family
 from .open_loop import request_of, without_pause

@@ -15,7 +15,7 @@ from ..settings import Settings
 from ..telemetry.metrics import Metrics, RefusalTally
 from ..telemetry.traces import traces_of_environment
 from ..thread_pool import Threads
-from ..work.association import Associator
+from ..work.results import Associator
 from .readiness import Readiness
 
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded

@@ -13,8 +13,8 @@ from linefix.documents.reading import read_batch
 from linefix.documents.requests import BatchItem, BatchRequest
 
 from ...errors import ShareHeldError, TooMuchHeldError
-from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
+from ...work.results import BatchResult, batch_done
 from ..answers import BatchAnswer
 from ..body_stage import read
 from ..exchange import Exchange, Searching

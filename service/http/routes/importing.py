@@ -14,8 +14,8 @@ from linefix.documents.reading import read_model
 from ...errors import DeadlinePassedError, ImportTooLateError
 from ...importing.bounded import ReadFiles, read_apart
 from ...importing.fields import MAP_FORM, SCANS_FORM
-from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
+from ...work.results import answer_import, answer_scans, index_import
 from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM
 from ..body_stage import parse, receive

@@ -20,8 +20,8 @@ from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, U
 from linefix.operations import Json, Steps, analysis_steps, check_steps, update_steps
 
 from ...maps.lookup import FoundMaps
-from ...work.association import answer_apply
 from ...work.job import Done, Job, Operation, begin
+from ...work.results import answer_apply
 from ..body_stage import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map

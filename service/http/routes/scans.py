@@ -10,8 +10,8 @@ from linefix.documents import examples
 from linefix.documents.replies import AssociateAnswer, RegisterAnswer, VectorizeAnswer
 from linefix.documents.requests import AssociateRequest, RegisterRequest, VectorizeRequest
 
-from ...work.association import answer_registration, answer_vectorization
 from ...work.job import Done, Job
+from ...work.results import answer_registration, answer_vectorization
 from ..body_stage import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps

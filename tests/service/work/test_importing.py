@@ -12,7 +12,7 @@ from association import CancelledError, Deadline
 from service.app import create_app
 from service.errors import DeadlinePassedError
 from service.settings import Settings
-from service.work.importing import index_import
+from service.work.results import index_import
 from tests.service.maps.test_lookup import Lookup, inline
 
 

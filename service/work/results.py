@@ -1,4 +1,4 @@
-"""Associations: where in a map a scan was taken."""
+"""Results of requests: associations, batches, registrations, vectorizations, applied changes, imports of files."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from dataclasses import dataclass
 
 import orjson
 
-from association import Deadline
+from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from linefix.documents.encoding import encode, encode_list
-from linefix.documents.parts import SearchOptions
+from linefix.documents.parts import InlineMap, SearchOptions, is_oriented
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
+from linefix.documents.results import check_json
 from linefix.documents.updates import ApplyRequest
 from linefix.operations import Json, Stopwatch, Target, applied, find, registered, vectorized
+from map_quality import check_map
 
+from ..errors import DeadlinePassedError
+from ..importing.bounded import ReadFiles
 from ..maps import CachedMap
-from ..maps.lookup import FoundMaps, MapLookup
+from ..maps.lookup import FoundMaps, MapLookup, outline_of
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
 from .job import Done, Job
@@ -125,3 +129,49 @@ def answer_apply(asked: ApplyRequest, job: Job) -> Done:
     """Return a map with the changes that are accepted; raises `InputError` where it could not be put."""
     accepted = sum(one.accepted for one in asked.changes)
     return job.done({**applied(asked, job.watch), "client_ref": asked.client_ref}, changes=accepted)
+
+
+def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> MapIndex:
+    """Index an imported map, with the deadline; the index is not cached, since no search uses it.
+
+    Raises
+    ------
+    InvalidSegmentsError, InvalidMapError
+        When it could not be put.
+    DeadlinePassedError
+        When the deadline has passed.
+    CancelledError
+        When the client has gone.
+    """
+    outline_of(line_map)
+    try:
+        return lookup.index_once(line_map, deadline)
+    except IndexingEndedError:
+        raise CancelledError if deadline.cancelled else DeadlinePassedError from None
+
+
+def answer_import(index: MapIndex, line_map: InlineMap, read: ReadFiles, job: Job) -> Done:
+    """Return a map that could be put as it is, the report of its import, and its doubtful parts.
+
+    Raises
+    ------
+    CancelledError
+        When the client has gone.
+    """
+    found = check_map(index, job.deadline, oriented=is_oriented(None, line_map.oriented))
+    job.watch.lap("check")
+    report = read.head["report"]
+    answer = {
+        "map": orjson.Fragment(read.content),
+        "report": report,
+        "picture": read.head["picture"],
+        "check": check_json(found),
+    }
+    return job.done(answer, format=report["format"], findings=[one.code for one in found.findings])
+
+
+def answer_scans(read: ReadFiles, job: Job) -> Done:
+    """Return scans that may be sent as they are, and the report of reading them."""
+    job.watch.lap("read")
+    scans, report = orjson.Fragment(read.content.removeprefix(b'{"scans":').removesuffix(b"}\n")), read.head["report"]
+    return job.done({"scans": scans, "count": int(read.head["count"]), "report": report}, format=report["format"])
