@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
+OF_SCANS = ("laser", "ranges", "views")  # fields that no map has
 RECORDINGS = ("rosbag1", "rosbag2", "mcap")
 CHOICE = ("grids", "topic", "costmap", "orientation")  # codes of notes of the grid that was read
 IN_BAGS = "metadata.yaml"  # a file in the folder of each bag of ROS 2
@@ -65,6 +66,8 @@ def read_map_file(name: str) -> Json:
         return {"segments": told}
     if not isinstance(told, dict):
         raise RefusedError(f'{name}: expected {{"segments": [[x1, y1, x2, y2], ...]}}')
+    if not told.keys().isdisjoint(OF_SCANS) and "segments" not in told:
+        raise RefusedError(f"{name}: is a scan; the map comes first")
     return told
 
 

@@ -40,7 +40,7 @@ LIKELY = "PROBABILITY"
 Server = Annotated[Text, option("Use the service at this URL; the key is read from LINEFIX_KEY.", "URL", "--server")]
 AsJson = Annotated[bool, flag("Print the complete answer as JSON.", "--json")]
 MapArgument = Annotated[str, argument(f"{A_MAP} or the id of a stored map.", "MAP")]
-MapsArgument = Annotated[list[str], argument(f"{A_MAP} a folder of these; or the id of a stored map.", "MAP...")]
+MapsArgument = Annotated[list[str], argument(f"{A_MAP} a folder of these; or the id of a stored map.", "MAP")]
 ScanArgument = Annotated[
     str, argument("A scan file: JSON with segments, points, laser or views; or a LaserScan; - reads stdin.", "SCAN")
 ]

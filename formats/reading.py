@@ -42,6 +42,7 @@ MAP_SUFFIXES = (".yaml", ".yml", *DRAWINGS, *BAG_SUFFIXES)
 TEXTS = (".log", ".clf", ".carmen")
 LOG_SUFFIXES = (*BAG_SUFFIXES, *TEXTS)
 """Of files that `read_log` reads."""
+PICTURES = (".png", ".pgm", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".gif", ".webp")
 DEFAULT_LOG_OPTIONS = LogOptions()
 
 
@@ -115,6 +116,10 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPT
 
 
 def _unsupported(file: Path, what: str, suffixes: tuple[str, ...]) -> UnsupportedFormatError:
+    if file.suffix.lower() in PICTURES:
+        return UnsupportedFormatError(
+            "is a picture, which has no scale of its own; give the YAML file of the map", argument=name_of(file)
+        )
     known = ", ".join(suffixes)
     return UnsupportedFormatError(
         f"expected {what} that ends in one of {known}, found {ending_of(file)}", argument=name_of(file)

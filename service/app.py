@@ -92,7 +92,7 @@ async def _lifespan(app: FastAPI, services: Services, started: Started | None) -
     following = asyncio.create_task(_follow(services.key_threads, services.keyring.refresh))
     if started is not None:
         started(services)
-    if services.settings.workers > 1 or is_complete():  # no request comes to a process that has to refuse it
+    if is_complete():  # no request comes to a process that has to refuse it; a first start answers probes meanwhile
         await getting_ready
     try:
         yield

@@ -57,7 +57,7 @@ class LogOptions:
 @grouped
 def update(
     on: MapArgument,
-    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG...")],
+    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")],
     *,
     out: OutMap = None,
     picture: Picture = None,

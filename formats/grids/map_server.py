@@ -93,6 +93,11 @@ def read_grid(
         raise IncompleteFileError(
             "there is no such file among those of the request; add it", argument=shown(told.image)
         )
+    if not picture.exists():
+        raise IncompleteFileError(
+            f"names the picture {shown(told.image)}, but there is no such file beside it; add it",
+            argument=name_of(path),
+        )
     pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map

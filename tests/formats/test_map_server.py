@@ -171,7 +171,11 @@ def test_the_report_counts_what_it_read(tmp_path: Path) -> None:
         (YAML.replace("0.05", "-1"), MalformedFileError, "expected resolution to be a number from 0.001 to 10"),
         (YAML.replace("0.05", ".nan"), MalformedFileError, "expected resolution"),
         (YAML.replace("[{origin}]", "[0, .inf, 0]"), MalformedFileError, "expected origin"),
-        (YAML.replace("{image}", "nothing.pgm"), IncompleteFileError, "nothing.pgm: there is no such file"),
+        (
+            YAML.replace("{image}", "nothing.pgm"),
+            IncompleteFileError,
+            "names the picture nothing.pgm, but there is no such file",
+        ),
         (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is not a picture"),
         ("[" * 3_000, MalformedFileError, "is not YAML"),
         ("#" * 17_000, TooLargeError, "at most 16384 bytes"),

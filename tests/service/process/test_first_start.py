@@ -21,7 +21,7 @@ def test_what_a_first_start_compiles_is_not_kept_in_memory(
     begun = time.monotonic()
     until(lambda: ready(running) == 2, patience=300.0)
     assert time.monotonic() - begun > 5.0, "nothing was compiled"
-    assert running.log().count("compiling") == 2
+    assert running.log().count("compiling the kernels") == 2
     for pid in workers_of(running):
         status = Path(f"/proc/{pid}/status").read_text()
         anonymous = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("RssAnon"))
