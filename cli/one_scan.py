@@ -45,7 +45,7 @@ class NearOptions:
 
 @dataclass(frozen=True, slots=True)
 class SeveralOptions:
-    """What is known of several maps, as options."""
+    """Prior knowledge about several maps, as options."""
 
     near_map: Annotated[Text, option("Of several maps the one of --near.", "MAP_ID")] = None
     weight: Annotated[Texts, option("Probability of one of several maps; repeatable.", f"MAP_ID={LIKELY}")] = None

@@ -34,8 +34,8 @@ class RigidTransform:
     x, y : float
         Metres.
     theta : float
-        Radians, counter-clockwise, in (-pi, pi]. Up to four turns are wrapped; a `ValueError` says that more are likely
-        degrees.
+        Radians, counter-clockwise, in (-pi, pi]. Up to four turns are wrapped; beyond that is a
+        `ValueError`, because the angle is likely in degrees.
     """
 
     x: float
