@@ -41,12 +41,12 @@ class Sides:
 
     @property
     def wrong(self) -> Floats:
-        """How many rays met what they should not: backs from the left side, fronts from the right side; (k, 2)."""
+        """The number of rays that met the wrong side: backs from the left side, fronts from the right side; (k, 2)."""
         return np.stack([self.hits[:, 0, 1], self.hits[:, 1, 0]], axis=1)
 
     @property
     def against(self) -> Flags:
-        """Whether most rays from the left, and from the right side of a wall met what they should not; (k, 2)."""
+        """True where most rays from the left, and from the right side of a wall, met the wrong side; (k, 2)."""
         return np.asarray(self.wrong > tuning.CONTRADICTED * self.hits.sum(axis=2))
 
     @property

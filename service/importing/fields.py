@@ -15,7 +15,7 @@ Fields = Mapping[str, Sequence[str]]
 """Values as text; a field may be there several times."""
 
 Known = dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]]
-"""How fields are read, and their schemas; everything in a form is text."""
+"""The reader and the schema of each field; everything in a form is text."""
 
 POINT = "point"
 MAX_SCANS = 1000

@@ -173,7 +173,7 @@ class Child:
         if self._connection is not None:
             self._connection.close()
         if self._process is not None:
-            for patience in (END_SECONDS / 5, 10 * END_SECONDS):  # one that ended by itself has its status soon
+            for patience in (END_SECONDS / 5, 10 * END_SECONDS):  # a process that ended by itself has its status soon
                 with suppress(subprocess.TimeoutExpired):
                     status = self._process.wait(patience)
                     break

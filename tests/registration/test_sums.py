@@ -146,7 +146,7 @@ def test_the_cost_is_that_of_all_points_behind_the_segments() -> None:
 
     moved = POSE.apply(points)
     distances = np.einsum("nj,npj->np", map_segments.normals, moved) - map_segments.offsets[:, None]
-    # What the fit left, the scatter of the points about their own segments, is no matter of the pose.
+    # The scatter of the points about their own segments does not depend on the pose.
     own = np.einsum("nj,npj->np", np.stack([-pairs.directions[:, 1], pairs.directions[:, 0]], axis=1), points)
     scatter = np.sum((own - own.mean(axis=1, keepdims=True)) ** 2)
     expected = (np.sum(distances**2) - scatter) / 0.01**2

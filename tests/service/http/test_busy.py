@@ -81,7 +81,7 @@ def test_too_many_are_told_to_come_back_before_they_send(busy: RunningService) -
         assert answer.startswith(b"HTTP/1.1 503")
         assert b"retry-after: 1\r\n" in answer
         assert b'"code":"overloaded"' in answer
-        # What needs no search is answered all the same, also on a connection that was refused before.
+        # A request without a search is answered all the same, also on a connection that was refused before.
         livez = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"
         answer = answers(busy, (head % 2 + b"{}") * 3 + livez, b'{"status":"ok"}')
         assert answer.count(b"HTTP/1.1 503") == 3
@@ -103,7 +103,7 @@ def test_a_client_that_hangs_up_frees_its_place(busy: RunningService) -> None:
 
 
 def test_a_key_that_keeps_others_waiting_is_told_so_a_little_later(busy: RunningService) -> None:
-    """Told at once it would ask at once; one that does not wait for it is no defect."""
+    """If it were told at once, it would send the next request at once."""
     asked = post(searched_briefly())
     with full(busy, "127.0.0.2"):
         begun = time.monotonic()

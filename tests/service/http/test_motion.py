@@ -1,4 +1,4 @@
-"""What is not known of a scan: the motion of its sensor, and beams whose range is null."""
+"""Scans of which something is unknown: the motion of the sensor, or ranges that are null."""
 
 from __future__ import annotations
 

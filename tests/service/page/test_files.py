@@ -25,7 +25,7 @@ def hashes(folder: Path, names: list[str]) -> dict[str, str]:
 
 
 def test_the_page_was_built_from_these_sources() -> None:
-    """Where this fails: `make page`."""
+    """If this fails, run `make page`."""
     manifest = json.loads((BUILT / "manifest.json").read_text())
     sources = [path.relative_to(WEB).as_posix() for path in WEB.glob("src/*") if path != CONTRACT]
     sources += ["index.html", "package.json", "tsconfig.json", "vite.config.js"]
