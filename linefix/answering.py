@@ -18,6 +18,7 @@ from .documents.limits import Limits
 from .documents.parts import InlineMap, MapDocument, SearchOptions, StoredMap, is_oriented
 from .documents.reading import validate
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, OnMaps, RegisterRequest, VectorizeRequest
+from .documents.scans import scanned_of
 from .documents.updates import UpdateRequest
 from .explaining import explain_search
 from .operations import (
@@ -139,7 +140,7 @@ def explain(document: Json, within: Within) -> Json:
     how, target = asked.options, target_of(asked, asked.options.oriented, within)
     if isinstance(target.maps, MapSet):
         raise InvalidRequestError([Fault("/maps", "found several maps, expected one map")])
-    deadline, scanned = watch.deadline(how.deadline_ms, within.deadline_ms), inputs.scanned_of(asked.scan)
+    deadline, scanned = watch.deadline(how.deadline_ms, within.deadline_ms), scanned_of(asked.scan)
     watch.lap("decode")
     require_time(deadline)
     search_options = inputs.association_options_of(how, oriented=target.oriented)

@@ -28,7 +28,7 @@ from .documents.analysis import AnalyzeRequest
 from .documents.errors import Fault, InvalidRequestError
 from .documents.parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
-from .documents.scans import Scanned, vectorization_of
+from .documents.scans import Scanned, measured_of, scanned_of, transform_of, vectorization_of
 from .documents.updates import ApplyRequest, UpdateRequest
 from .driving import associate, associate_on_maps
 
@@ -151,7 +151,7 @@ def find(
     CancelledError
         When the deadline was cancelled.
     """
-    scanned = inputs.scanned_of(sought.scan)
+    scanned = scanned_of(sought.scan)
     watch.lap("decode")
     require_time(deadline)
     try:
@@ -178,7 +178,7 @@ def found_json(
 
 def registered(asked: RegisterRequest, watch: Stopwatch, listed: Callable[[Iterable[Json]], Any] = list) -> Json:
     """Return the answer of a registration; `listed` makes a list of its residuals, which are many."""
-    segments, scan = Segments.from_array(asked.map.segments, argument="map.segments"), inputs.measured_of(asked.scan)
+    segments, scan = Segments.from_array(asked.map.segments, argument="map.segments"), measured_of(asked.scan)
     pairs, how = inputs.pairs_of(asked, len(segments), len(scan)), inputs.registration_options_of(asked)
     watch.lap("decode")
     sigma = asked.map.sigma
@@ -217,7 +217,7 @@ def check_steps(index: MapIndex, asked: CheckRequest | None, deadline: Deadline,
     scans = [] if asked is None else _in_time(inputs.scans_of(asked), deadline)
     poses = None
     if asked is not None and asked.poses is not None:
-        poses = [None if one is None else inputs.transform_of(one) for one in asked.poses]
+        poses = [None if one is None else transform_of(one) for one in asked.poses]
     yield
     checked = yield from checking(index, scans, poses, deadline, oriented=oriented)
     return results.checked_json(checked)

@@ -8,7 +8,6 @@ from typing import Any
 
 from .errors import Fault
 from .limits import MAX_FAULTS
-from .parts import TAGS
 from .strict import nearest_name
 
 _PLAIN = re.compile(r"^[A-Za-z0-9_.-]{1,40}$")
@@ -69,9 +68,9 @@ def _pointer(parts: Sequence[object]) -> str:
     """Return a JSON pointer; a name that is not plain ends it, since it came from the caller."""
     pointer = ""
     for part in parts:
-        if part in TAGS:
-            continue
         name = str(part)
+        if name.startswith("<"):
+            continue  # of a union, the model that was chosen; or of the caller, which is not repeated
         if not _PLAIN.match(name):
             break
         pointer += f"/{name}"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,117 +20,21 @@ from association import (
     Prior,
     Scan,
     SoftPrior,
-    View,
-    assemble,
-    mirrored,
 )
 from map_quality import NOT_SHARPENED, Analysis, Replacement, Robot, Sharpened, VisitScan
-from registration import (
-    IDENTITY,
-    InputError,
-    InvalidArgumentError,
-    MeasuredSegments,
-    RegistrationOptions,
-    RigidTransform,
-    Segments,
-)
+from registration import InputError, InvalidArgumentError, RegistrationOptions, Segments
 
 from .analysis import AnalyzeRequest
 from .errors import Fault, InvalidRequestError
-from .parts import (
-    HardPriorFields,
-    LaserScan,
-    MapDocument,
-    MeasuredFields,
-    PointScan,
-    SearchOptions,
-    SegmentScan,
-    SoftPriorFields,
-    is_oriented,
-)
+from .parts import HardPriorFields, LaserScan, MapDocument, SearchOptions, SoftPriorFields, is_oriented
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
-from .scans import Scanned, range_scan, scan_points, view_laser, viewpoint_of
-from .strict import Pose
-from .updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest, UpdateScan
-from .views import LaserView, PointView, SegmentView, ViewsScan
+from .scans import Scanned, scanned_of, transform_of
+from .updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
+from .views import OneScan, ViewsScan
 
 # Options of a search that have the same names and values in a request.
 _AS_SENT = [one.name for one in fields(AssociationOptions) if one.name not in ("oriented", "include")]
-LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
-
-
-def transform_of(pose: Pose) -> RigidTransform:
-    """Return a pose as a transform."""
-    return RigidTransform(pose.x, pose.y, pose.theta)
-
-
-def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegments:
-    """Return segments with what is known of their points; `argument` is what errors call the scan."""
-    segments = Segments.from_array(scan.segments, argument=f"{argument}.segments")
-    moments = None
-    if scan.centroids is not None and scan.spreads is not None:
-        moments = (scan.centroids, scan.spreads)
-    return MeasuredSegments.from_segments(segments, scan.sigma, scan.point_counts, moments, argument=argument)
-
-
-def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: bool = True) -> Scanned:
-    """Return the robot's scan, whatever form it came in.
-
-    If not `timed`, an unknown motion during a scan counts as none.
-    """
-    if isinstance(scan, ViewsScan):
-        return _of_views(scan, timed=timed)
-    viewpoint = viewpoint_of(scan.viewpoint)
-    if isinstance(scan, LaserScan):
-        seen = range_scan(scan.laser, scan.twist, "/scan", timed=timed)
-        seen = replace(seen, flipped=isinstance(scan, UpdateScan) and scan.flipped)
-        return _vectorized(assemble([view_laser(seen, IDENTITY, scan.sigma, viewpoint)]))
-    if isinstance(scan, PointScan):
-        return _vectorized(scan_points(scan.points, scan.sigma, viewpoint))
-    return Scanned(Scan(measured_of(scan), viewpoint), None)
-
-
-def _vectorized(scan: Scan) -> Scanned:
-    return Scanned(scan, scan.measured.segments.endpoints)
-
-
-def _of_views(scan: ViewsScan, *, timed: bool) -> Scanned:
-    views = [_view_of(view, k, timed=timed) for k, view in enumerate(scan.views)]
-    together = assemble(views)
-    counts = np.array([len(view.scan.measured) for view in views])
-    starts = np.cumsum(counts) - counts
-    rows = np.split(together.measured.segments.endpoints, starts[1:])
-    sent = (isinstance(view, SegmentView) for view in scan.views)
-    parts = tuple(None if as_sent else own for own, as_sent in zip(rows, sent, strict=True))
-    return Scanned(together, None, parts, starts)
-
-
-def _view_of(view: SegmentView | LaserView | PointView, number: int, *, timed: bool) -> View:
-    """Return what one sensor saw, from where it stood."""
-    viewpoint, place = viewpoint_of(view.viewpoint), f"/scan/views/{number}"
-    if isinstance(view, LaserView):
-        return _laser_view(view, place, timed=timed)
-    if isinstance(view, PointView):
-        seen = scan_points(view.points, view.sigma, viewpoint, place)
-    else:
-        seen = Scan(measured_of(view, f"scan.views.{number}"), viewpoint)
-    seen = mirrored(seen) if view.flipped else seen
-    return View(seen, transform_of(view.pose), view.covariance, view.relative_to)
-
-
-def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
-    """Return a scanner's view; scanners on one robot share its unknown motion, views of a drive have each their own."""
-    at = transform_of(view.pose)
-    seen = replace(range_scan(view.laser, view.twist, place, timed=timed), flipped=view.flipped)
-    if view.relative_to is None and view.covariance is None and math.hypot(at.x, at.y) <= LONGEST_LEVER:
-        # It turns with the robot, whose frame is that of the scan.
-        return view_laser(replace(seen, mount=at), IDENTITY, view.sigma, viewpoint_of(view.viewpoint), place)
-    found = view_laser(seen, at, view.sigma, viewpoint_of(view.viewpoint), place)
-    own = None if found.motion is None else found.motion @ found.motion.T
-    parts = [one for one in (view.covariance, own) if one is not None]
-    covariance = sum(parts[1:], parts[0]) if parts else None
-    return replace(found, covariance=covariance, relative_to=view.relative_to, motion=None)
 
 
 def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:
@@ -149,13 +52,16 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
     return AssociationOptions(oriented=oriented, include=include, **{name: getattr(options, name) for name in _AS_SENT})
 
 
-def included_of(
-    scan: SegmentScan | LaserScan | PointScan | ViewsScan, options: SearchOptions, scanned: Scanned, frame_id: str
-) -> Included:
+def included_of(scan: OneScan | ViewsScan, options: SearchOptions, scanned: Scanned, frame_id: str) -> Included:
     """Return the fields that the answer repeats of a request; `frame_id` is the map's."""
     parts = frozenset[str](options.include)
     segments = scanned.listed if "segments" in parts else None
-    return Included(parts, frame_id, scan.told_frame_id, scan.told_stamp, segments, scanned.starts)
+    child_frame_id, stamp = scan.frame_id, scan.stamp
+    if isinstance(scan, LaserScan) and scan.laser.header is not None:  # what the scan does not say itself
+        header = scan.laser.header
+        child_frame_id = child_frame_id if "frame_id" in scan.model_fields_set else header.frame_id or child_frame_id
+        stamp = header.stamp if stamp is None else stamp
+    return Included(parts, frame_id, child_frame_id, stamp, segments, scanned.starts)
 
 
 def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:

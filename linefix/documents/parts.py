@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import (
@@ -20,21 +20,13 @@ from .arrays import (
     SigmaOrSigmas,
     Spreads,
 )
-from .strict import Angle, DeadlineMs, FrameId, FreeJson, MapId, Point, Pose, Strict, in_radians
+from .strict import Angle, DeadlineMs, FrameId, FreeJson, MapId, OneOf, Point, Pose, Strict, in_radians
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
 PointSigma = Annotated[float, Field(gt=0.0, le=10.0)]
 RaySigma = Annotated[float, Field(ge=1e-6, le=10.0)]
 IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map"]
 EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segments", "missing_map")
-
-# Union tags; in brackets, so that no field of a request is ever taken for one.
-INLINE, STORED = "<inline>", "<stored>"
-BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS = "<segments>", "<laser>", "<points>", "<views>"
-SOFT, HARD = "<soft>", "<hard>"
-_BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta", "points", "points_sigma"))
-_BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint", "twist"))
-TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS, SOFT, HARD, "<list>", "<prefix>"))
 
 
 class MapDocument(Strict):
@@ -79,23 +71,7 @@ def is_oriented(asked: bool | None, own: bool | None) -> bool:
     return next((said for said in (asked, own) if said is not None), True)
 
 
-def _map_kind(value: Any) -> str | None:
-    if not isinstance(value, dict):
-        return INLINE
-    inline, stored = "segments" in value, "map_id" in value
-    if not inline and not stored and value.keys() - _BESIDE_A_MAP:
-        return INLINE  # which names the fields that it does not know, a misspelt one among them
-    return None if inline == stored else STORED if stored else INLINE
-
-
-AnyMap = Annotated[
-    Annotated[InlineMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)],
-    Discriminator(
-        _map_kind,
-        custom_error_type="one_of",
-        custom_error_message="expected exactly one of segments and map_id, found both or neither",
-    ),
-]
+AnyMap = Annotated[InlineMap | StoredMap, OneOf("segments and map_id, found both or neither", ("segments", "map_id"))]
 
 
 class _Scan(Strict):
@@ -106,16 +82,6 @@ class _Scan(Strict):
         description="position of the sensor, metres; null: several positions, and lines of sight are not used as "
         "evidence",
     )
-
-    @property
-    def told_stamp(self) -> Any:
-        """When it was taken, as sent."""
-        return self.stamp
-
-    @property
-    def told_frame_id(self) -> str:
-        """The frame that it is in."""
-        return self.frame_id
 
 
 def require_at_the_sensor(viewpoint: list[float] | None) -> None:
@@ -249,38 +215,9 @@ class LaserScan(_Scan, RangeFields):
         "that of the first beam",
     )
 
-    @property
-    def told_stamp(self) -> Any:
-        """The scan's own stamp, or that of its header."""
-        header = self.laser.header
-        return header.stamp if self.stamp is None and header is not None else self.stamp
-
-    @property
-    def told_frame_id(self) -> str:
-        """The scan's own frame, or that of its header."""
-        header = self.laser.header
-        if "frame_id" in self.model_fields_set or header is None:
-            return self.frame_id
-        return header.frame_id or self.frame_id
-
 
 class PointScan(_Scan, PointFields):
     """A scan as points in scanning order."""
-
-
-def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None:
-    """Return the form of a scan, or of a view, by its fields; None where it has several, or none."""
-    if not isinstance(value, dict):
-        return BY_SEGMENTS
-    if "laser" in value:
-        return None if "segments" in value or "points" in value else BY_LASER
-    if "segments" in value:
-        return None if "points" in value else BY_SEGMENTS
-    if "points" in value:
-        return BY_POINTS
-    if "ranges" in value:
-        return BY_LASER  # without its `laser` around it
-    return BY_SEGMENTS if value.keys() - beside else None
 
 
 class SoftPriorFields(Pose):
@@ -304,20 +241,9 @@ class HardPriorFields(Pose):
     map_id: MapId | None = Field(None, description="of several maps the one whose frame the pose is in")
 
 
-def _prior_kind(value: Any) -> str | None:
-    if not isinstance(value, dict):
-        return HARD
-    soft, hard = "covariance" in value, "radius" in value or "angle" in value
-    return None if soft == hard else SOFT if soft else HARD
-
-
 AnyPrior = Annotated[
-    Annotated[SoftPriorFields, Tag(SOFT)] | Annotated[HardPriorFields, Tag(HARD)],
-    Discriminator(
-        _prior_kind,
-        custom_error_type="one_of",
-        custom_error_message="expected exactly one of covariance, or radius with angle",
-    ),
+    SoftPriorFields | HardPriorFields,
+    OneOf("covariance, or radius with angle", ("covariance", "radius angle")),
 ]
 
 

@@ -1,7 +1,8 @@
-"""Ranges and points of a request to scans, or to segments."""
+"""Scans of a request to scans of the search, or to segments."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationWarning, Scan, View
-from registration import RigidTransform
+from association import AssociationWarning, Scan, View, assemble, mirrored
+from registration import IDENTITY, MeasuredSegments, RigidTransform, Segments
 from vectorization import (
     LaserScan,
     Motion,
@@ -24,20 +25,27 @@ from vectorization import (
 
 from ..ranges import RangeScan, motion_warning, view_of
 from .errors import Fault, InvalidRequestError
-from .parts import Laser, Twist
+from .parts import Laser, MeasuredFields, PointFields, RangeFields, Twist
 from .requests import VectorizeRequest
-
-Floats = NDArray[np.float64]
-Viewpoint = tuple[float, float] | None
+from .strict import Pose
+from .views import OneScan, OneView, ViewsScan
 
 MOST_NULLS = 1.0 / 3.0  # fraction of a scan's ranges
-_OPTIONS = frozenset(("sigma", "min_points", "min_length", "max_gap"))
-_PLACES = ("", "/options")  # where scan and options stand in a request to vectorize
+LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
 
-def viewpoint_of(place: list[float] | None) -> Viewpoint:
-    """Return where the sensor stood, metres; None where the scan is not from one place."""
-    return None if place is None else (place[0], place[1])
+def transform_of(pose: Pose) -> RigidTransform:
+    """Return a pose as a transform."""
+    return RigidTransform(pose.x, pose.y, pose.theta)
+
+
+def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegments:
+    """Return segments with what is known of their points; `argument` is what errors call the scan."""
+    segments = Segments.from_array(scan.segments, argument=f"{argument}.segments")
+    moments = None
+    if scan.centroids is not None and scan.spreads is not None:
+        moments = (scan.centroids, scan.spreads)
+    return MeasuredSegments.from_segments(segments, scan.sigma, scan.point_counts, moments, argument=argument)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,77 +55,97 @@ class Scanned:
     Attributes
     ----------
     scan : Scan
-    segments : (n, 4), or None
-        Metres in the scan's frame; of several views None, see `parts`.
-    parts : tuple of (m, 4) or None, or None
-        Of several views the segments of each, likewise.
+    sent : tuple of bool
+        Of each view whether its segments were sent.
     starts : (v,) or None
-        Which segment of the scan is the first of each view.
+        Of several views, which segment of the scan is the first of each.
     """
 
     scan: Scan
-    segments: Floats | None
-    parts: tuple[Floats | None, ...] | None = None
+    sent: tuple[bool, ...]
     starts: NDArray[np.intp] | None = None
 
     @property
     def listed(self) -> list[Any] | None:
         """The segments that the caller did not send; of several views one list, or None, each."""
-        if self.parts is None:
-            return None if self.segments is None else self.segments.tolist()
-        return [None if part is None else part.tolist() for part in self.parts]
+        rows = self.scan.measured.segments.endpoints
+        if self.starts is None:
+            return None if self.sent[0] else rows.tolist()
+        parts = zip(np.split(rows, self.starts[1:]), self.sent, strict=True)
+        return [None if sent else own.tolist() for own, sent in parts]
 
 
-def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:
-    """Return the ranges of a scanner; `place` is the pointer of its scan.
+def scanned_of(scan: OneScan | ViewsScan, *, timed: bool = True) -> Scanned:
+    """Return the robot's scan, whatever form it came in.
 
-    If not `timed`, an unknown motion counts as none.
+    If not `timed`, an unknown motion during a scan counts as none.
     """
-    bounds = {
-        name: value
-        for name, value in (("range_min", laser.range_min), ("range_max", laser.range_max))
-        if value is not None
-    }
+    if not isinstance(scan, ViewsScan):
+        return Scanned(assemble([_view_of(scan, "/scan", timed=timed)]), (isinstance(scan, MeasuredFields),))
+    views = [_view_of(view, f"/scan/views/{k}", timed=timed) for k, view in enumerate(scan.views)]
+    counts = np.array([len(view.scan.measured) for view in views])
+    sent = tuple(isinstance(view, MeasuredFields) for view in scan.views)
+    return Scanned(assemble(views), sent, np.cumsum(counts) - counts)
+
+
+def _view_of(seen: OneScan | OneView, place: str, *, timed: bool) -> View:
+    """Return what one sensor saw, from where it stood; `place` is the pointer of it."""
+    pose, covariance, relative_to = IDENTITY, None, None
+    if isinstance(seen, OneView):
+        pose, covariance, relative_to = transform_of(seen.pose), seen.covariance, seen.relative_to
+    flipped = bool(getattr(seen, "flipped", False))
+    viewpoint = _viewpoint_of(seen.viewpoint)
+    if isinstance(seen, RangeFields):
+        ranges = replace(_range_scan(seen.laser, seen.twist, place, timed=timed), flipped=flipped)
+        if relative_to is not None or covariance is not None or math.hypot(pose.x, pose.y) > LONGEST_LEVER:
+            return _of_drive(_laser_view(ranges, pose, seen, place), covariance, relative_to)
+        # It turns with the robot, whose frame is that of the scan.
+        return _laser_view(replace(ranges, mount=pose), IDENTITY, seen, place)
+    if isinstance(seen, PointFields):
+        with _naming_argument(place):
+            found = vectorize(seen.points, VectorizationOptions(sigma=seen.sigma), viewpoint)
+        scan = Scan(found.measured, viewpoint, ordered=found.ordered)
+    else:
+        scan = Scan(measured_of(seen, place[1:].replace("/", ".")), viewpoint)
+    return View(mirrored(scan) if flipped else scan, pose, covariance, relative_to)
+
+
+def _laser_view(ranges: RangeScan, pose: RigidTransform, seen: RangeFields, place: str) -> View:
+    """Return a scanner's view; the single beams stay evidence. `pose` is that of the frame it is mounted on."""
+    with _naming_argument(place, f"{place}/laser"):
+        view = view_of(ranges, pose, seen.sigma)
+    nulls = _nulls_warning(ranges.laser)
+    if nulls is not None:
+        view = replace(view, scan=replace(view.scan, warnings=(*view.scan.warnings, nulls)))
+    if getattr(seen, "viewpoint", None) is not None:
+        return view
+    return replace(view, scan=replace(view.scan, viewpoint=None, beams=None))
+
+
+def _of_drive(view: View, covariance: NDArray[np.float64] | None, relative_to: int | None) -> View:
+    """Return a view of a drive: scanners of one robot share its unknown motion, each view of a drive has its own."""
+    own = None if view.motion is None else view.motion @ view.motion.T
+    parts = [one for one in (covariance, own) if one is not None]
+    return replace(view, covariance=sum(parts[1:], parts[0]) if parts else None, relative_to=relative_to, motion=None)
+
+
+def _range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:
+    """Return the ranges of a scanner; `place` is the pointer of its scan."""
+    bounds = {"range_min": laser.range_min, "range_max": laser.range_max}
     motion = None
     if twist is not None and laser.time_increment:
         motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
-    with _naming_argument(f"{place}/laser", (place, place)):
+    with _naming_argument(place, f"{place}/laser"):
         if laser.angle_max is not None and len(laser.ranges):
             require_angle_max(laser.angle_min, laser.angle_max, laser.angle_increment, len(laser.ranges))
-        scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **bounds)
+        given = {name: bound for name, bound in bounds.items() if bound is not None}
+        scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **given)
     return RangeScan(scan, (timed and laser.time_increment) or 0.0)
 
 
-def vectorize_laser(seen: RangeScan, options: VectorizationOptions, places: tuple[str, str]) -> Vectorization:
-    """Return the segments in the ranges of a scanner; `places` are the pointers of scan and options."""
-    with _naming_argument(f"{places[0]}/laser", places):
-        return vectorize(seen.laser, options)
-
-
-def vectorize_points(
-    points: Floats, options: VectorizationOptions, viewpoint: Viewpoint, places: tuple[str, str]
-) -> Vectorization:
-    """Return the segments in ordered points; `places` are the pointers of scan and options."""
-    with _naming_argument(places[0], places):
-        return vectorize(points, options, viewpoint)
-
-
-def view_laser(
-    seen: RangeScan, at: RigidTransform, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan"
-) -> View:
-    """Return a scanner's view; the single beams stay evidence. `at` is the pose of the frame it is mounted on."""
-    with _naming_argument(f"{place}/laser", (place, place)):
-        view = view_of(seen, at, sigma)
-    nulls = _nulls_warning(seen.laser)
-    if nulls is not None:
-        view = replace(view, scan=replace(view.scan, warnings=(*view.scan.warnings, nulls)))
-    return view if viewpoint is not None else replace(view, scan=replace(view.scan, viewpoint=None, beams=None))
-
-
-def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan") -> Scan:
-    """Return points in scanning order as a scan."""
-    found = vectorize_points(points, VectorizationOptions(sigma=sigma), viewpoint, (place, place))
-    return Scan(found.measured, viewpoint, ordered=found.ordered)
+def _viewpoint_of(place: list[float] | None) -> tuple[float, float] | None:
+    """Return where the sensor stood, metres; None where the scan is not from one place."""
+    return None if place is None else (place[0], place[1])
 
 
 def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
@@ -134,16 +162,15 @@ def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
 
 
 @contextmanager
-def _naming_argument(form: str, places: tuple[str, str]) -> Iterator[None]:
-    """Name the place in the request of an argument that the vectorizer rejects."""
+def _naming_argument(scan: str, form: str | None = None, options: str | None = None) -> Iterator[None]:
+    """Name the place of an argument that the vectorizer rejects, by the pointers of scan, its ranges, and options."""
     try:
         yield
     except VectorizationError as error:
-        scan, options = places
-        beside = {**dict.fromkeys(_OPTIONS, options), "twist": scan}
-        place = f"{beside.get(error.argument, form)}/{error.argument}"
+        beside = dict.fromkeys(("sigma", "min_points", "min_length", "max_gap"), scan if options is None else options)
+        place = (beside | {"twist": scan}).get(error.argument, scan if form is None else form)
         row = "" if error.index is None else f"/{error.index}"
-        raise InvalidRequestError([Fault(place + row, error.message)]) from error
+        raise InvalidRequestError([Fault(f"{place}/{error.argument}{row}", error.message)]) from error
 
 
 def vectorization_of(asked: VectorizeRequest) -> tuple[Vectorization, AssociationWarning | None]:
@@ -154,10 +181,11 @@ def vectorization_of(asked: VectorizeRequest) -> tuple[Vectorization, Associatio
     InvalidRequestError
         When the library rejects it.
     """
-    sent = asked.options
-    options = VectorizationOptions(sent.sigma, sent.min_points, sent.min_length, sent.max_gap)
+    options = VectorizationOptions(**dict(asked.options))
     if asked.laser is None:
         assert asked.points is not None  # the model takes exactly one of the two
-        return vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES), None
-    seen = range_scan(asked.laser, asked.twist, _PLACES[0])
-    return vectorize_laser(seen, options, _PLACES), motion_warning(seen)
+        with _naming_argument("", options="/options"):
+            return vectorize(asked.points, options, _viewpoint_of(asked.viewpoint)), None
+    seen = _range_scan(asked.laser, asked.twist, "")
+    with _naming_argument("", "/laser", "/options"):
+        return vectorize(seen.laser, options), motion_warning(seen)

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from .errors import Fault, InvalidRequestError
-from .parts import INLINE, STORED, InlineMap, StoredMap
+from .parts import InlineMap, StoredMap
 from .strict import MapId, Strict
 
 FEWEST_MAPS, MOST_MAPS = 2, 256
@@ -21,11 +21,11 @@ class NamedMap(InlineMap):
 
 
 def _named_kind(value: Any) -> str:
-    return INLINE if isinstance(value, dict) and "segments" in value else STORED
+    return "<named>" if isinstance(value, dict) and "segments" in value else "<stored>"
 
 
 NamedOrStored = Annotated[
-    Annotated[NamedMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)], Discriminator(_named_kind)
+    Annotated[NamedMap, Tag("<named>")] | Annotated[StoredMap, Tag("<stored>")], Discriminator(_named_kind)
 ]
 
 
@@ -37,16 +37,13 @@ class MapPrefix(Strict):
     )
 
 
-LIST, PREFIX = "<list>", "<prefix>"
-
-
 def _several_kind(value: Any) -> str:
-    return PREFIX if isinstance(value, dict | MapPrefix) else LIST
+    return "<prefix>" if isinstance(value, dict | MapPrefix) else "<list>"
 
 
 SeveralMaps = Annotated[
-    Annotated[Annotated[list[NamedOrStored], Field(min_length=FEWEST_MAPS, max_length=MOST_MAPS)], Tag(LIST)]
-    | Annotated[MapPrefix, Tag(PREFIX)],
+    Annotated[Annotated[list[NamedOrStored], Field(min_length=FEWEST_MAPS, max_length=MOST_MAPS)], Tag("<list>")]
+    | Annotated[MapPrefix, Tag("<prefix>")],
     Discriminator(_several_kind),
 ]
 

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import chain, islice
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, get_args
 
 import orjson
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    PlainValidator,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from .limits import MAX_FAULTS
 
@@ -54,6 +64,42 @@ class Answer(BaseModel):
     """Model of an answer: documents the JSON, is never built for an answer."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)  # seldom asked for
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """Chooses a model of a union by the fields of a value, so that its faults are those of this model alone.
+
+    Attributes
+    ----------
+    expected : str
+        The fields, in words.
+    fields : tuple of str
+        Of each model, in the order of the union, the names that decide for it, with spaces between.
+    """
+
+    expected: str
+    fields: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the union of the models, each with its number in brackets, which no pointer has."""
+        models: tuple[type[BaseModel], ...] = get_args(source)
+        known = {name for model in models for name in model.model_fields}
+
+        def choose(value: Any) -> str | None:
+            if not isinstance(value, dict):
+                return next((f"<{k}>" for k, model in enumerate(models) if isinstance(value, model)), "<0>")
+            found = [k for k, names in enumerate(self.fields) if value.keys() & names.split()]
+            if not found and value.keys() - known:
+                return "<0>"  # which names the fields that it does not know, a misspelt one among them
+            return f"<{found[0]}>" if len(found) == 1 else None
+
+        return core_schema.tagged_union_schema(
+            {f"<{k}>": handler.generate_schema(model) for k, model in enumerate(models)},
+            choose,
+            custom_error_type="one_of",
+            custom_error_message=f"expected exactly one of {self.expected}",
+        )
 
 
 def _free_json(value: Any) -> Any:

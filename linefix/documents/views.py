@@ -4,27 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from .arrays import StepCovariance
 from .errors import TooManyError
 from .limits import Limits
-from .parts import (
-    BY_LASER,
-    BY_POINTS,
-    BY_SEGMENTS,
-    BY_VIEWS,
-    LaserScan,
-    MeasuredFields,
-    PointFields,
-    PointScan,
-    RangeFields,
-    SegmentScan,
-    scan_kind,
-)
-from .strict import FrameId, FreeJson, Point, Pose, Strict
-
-_BESIDE_A_VIEW = frozenset(("pose", "flipped", "sigma", "covariance", "relative_to", "viewpoint"))
+from .parts import LaserScan, MeasuredFields, PointFields, PointScan, RangeFields, SegmentScan
+from .strict import FrameId, FreeJson, OneOf, Point, Pose, Strict
 
 
 class SensorPose(Pose):
@@ -60,20 +46,10 @@ class PointView(PointFields, _View):
     """A view as points in scanning order."""
 
 
-def _view_kind(value: Any) -> str | None:
-    return scan_kind(value, _BESIDE_A_VIEW)
-
-
-AnyView = Annotated[
-    Annotated[SegmentView, Tag(BY_SEGMENTS)]
-    | Annotated[LaserView, Tag(BY_LASER)]
-    | Annotated[PointView, Tag(BY_POINTS)],
-    Discriminator(
-        _view_kind,
-        custom_error_type="one_of",
-        custom_error_message="expected exactly one of segments, laser and points",
-    ),
-]
+OneScan = SegmentScan | LaserScan | PointScan
+OneView = SegmentView | LaserView | PointView
+BY_FORM = ("segments", "laser ranges", "points")  # ranges: without the `laser` around them
+AnyView = Annotated[OneView, OneOf("segments, laser and points", BY_FORM)]
 
 
 class ViewsScan(Strict):
@@ -109,29 +85,5 @@ class ViewsScan(Strict):
             raise TooManyError("", limits.beams_together, "ranges or points of all views together")
         return self
 
-    @property
-    def told_stamp(self) -> Any:
-        """When it was taken, as sent."""
-        return self.stamp
 
-    @property
-    def told_frame_id(self) -> str:
-        """The frame that the views share."""
-        return self.frame_id
-
-
-def _any_kind(value: Any) -> str | None:
-    return BY_VIEWS if isinstance(value, dict) and "views" in value else scan_kind(value)
-
-
-AnyScan = Annotated[
-    Annotated[SegmentScan, Tag(BY_SEGMENTS)]
-    | Annotated[LaserScan, Tag(BY_LASER)]
-    | Annotated[PointScan, Tag(BY_POINTS)]
-    | Annotated[ViewsScan, Tag(BY_VIEWS)],
-    Discriminator(
-        _any_kind,
-        custom_error_type="one_of",
-        custom_error_message="expected exactly one of segments, laser, points and views",
-    ),
-]
+AnyScan = Annotated[OneScan | ViewsScan, OneOf("segments, laser, points and views", (*BY_FORM, "views"))]
