@@ -108,15 +108,14 @@ def refused_at(faults: Sequence[tuple[str, str]], asked: Asked = NOTHING) -> Ref
 def refusing(asked: Asked = NOTHING) -> Iterator[None]:
     """Raise errors of the command line in place of those about a request."""
     from linefix.answering import NotStoredError
-    from linefix.documents.errors import InvalidRequestError, TooManyError
+    from linefix.documents.errors import DeadlinePassedError, InvalidRequestError, TooManyError
     from linefix.documents.inputs import fault_of
-    from linefix.operations import TooLateError
     from registration import InputError
 
     try:
         yield
         return
-    except TooLateError as error:
+    except DeadlinePassedError as error:
         raise NoServerError(str(error)) from None
     except NotStoredError as error:
         raise RefusedError(str(error)) from None

@@ -102,7 +102,7 @@ def associate(document: Json, within: Within) -> Json:
     ------
     RequestError, InputError
         When a part of the request is not taken, as of every function here.
-    TooLateError
+    DeadlinePassedError
         When the deadline passes before the search starts, likewise.
     """
     watch = Stopwatch()

@@ -25,7 +25,7 @@ from .analyzing import looks
 from .checking import checking
 from .documents import inputs, results
 from .documents.analysis import AnalyzeRequest
-from .documents.errors import Fault, InvalidRequestError
+from .documents.errors import DeadlinePassedError, Fault, InvalidRequestError
 from .documents.parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
 from .documents.scans import Scanned, measured_of, scanned_of, transform_of, vectorization_of
@@ -36,14 +36,6 @@ T = TypeVar("T")
 Json = dict[str, Any]
 Steps = Generator[None, None, Json]
 """Work on an answer; between steps others may have their turn."""
-
-
-class TooLateError(Exception):
-    """The deadline passed before the search started."""
-
-    def __str__(self) -> str:
-        """Name the remedy."""
-        return "the deadline passed before the search started; extend deadline_ms, or send the request again later"
 
 
 class Stopwatch:
@@ -103,11 +95,11 @@ class Target:
 
 
 def require_time(deadline: Deadline) -> None:
-    """Raise `TooLateError` when the deadline has passed, `CancelledError` when it was cancelled."""
+    """Raise `DeadlinePassedError` when the deadline has passed, `CancelledError` when it was cancelled."""
     if deadline.cancelled:
         raise CancelledError
     if deadline.passed:
-        raise TooLateError
+        raise DeadlinePassedError
 
 
 def search(
@@ -146,7 +138,7 @@ def find(
     ------
     InputError, InvalidRequestError
         When the libraries reject the scan, the prior or an option.
-    TooLateError
+    DeadlinePassedError
         When the deadline passes before the search starts.
     CancelledError
         When the deadline was cancelled.
@@ -157,7 +149,7 @@ def find(
     try:
         result = search(target, scanned.scan, sought.prior, how, deadline)
     except IndexingEndedError:
-        raise TooLateError from None
+        raise DeadlinePassedError from None
     watch.lap("search")
     return result, found_json(target, result, sought, scanned, how)
 

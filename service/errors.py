@@ -153,12 +153,6 @@ class ShareHeldError(ServiceError):
     message = "large requests and answers of this key or address use its part of the memory; send fewer at once"
 
 
-class DeadlinePassedError(ServiceError):
-    """The deadline passed before the search started."""
-
-    message = "the deadline passed before the search started; extend deadline_ms, or send the request again later"
-
-
 class FormatsMissingError(ServiceError):
     """The extra ``[formats]`` is not installed."""
 

@@ -94,3 +94,11 @@ class BodyTooLargeError(RequestError):
     def __str__(self) -> str:
         """Name the limit."""
         return f"expected a body of at most {self.max_bytes} bytes, unpacked; found more"
+
+
+class DeadlinePassedError(Exception):
+    """The deadline passed before the search started."""
+
+    def __str__(self) -> str:
+        """Name the remedy."""
+        return "the deadline passed before the search started; extend deadline_ms, or send the request again later"

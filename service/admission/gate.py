@@ -19,8 +19,9 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
+from linefix.documents.errors import DeadlinePassedError
 
-from ..errors import DeadlinePassedError, QueueFullError, ShareUsedError
+from ..errors import QueueFullError, ShareUsedError
 from .keys import Holder
 
 T = TypeVar("T")

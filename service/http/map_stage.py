@@ -11,10 +11,11 @@ from functools import partial
 from typing import TypeVar
 
 from association import Deadline
+from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import AssociateRequest, BatchRequest
 
-from ..errors import DeadlinePassedError, StoreAwayError, UnknownMapError
+from ..errors import StoreAwayError, UnknownMapError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMaps
 from .exchange import Exchange

@@ -21,6 +21,7 @@ from starlette.routing import Match
 from association import CancelledError
 from linefix.documents.errors import (
     BodyTooLargeError,
+    DeadlinePassedError,
     Fault,
     InvalidRequestError,
     NotJsonError,
@@ -30,7 +31,6 @@ from linefix.documents.errors import (
 from linefix.documents.faults import faults_of
 from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
-from linefix.operations import TooLateError
 from registration import InputError
 
 from .. import errors
@@ -64,7 +64,7 @@ STRANGE = (errors.UnknownKeyError, errors.ForeignHostError, errors.ForeignOrigin
 WRONG_KIND = (errors.MediaTypeError, errors.EncodingError, errors.FormatsMissingError, errors.UnknownFormatError)
 BUSY = (errors.QueueFullError, errors.TooMuchHeldError, errors.BusyStoreError)
 SHARES = (errors.ShareUsedError, errors.ShareHeldError)
-LATE = (errors.DeadlinePassedError, TooLateError, errors.IndexNotReadyError, errors.ImportTooLateError)
+LATE = (DeadlinePassedError, errors.IndexNotReadyError, errors.ImportTooLateError)
 TOO_LARGE = (TooManyError, BodyTooLargeError, errors.FileTooLargeError)
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),

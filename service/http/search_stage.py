@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from starlette.types import Receive
 
 from association import CancelledError, Deadline
+from linefix.documents.errors import DeadlinePassedError
 
-from ..errors import DeadlinePassedError
 from ..telemetry.traces import queued
 from .exchange import Exchange
 

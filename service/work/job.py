@@ -10,9 +10,9 @@ from typing import Any
 
 from association import CancelledError, Deadline, MapIndex
 from linefix.documents.encoding import encode
+from linefix.documents.errors import DeadlinePassedError
 from linefix.operations import Json, Steps, Stopwatch
 
-from ..errors import DeadlinePassedError
 from ..maps.lookup import FoundMaps, MapLookup
 
 TURN_SECONDS = 0.1  # of the gate, before others have theirs

@@ -10,6 +10,7 @@ import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from linefix.documents.encoding import encode, encode_list
+from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap, SearchOptions, is_oriented
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
 from linefix.documents.results import check_json
@@ -17,7 +18,6 @@ from linefix.documents.updates import ApplyRequest
 from linefix.operations import Json, Stopwatch, Target, applied, find, registered, vectorized
 from map_quality import check_map
 
-from ..errors import DeadlinePassedError
 from ..importing.bounded import ReadFiles
 from ..maps import CachedMap
 from ..maps.lookup import FoundMaps, MapLookup, outline_of

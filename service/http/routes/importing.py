@@ -8,10 +8,11 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
 
-from ...errors import DeadlinePassedError, ImportTooLateError
+from ...errors import ImportTooLateError
 from ...importing.bounded import ReadFiles, read_apart
 from ...importing.fields import MAP_FORM, SCANS_FORM
 from ...work.job import Done, Job

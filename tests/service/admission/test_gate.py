@@ -17,8 +17,9 @@ from typing import Any, ParamSpec, TypeVar
 import pytest
 
 from association import CancelledError, Deadline
+from linefix.documents.errors import DeadlinePassedError
 from service.admission.gate import HEARING_SECONDS, LONG_NICE, LONG_SECONDS, Gate, Ticket
-from service.errors import DeadlinePassedError, QueueFullError, ShareUsedError
+from service.errors import QueueFullError, ShareUsedError
 
 T = TypeVar("T")
 P = ParamSpec("P")

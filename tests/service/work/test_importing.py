@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from association import CancelledError, Deadline
+from linefix.documents.errors import DeadlinePassedError
 from service.app import create_app
-from service.errors import DeadlinePassedError
 from service.settings import Settings
 from service.work.results import index_import
 from tests.service.maps.test_lookup import Lookup, inline
