@@ -5,16 +5,11 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
 from itertools import islice
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from association import Deadline, MapIndex, MapPoints
-from map_quality import Analysis, PlaceVerdict, Robot, Standing
-from registration import Segments
+from association import Deadline
+from map_quality import Analysis, PlaceVerdict
 
 PORTION = 16  # places that a process is given at a time
 ALONE = 64  # places up to which starting others takes longer than it saves
@@ -24,34 +19,6 @@ Looks = dict[int, PlaceVerdict | None]
 T = TypeVar("T")
 _analysis: Analysis | None = None  # of a process that was started for it
 _deadline = Deadline()
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """Input of another process; it builds the index again, because an index is not sent.
-
-    Attributes
-    ----------
-    endpoints : (n, 4)
-        The map as sent, metres.
-    sigma, points, oriented, robot, standing, seed, drive
-        As in `MapIndex` and `Analysis`.
-    landmark : (k, 4)
-        Segments of the landmark, metres.
-    ends_at : float or None
-        Of the machine's monotonic clock.
-    """
-
-    endpoints: NDArray[np.float64]
-    sigma: float | None
-    points: MapPoints
-    oriented: bool
-    robot: Robot
-    standing: Standing
-    seed: int
-    drive: float
-    landmark: NDArray[np.float64]
-    ends_at: float | None
 
 
 def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progress: Progress) -> Looks:
@@ -77,12 +44,7 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
         return found
     # Spawned, never forked: this process has threads.
     context = multiprocessing.get_context("spawn")
-    own = analysis.segments.endpoints
-    landmark = np.empty((0, 4)) if analysis.landmark is None else analysis.landmark.segments.endpoints[len(own) :]
-    index = analysis.index
-    task = Task(own, index.sigma, index.points, analysis.oriented, analysis.robot, analysis.standing, analysis.seed,
-                analysis.drive, landmark, deadline.at)  # fmt: skip
-    with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (task,)) as pool:
+    with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (analysis, deadline.at)) as pool:
         todo, running = iter(portions), set[Future[Looks]]()
         while True:
             running |= {pool.submit(_look_here, portion) for portion in islice(todo, 2 * cores - len(running))}
@@ -98,15 +60,10 @@ def looks(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Gen
     """Try some places, a scan at a step, and return the results of those for which there was time."""
     found: Looks = {}
     for number in portion:
-        steps, verdict, ended = analysis.looking(number, deadline), None, False
-        while not ended:
-            try:
-                next(steps)
-            except StopIteration as done:
-                verdict, ended = done.value, True
-            if deadline.passed:
-                return found  # an unfinished result is no answer: the search was cut
-            yield
+        verdict = yield from analysis.looking(number, deadline)
+        if deadline.passed:
+            return found  # an unfinished result is no answer: the search was cut
+        yield
         found[number] = verdict
     return found
 
@@ -121,15 +78,10 @@ def finished(steps: Generator[None, None, T]) -> T:
             return result
 
 
-def _begin(task: Task) -> None:
-    """Index the map once in each process."""
+def _begin(analysis: Analysis, ends_at: float | None) -> None:
+    """Take the analysis once in each process; `ends_at` is of the machine's monotonic clock."""
     global _analysis, _deadline
-    segments = Segments.derived(task.endpoints)
-    index = MapIndex.build(segments, task.sigma, oriented=task.oriented, points=task.points)
-    _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed, task.drive)
-    if len(task.landmark):
-        _analysis = _analysis.with_segments(Segments.derived(task.landmark))
-    _deadline = Deadline(task.ends_at)
+    _analysis, _deadline = analysis, Deadline(ends_at)
 
 
 def _look_here(portion: Sequence[int]) -> Looks:

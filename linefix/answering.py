@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from association import Deadline, MapSet, map_set
+from association import AssociationOptions, AssociationResult, Deadline, KnownOfMaps, MapIndex, MapSet, Scan, map_set
 from map_quality import check_map
 
 from .analyzing import Progress, finished, look_on_all_cores
@@ -18,17 +18,17 @@ from .documents.limits import Limits
 from .documents.parts import InlineMap, MapDocument, SearchOptions, StoredMap, is_oriented
 from .documents.reading import validate
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, OnMaps, RegisterRequest, VectorizeRequest
-from .documents.scans import scanned_of
 from .documents.updates import UpdateRequest
-from .explaining import explain_search
+from .driving import search
+from .explaining import Explanation, explain_search
 from .operations import (
     Json,
+    Search,
     Steps,
     Stopwatch,
     Target,
     check_steps,
     find,
-    found_json,
     registered,
     require_time,
     update_steps,
@@ -126,28 +126,34 @@ def locating(on: Json, options: Json, within: Within) -> Callable[[Json], Json]:
 
 
 def locate(
-    target: Target, sought: AssociateRequest | BatchItem, how: SearchOptions, within: Within, watch: Stopwatch
+    target: Target,
+    sought: AssociateRequest | BatchItem,
+    how: SearchOptions,
+    within: Within,
+    watch: Stopwatch,
+    by: Search = search,
 ) -> Json:
     """Return the answer of ``POST /v1/associate`` on maps that are indexed."""
-    _, answer = find(target, sought, how, watch.deadline(how.deadline_ms, within.deadline_ms), watch)
+    _, answer = find(target, sought, how, watch.deadline(how.deadline_ms, within.deadline_ms), watch, by)
     return _sealed(answer, watch, getattr(sought, "client_ref", None))
 
 
 def explain(document: Json, within: Within) -> Json:
     """Return the answer of `associate` as ``answer``, and next to it how its verdict came about."""
-    watch = Stopwatch()
+    watch, explained = Stopwatch(), list[Explanation]()
     asked = validate(AssociateRequest, document, within.limits)
-    how, target = asked.options, target_of(asked, asked.options.oriented, within)
-    if isinstance(target.maps, MapSet):
-        raise InvalidRequestError([Fault("/maps", "found several maps, expected one map")])
-    deadline, scanned = watch.deadline(how.deadline_ms, within.deadline_ms), scanned_of(asked.scan)
-    watch.lap("decode")
-    require_time(deadline)
-    search_options = inputs.association_options_of(how, oriented=target.oriented)
-    found = explain_search(target.maps, scanned.scan, inputs.prior_of(asked.prior), search_options, deadline)
-    watch.lap("search")
-    answer = found_json(target, found.result, asked, scanned, how)
-    return {"answer": _sealed(answer, watch, asked.client_ref), **results.explanation_json(found)}
+    target = target_of(asked, asked.options.oriented, within)
+
+    def by(
+        maps: MapIndex | MapSet, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline
+    ) -> AssociationResult:
+        if isinstance(maps, MapSet):
+            raise InvalidRequestError([Fault("/maps", "found several maps, expected one map")])
+        explained.append(explain_search(maps, scan, known.prior, options, deadline))
+        return explained[-1].result
+
+    answer = locate(target, asked, asked.options, within, watch, by)
+    return {"answer": answer, **results.explanation_json(explained[-1])}
 
 
 def register(document: Json, within: Within) -> Json:

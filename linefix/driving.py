@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 import association
 from association import (
-    NOTHING_KNOWN,
     AssociationOptions,
     AssociationResult,
     AssociationWarning,
@@ -68,20 +67,20 @@ def associate(
 
     The answer of a drive that is not usable is that of its last view, if `search_drive` finds that usable.
     """
-    how = options or AssociationOptions()
-    return search_drive(lambda seen: association.associate(index, seen, prior, how, deadline), scan)
+    return search(index, scan, KnownOfMaps(prior), options or AssociationOptions(), deadline)
 
 
-def associate_on_maps(
-    maps: MapSet,
-    scan: Scan,
-    known: KnownOfMaps = NOTHING_KNOWN,
-    options: AssociationOptions | None = None,
-    deadline: Deadline | None = None,
+def search(
+    maps: MapIndex | MapSet, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline | None
 ) -> AssociationResult:
-    """Find on which of several maps a scan was taken: `association.associate_on_maps`, with drives as `associate`."""
-    how = options or AssociationOptions()
-    return search_drive(lambda seen: association.associate_on_maps(maps, seen, known, how, deadline), scan)
+    """Find a scan in a map, or on several: the search of each interface, with drives as `associate`."""
+
+    def once(seen: Scan) -> AssociationResult:
+        if isinstance(maps, MapSet):
+            return association.associate_on_maps(maps, seen, known, options, deadline)
+        return association.associate(maps, seen, known.prior, options, deadline)
+
+    return search_drive(once, scan)
 
 
 def search_drive(search: Search, scan: Scan) -> AssociationResult:

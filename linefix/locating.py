@@ -26,7 +26,7 @@ from association import (
 from registration import InvalidArgumentError, MeasuredSegments, Segments
 from vectorization import LaserScan
 
-from .driving import associate, associate_on_maps
+from .driving import search
 from .ranges import MountedScan, ranges_scan, view_of
 
 if TYPE_CHECKING:
@@ -104,18 +104,18 @@ def locate(
     >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
     '1.00 1.00 1.57'
     """
-    maps = _several(map)
+    maps, how = _several(map), options or AssociationOptions()
     if maps is not None:
-        how, known = options or AssociationOptions(), KnownOfMaps(prior, prior_map, map_weights)
-        return associate_on_maps(maps, scan_of(scan, angles), known, how, deadline)
+        known = KnownOfMaps(prior, prior_map, map_weights)
+        return search(maps, scan_of(scan, angles), known, how, deadline)
     if prior_map is not None or map_weights is not None:
         name = "map_weights" if prior_map is None else "prior_map"
         raise InvalidArgumentError(
             f"found `{name}` with a single map, expected it with several; use `index_maps`, or omit `{name}`",
             argument=name,
         )
-    index, how = prepared(map, options)  # type: ignore[arg-type]
-    return associate(index, scan_of(scan, angles), prior, how, deadline)
+    index, how = prepared(map, how)  # type: ignore[arg-type]
+    return search(index, scan_of(scan, angles), KnownOfMaps(prior), how, deadline)
 
 
 def prepared(

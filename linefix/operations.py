@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from association import (
+    AssociationOptions,
     AssociationResult,
     CancelledError,
     Deadline,
@@ -26,14 +27,15 @@ from .checking import checking
 from .documents import inputs, results
 from .documents.analysis import AnalyzeRequest
 from .documents.errors import DeadlinePassedError, Fault, InvalidRequestError
-from .documents.parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields
+from .documents.parts import MapDocument, SearchOptions
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
-from .documents.scans import Scanned, measured_of, scanned_of, transform_of, vectorization_of
+from .documents.scans import measured_of, scanned_of, transform_of, vectorization_of
 from .documents.updates import ApplyRequest, UpdateRequest
-from .driving import associate, associate_on_maps
+from .driving import search
 
 T = TypeVar("T")
 Json = dict[str, Any]
+Search = Callable[[MapIndex | MapSet, Scan, KnownOfMaps, AssociationOptions, Deadline], AssociationResult]
 Steps = Generator[None, None, Json]
 """Work on an answer; between steps others may have their turn."""
 
@@ -102,37 +104,15 @@ def require_time(deadline: Deadline) -> None:
         raise DeadlinePassedError
 
 
-def search(
+def find(
     target: Target,
-    scan: Scan,
-    sent: SoftPriorFields | HardPriorFields | None,
+    sought: AssociateRequest | BatchItem,
     options: SearchOptions,
     deadline: Deadline,
-) -> AssociationResult:
-    """Find a scan in a map, or on several.
-
-    Raises
-    ------
-    InputError
-        When the search rejects the prior or an option.
-    IndexingEndedError
-        When the deadline passes before the search.
-    """
-    prior, prior_map = inputs.prior_of(sent), None if sent is None else sent.map_id
-    how = inputs.association_options_of(options, oriented=target.oriented)
-    if isinstance(target.maps, MapSet):
-        return associate_on_maps(target.maps, scan, KnownOfMaps(prior, prior_map, target.weights), how, deadline)
-    if prior_map is not None:
-        raise InvalidSearchError(
-            "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
-        )
-    return associate(target.maps, scan, prior, how, deadline)
-
-
-def find(
-    target: Target, sought: AssociateRequest | BatchItem, how: SearchOptions, deadline: Deadline, watch: Stopwatch
+    watch: Stopwatch,
+    by: Search = search,
 ) -> tuple[AssociationResult, Json]:
-    """Find a scan in a map, or on several; return also the answer.
+    """Find a scan in a map, or on several, `by` a search; return also the answer.
 
     Raises
     ------
@@ -146,26 +126,22 @@ def find(
     scanned = scanned_of(sought.scan)
     watch.lap("decode")
     require_time(deadline)
+    prior_map = None if sought.prior is None else sought.prior.map_id
+    if prior_map is not None and not isinstance(target.maps, MapSet):
+        raise InvalidSearchError(
+            "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
+        )
+    known = KnownOfMaps(inputs.prior_of(sought.prior), prior_map, target.weights)
+    how = inputs.association_options_of(options, oriented=target.oriented)
     try:
-        result = search(target, scanned.scan, sought.prior, how, deadline)
+        result = by(target.maps, scanned.scan, known, how, deadline)
     except IndexingEndedError:
         raise DeadlinePassedError from None
     watch.lap("search")
-    return result, found_json(target, result, sought, scanned, how)
-
-
-def found_json(
-    target: Target,
-    result: AssociationResult,
-    sought: AssociateRequest | BatchItem,
-    scanned: Scanned,
-    how: SearchOptions,
-) -> Json:
-    """Return the answer of a search."""
     references = {name: one for name, one in target.references.items() if name is not None and one is not None}
-    included = inputs.included_of(sought.scan, how, scanned, target.frames[result.map_id])
+    included = inputs.included_of(sought.scan, options, scanned, target.frames[result.map_id])
     answer = results.association_json(result, included, references)
-    return answer if references else {**answer, "map": target.references[None]}
+    return result, answer if references else {**answer, "map": target.references[None]}
 
 
 def registered(asked: RegisterRequest, watch: Stopwatch, listed: Callable[[Iterable[Json]], Any] = list) -> Json:
