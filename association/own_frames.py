@@ -82,8 +82,7 @@ def _registered_on_map(
     options = RegistrationOptions(rotation=context.options.rotation, weights=np.array([pair.weight for pair in pairs]))
     sigma = index.sigma or 0.0
     registered = register(index.parts[m].segments, context.scan.measured, indices, sigma, options, pose)
-    before = registered.diagnostics.ambiguity_before
-    return replace(diagnostics, registration=replace(diagnostics.registration, ambiguity_before=before))
+    return replace(diagnostics, ambiguity_before=registered.diagnostics.ambiguity_before)
 
 
 def _correspondence(pair: Correspondence, first: int) -> Correspondence:

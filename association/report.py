@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -89,8 +89,9 @@ def _diagnostics(
     if nearest is not None:
         margin = max(0.0, best.posterior - nearest.posterior)
         runner_up = max(0.0, nearest.posterior / best.posterior) if best.posterior > 0.0 else None
+    fit = answer.registered.diagnostics
     return AssociationDiagnostics(
-        registration=answer.registered.diagnostics,
+        **{one.name: getattr(fit, one.name) for one in fields(fit)},
         inlier_fraction=best.fraction(context.lines.rows),
         score=best.score,
         runner_up=runner_up,

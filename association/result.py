@@ -126,13 +126,11 @@ class Corrections:
 
 
 @dataclass(frozen=True, slots=True)
-class AssociationDiagnostics:
-    """Numbers next to the pose.
+class AssociationDiagnostics(RegistrationDiagnostics):
+    """Numbers next to the pose; those of `RegistrationDiagnostics` are of the accepted pairs at the answered pose.
 
     Attributes
     ----------
-    registration : RegistrationDiagnostics
-        Of the accepted pairs at the answered pose.
     inlier_fraction : float
         Fraction of the scan's length that is matched.
     score : float
@@ -153,7 +151,6 @@ class AssociationDiagnostics:
         or shows no rotation.
     """
 
-    registration: RegistrationDiagnostics
     inlier_fraction: float
     score: float
     runner_up: float | None

@@ -67,18 +67,23 @@ def associate(
 
     The answer of a drive that is not usable is that of its last view, if `search_drive` finds that usable.
     """
-    return search(index, scan, KnownOfMaps(prior), options or AssociationOptions(), deadline)
+    return search(index, scan, KnownOfMaps(prior), options, deadline)
 
 
 def search(
-    maps: MapIndex | MapSet, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline | None
+    maps: MapIndex | MapSet,
+    scan: Scan,
+    known: KnownOfMaps,
+    options: AssociationOptions | None = None,
+    deadline: Deadline | None = None,
 ) -> AssociationResult:
     """Find a scan in a map, or on several: the search of each interface, with drives as `associate`."""
+    how = options or AssociationOptions()
 
     def once(seen: Scan) -> AssociationResult:
         if isinstance(maps, MapSet):
-            return association.associate_on_maps(maps, seen, known, options, deadline)
-        return association.associate(maps, seen, known.prior, options, deadline)
+            return association.associate_on_maps(maps, seen, known, how, deadline)
+        return association.associate(maps, seen, known.prior, how, deadline)
 
     return search_drive(once, scan)
 

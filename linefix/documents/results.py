@@ -194,8 +194,7 @@ def _diagnostics_json(diagnostics: AssociationDiagnostics | None, named: _Names)
         return None
     wall = diagnostics.critical_wall
     critical = None if wall is None else answer_of(replies.CriticalWallAnswer, wall, scan=named.listed(wall.scan))
-    fit = answer_of(replies.RegistrationDiagnosticsAnswer, diagnostics.registration)
-    return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical, **fit)
+    return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical)
 
 
 def explanation_json(found: Explanation) -> Json:

@@ -72,9 +72,9 @@ def test_a_room_of_four_walls_and_a_scan_from_a_known_pose() -> None:
             assert pair.overlap == pytest.approx(1.0, abs=1e-9)
             assert pair.alternatives == ()
         assert diagnostics_in(result).inlier_fraction == pytest.approx(1.0)
-        assert diagnostics_in(result).registration.pairs == 4
-        assert diagnostics_in(result).registration.dof == 5
-        assert diagnostics_in(result).registration.chi2 == pytest.approx(0.0, abs=1e-9)
+        assert diagnostics_in(result).pairs == 4
+        assert diagnostics_in(result).dof == 5
+        assert diagnostics_in(result).chi2 == pytest.approx(0.0, abs=1e-9)
 
 
 def test_residuals_are_those_of_the_formulas() -> None:
@@ -149,7 +149,7 @@ def test_the_pose_is_the_least_squares_estimate() -> None:
         x = x - np.linalg.lstsq(jacobian, residuals(x))[0]
     result = answer_of_four(ends)
     assert same_pose(pose_in(result), RigidTransform(*x.tolist()), 1e-6, 1e-6)
-    assert diagnostics_in(result).registration.chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
+    assert diagnostics_in(result).chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
 
 
 def overlap_at(wall: Floats, segment: Floats, at: RigidTransform) -> float:
@@ -231,12 +231,12 @@ def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> 
     assert diagnostics_in(result).corrections is None
     assert again.pose is not None
     assert same_pose(again.pose, pose_in(result), 1e-6, 1e-6)
-    assert again.diagnostics.dof == diagnostics_in(result).registration.dof
+    assert again.diagnostics.dof == diagnostics_in(result).dof
     if sigma > 0.0:
         return
     assert again.covariance is not None
     np.testing.assert_allclose(again.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
-    assert again.diagnostics.chi2 == pytest.approx(diagnostics_in(result).registration.chi2, rel=1e-6)
+    assert again.diagnostics.chi2 == pytest.approx(diagnostics_in(result).chi2, rel=1e-6)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03, None])
@@ -248,9 +248,9 @@ def test_an_equal_room_has_the_same_numbers(sigma: float | None) -> None:
     assert diagnostics is not None
     assert (other.score, other.inlier_fraction) == pytest.approx((diagnostics.score, diagnostics.inlier_fraction))
     assert other.probability == pytest.approx(result.probability, rel=1e-3)
-    assert other.reliability == pytest.approx(diagnostics.registration.reliability)
+    assert other.reliability == pytest.approx(diagnostics.reliability)
     for name in ("rotation", "translation"):
-        expected = getattr(diagnostics.registration.ambiguity, name)
+        expected = getattr(diagnostics.ambiguity, name)
         assert getattr(other.ambiguity, name) == pytest.approx(expected, rel=1e-6)
     assert other.covariance is not None
     np.testing.assert_allclose(other.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)

@@ -123,7 +123,7 @@ def assert_consistent(result: AssociationResult, scan: Scan, index: MapIndex, pr
     assert diagnostics.margin is None or diagnostics.margin >= 0.0
     assert diagnostics.runner_up is None or diagnostics.runner_up >= 0.0
     assert 0.0 <= diagnostics.inlier_fraction <= 1.0 + 1e-9
-    assert diagnostics.registration.pairs == len(result.correspondences)
+    assert diagnostics.pairs == len(result.correspondences)
     if diagnostics.critical_wall is not None:
         wall = diagnostics.critical_wall
         assert set(wall.scan) <= set(matched)

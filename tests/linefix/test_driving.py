@@ -30,8 +30,8 @@ from linefix.driving import (
     AGREED_DISTANCE,
     AGREED_PROBABILITY,
     LAST_VIEW_ONLY,
-    associate_on_maps,
     last_view,
+    search,
     search_drive,
 )
 from registration import Beams, MeasuredSegments, RigidTransform, Segments
@@ -145,7 +145,7 @@ def test_both_verdicts_are_explained() -> None:
 def test_on_several_maps_too() -> None:
     maps = linefix.index_maps({"room": ROOM, "hall": ROOM[:4] * [2.0, 3.0, 2.0, 3.0]})
     for known in (KnownOfMaps(), KnownOfMaps(HardPrior(INSIDE, 0.5, 0.5), "room")):
-        found = associate_on_maps(maps, WHOLE, known)
+        found = search(maps, WHOLE, known)
         assert (found.usable, found.map_id, codes(found)[-1]) == (True, "room", LAST_VIEW_ONLY.code)
     assert codes(linefix.locate(maps, WHOLE))[-1] == LAST_VIEW_ONLY.code
 
@@ -221,7 +221,7 @@ def test_a_prior_that_the_drive_contradicts_is_not_answered() -> None:
     elsewhere = HardPrior(RigidTransform(7.5, 2.0, INSIDE.theta), 0.5, 0.5)
     assert not linefix.associate(INDEX, WHOLE, elsewhere).usable
     maps = linefix.index_maps({"room": ROOM, "hall": ROOM[:4] * [2.0, 3.0, 2.0, 3.0]})
-    assert not associate_on_maps(maps, WHOLE, KnownOfMaps(elsewhere, "room")).usable
+    assert not search(maps, WHOLE, KnownOfMaps(elsewhere, "room")).usable
     assert linefix.associate(INDEX, WHOLE, HardPrior(INSIDE, 0.5, 0.5)).usable
 
 

@@ -174,9 +174,7 @@ def _diagnostics(result: AssociationResult) -> dict[str, Any]:
     """Return the answer's diagnostics by name, None where there are none."""
     if result.diagnostics is None:
         return dict.fromkeys((*DIAGNOSTICS, *OF_THE_REGISTRATION))
-    registration = result.diagnostics.registration
-    found = {name: getattr(result.diagnostics, name) for name in DIAGNOSTICS}
-    return found | {name: getattr(registration, name) for name in OF_THE_REGISTRATION}
+    return {name: getattr(result.diagnostics, name) for name in (*DIAGNOSTICS, *OF_THE_REGISTRATION)}
 
 
 def share_read(case: Case, pose: RigidTransform) -> float:
