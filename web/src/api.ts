@@ -73,7 +73,7 @@ export const applyChanges = (map: MapDocument, { changes, sharpened }: Proposal)
 export const limits = () => call<contract.Limits>("GET", "/v1/limits");
 
 /** Convert files of another tool to a map; the service stores nothing. */
-export const importMap = (files: File[], units: string) => importing<Imported>("/v1/maps:import", files, units ? { units } : {});
+export const importMap = (files: File[], options: Record<string, string>) => importing<Imported>("/v1/maps:import", files, options);
 /** Read the scans of a log, at most so many, evenly spread. */
 export const importScans = (files: File[], most: number) => importing<ImportedScans>("/v1/scans:import", files, { max_scans: String(most) });
 

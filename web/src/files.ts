@@ -2,6 +2,7 @@
 
 import { importMap, importScans } from "./api";
 import { askSoon } from "./asking";
+import { dropped } from "./dropped";
 import { openSeveral } from "./floors";
 import { showImport, showScanImport } from "./imported";
 import { openLog, openScans } from "./log";
@@ -14,9 +15,11 @@ import { messageOf, write } from "./words";
 const about = document.querySelector<HTMLElement>("#about")!;
 const status = document.querySelector<HTMLElement>("#reading")!;
 const units = document.querySelector<HTMLSelectElement>("#units")!;
+const surface = document.querySelector<HTMLInputElement>("#surface")!;
 const LOGS = /\.(bag|mcap|db3|log|clf|carmen)$|^metadata\.yaml$/i;
+const GRIDS = /\.(ya?ml|pgm|png|bmp|bag|mcap|db3)$/i;
 const MOST_SCANS = 200; // of a log that are searched here
-let drawing: File[] = []; // the last one, for another unit
+let drawing: File[] = []; // the last one, for other options
 let last: Promise<unknown> = Promise.resolve(); // of the files that were opened
 let waiting = 0;
 let opening = 0;
@@ -57,7 +60,9 @@ async function readMap(files: File[], mine: number): Promise<void> {
   drawing = files;
   status.textContent = `Reading ${files[0].name} ...`;
   await requirePicture(files);
-  const found = await importMap(files, units.value);
+  const isGrid = files.some(({ name }) => GRIDS.test(name));
+  const options = isGrid ? { surface: surface.value } : { units: units.value };
+  const found = await importMap(files, Object.fromEntries(Object.entries(options).filter(([, value]) => value)));
   if (!isLatest(mine)) return;
   takeMap(found.map);
   if (found.picture) {
@@ -164,11 +169,11 @@ input.addEventListener("change", () => {
   input.value = "";
 });
 // After a message about a missing unit the drawing need not be opened again.
-units.addEventListener("change", () => {
+for (const option of [units, surface]) option.addEventListener("change", () => {
   if (drawing.length) open(drawing);
 });
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {
   event.preventDefault();
-  open([...(event.dataTransfer?.files ?? [])]);
+  if (event.dataTransfer) dropped(event.dataTransfer).then(open, (error: unknown) => write(status, messageOf(error)));
 });

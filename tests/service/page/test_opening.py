@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Page, Response, Route, expect
 
 from examples.sample import OfficePlan, offices, way_through, with_furniture, write_drive, write_grid
 from tests.running import RunningService, running
 from tests.service.http.test_map_points import MAP, SCAN
-from tests.service.importing.forms import SQUARE
+from tests.service.importing.forms import SQUARE, room_grid
 
 from .plan import shown, verdict
 
@@ -83,6 +83,57 @@ def test_a_grid_needs_its_picture(page: Page, tmp_path: Path) -> None:
     (tmp_path / "hq floor.pgm").write_bytes(b"P5 1 1 255 0")
     page.set_input_files("#files", [tmp_path / "hq floor.pgm"])
     expect(page.locator("#reading")).to_have_text("hq floor.pgm needs its YAML file: choose both.")
+
+
+def drop(page: Page, *paths: Path) -> None:
+    """Drop files and folders on the plan, as a file manager does."""
+    data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+    session = page.context.new_cdp_session(page)
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 500, "y": 400, "data": data})
+
+
+def bounds_of(answer: Response) -> np.ndarray:
+    """Return the least and greatest x and y of an imported map, metres."""
+    corners = np.array(answer.json()["map"]["segments"]).reshape(-1, 2)
+    return np.concatenate([corners.min(axis=0), corners.max(axis=0)])
+
+
+def test_a_folder_is_dropped(page: Page, tmp_path: Path) -> None:
+    """A grid in a folder inside of it, a scan, and a hidden file that no program reads."""
+    (tmp_path / "site" / "map").mkdir(parents=True)
+    for name, content in room_grid().items():
+        (tmp_path / "site" / "map" / name).write_bytes(content)
+    (tmp_path / "site" / "scan.json").write_text(json.dumps(SCAN))
+    (tmp_path / "site" / ".DS_Store").write_bytes(b"0")
+    shown(page, "flat", "usable")
+    is_scan = lambda asked: asked.url.endswith("/associate") and asked.post_data_json["scan"] == SCAN  # noqa: E731
+    with page.expect_request(is_scan, timeout=60_000):
+        drop(page, tmp_path / "site")
+    expect(page.locator("#about")).to_contain_text("walls from room.yaml", timeout=60_000)
+    expect(page.locator("#reading")).to_be_empty()
+
+
+def test_a_folder_of_too_many_files_is_refused(page: Page, tmp_path: Path) -> None:
+    (tmp_path / "site").mkdir()
+    for number in range(120):
+        (tmp_path / "site" / f"{number}.csv").write_bytes(SQUARE)
+    shown(page, "flat", "usable")
+    drop(page, tmp_path / "site")
+    expect(page.locator("#reading")).to_contain_text("has more than 64 files")
+
+
+def test_the_surface_of_walls_is_set(page: Page, tmp_path: Path) -> None:
+    for name, content in room_grid().items():
+        (tmp_path / name).write_bytes(content)
+    shown(page, "flat", "usable")
+    with page.expect_response("**/v1/maps:import", timeout=60_000) as answer:
+        page.set_input_files("#files", [tmp_path / name for name in room_grid()])
+    front = bounds_of(answer.value)
+    page.get_by_label("Surface of walls").fill("2")
+    with page.expect_response("**/v1/maps:import", timeout=60_000) as answer:
+        page.get_by_label("Surface of walls").press("Enter")
+    assert bounds_of(answer.value) == pytest.approx(front + np.array([-0.1, -0.1, 0.1, 0.1]), abs=0.02)
 
 
 def test_an_example_that_is_chosen_meanwhile_stays(page: Page, tmp_path: Path) -> None:
