@@ -39,7 +39,7 @@ def compile_kernels() -> None:
             return
         alone = (os.cpu_count() or 1) == 1 or directory is None
         with nullcontext() if alone else start_compiler("compile_second_half") as second:
-            warmup.warm_up_first_half()
+            warmup.warm_up_searching()
             if second is not None:
                 second.wait()  # its standard input is open until here: when it closes, the process ends
         warmup.warm_up()
@@ -54,15 +54,10 @@ def _hold(lock: IO[str]) -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
 
 
-def compile_second_half() -> None:
-    """Compile about half of the kernels, next to the process that compiles the others."""
-    warmup.warm_up_second_half()
-
-
 def run(task: str) -> None:
     """Run a function of this module in a process of its own."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    {"compile_kernels": compile_kernels, "compile_second_half": compile_second_half}[task]()
+    {"compile_kernels": compile_kernels, "compile_second_half": warmup.warm_up_second_half}[task]()
 
 
 def _end_with_parent() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from association import (
     AssociationOptions,
@@ -34,54 +35,26 @@ from registration import (
     register,
 )
 from simulation import scan
+from simulation.worlds import outline
 from vectorization import LaserScan, vectorize
 
-# A room with a niche, seen from inside: free space on the left of every wall.
-ROOM = np.array(
-    [
-        [-4.0, -3.0, 4.0, -3.0],
-        [4.0, -3.0, 4.0, 1.0],
-        [4.0, 1.0, 2.5, 1.0],
-        [2.5, 1.0, 2.5, 3.0],
-        [2.5, 3.0, -4.0, 3.0],
-        [-4.0, 3.0, -4.0, -3.0],
-    ]
-)
-# As another, but symmetric about an axis.
-SYMMETRIC_ROOM = np.array(
-    [
-        [-4.0, -3.0, 4.0, -3.0],
-        [4.0, -3.0, 4.0, 3.0],
-        [4.0, 3.0, 1.0, 3.0],
-        [1.0, 3.0, 1.0, 1.5],
-        [1.0, 1.5, -1.0, 1.5],
-        [-1.0, 1.5, -1.0, 3.0],
-        [-1.0, 3.0, -4.0, 3.0],
-        [-4.0, 3.0, -4.0, -3.0],
-    ]
-)
-
-
+# A room with a niche, seen from inside: free space on the left of every wall. And another, symmetric about an axis.
+ROOM = outline([(-4.0, -3.0), (4.0, -3.0), (4.0, 1.0), (2.5, 1.0), (2.5, 3.0), (-4.0, 3.0)])
+_HALF = [(4.0, -3.0), (4.0, 3.0), (1.0, 3.0), (1.0, 1.5)]
+SYMMETRIC_ROOM = outline([(-4.0, -3.0), *_HALF, *((-x, y) for x, y in _HALF[:0:-1])])
 THINGS = np.array([[1.0, 2.0], [-2.0, 1.0]])  # too small for walls
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 
 def warm_up() -> None:
     """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
-    warm_up_registering()
-    warm_up_vectorizing()
-    warm_up_simulating()
+    warm_up_second_half()
     warm_up_searching()
     warm_up_analyzing()
 
 
-def warm_up_first_half() -> None:
-    """Compile about half of the kernels: those of the search."""
-    warm_up_searching()
-
-
 def warm_up_second_half() -> None:
-    """Compile other kernels, so that the two halves seldom meet at the same kernel."""
+    """Compile other kernels than those of the search, so that two processes seldom meet at the same kernel."""
     warm_up_registering()
     warm_up_vectorizing()
     warm_up_simulating()
@@ -169,15 +142,12 @@ def _with_beams() -> Scan:
     return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
 
 
-def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def room_ranges(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance from the origin to the room's walls along each angle, metres."""
-    nearest = np.full(len(angles), np.inf)
-    for x1, y1, x2, y2 in ROOM:
-        ex, ey = x2 - x1, y2 - y1
-        cross = np.cos(angles) * ey - np.sin(angles) * ex
-        with np.errstate(divide="ignore", invalid="ignore"):
-            along = (x1 * ey - y1 * ex) / cross
-            share = (x1 * np.sin(angles) - y1 * np.cos(angles)) / cross
-        hit = (np.abs(cross) > 1e-12) & (along > 0.0) & (share >= 0.0) & (share <= 1.0)
-        nearest = np.where(hit, np.minimum(nearest, along), nearest)
+    x, y, ex, ey = (*ROOM[:, :2].T[:, :, None], *(ROOM[:, 2:] - ROOM[:, :2]).T[:, :, None])
+    cross = np.cos(angles) * ey - np.sin(angles) * ex
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along, fraction = (x * ey - y * ex) / cross, (x * np.sin(angles) - y * np.cos(angles)) / cross
+    hit = (np.abs(cross) > 1e-12) & (along > 0.0) & (fraction >= 0.0) & (fraction <= 1.0)
+    nearest: NDArray[np.float64] = np.where(hit, along, np.inf).min(axis=0)
     return nearest

@@ -20,25 +20,19 @@ class NotFiniteError(ArithmeticError):
 
 def require_finite(value: Any) -> None:
     """Raise `NotFiniteError` when there is a NaN or infinity anywhere in an answer."""
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise NotFiniteError("an answer holds a number that is not finite")
-    elif isinstance(value, dict):
-        _require_all_finite(value.values())
-    elif isinstance(value, list | tuple):
-        _require_all_finite(value)
-    elif isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():
-        raise NotFiniteError("an answer holds an array that is not finite")
-
-
-def _require_all_finite(values: Iterable[Any]) -> None:
+    if isinstance(value, np.ndarray):
+        value = [] if value.dtype.kind != "f" or np.isfinite(value).all() else [math.nan]
+    if isinstance(value, dict):
+        value = value.values()
+    elif not isinstance(value, list | tuple):
+        value = (value,) if isinstance(value, float) else ()
     # Most of what is in an answer is a number or a name: these are looked at here, without a call for each.
-    for value in values:
-        if type(value) is float:
-            if not math.isfinite(value):
+    for one in value:
+        if isinstance(one, float):
+            if not math.isfinite(one):
                 raise NotFiniteError("an answer holds a number that is not finite")
-        elif type(value) not in _PLAIN:
-            require_finite(value)
+        elif type(one) not in _PLAIN:
+            require_finite(one)
 
 
 def encode(answer: Any) -> bytes:

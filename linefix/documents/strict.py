@@ -103,33 +103,27 @@ class OneOf:
 
 
 def _free_json(value: Any) -> Any:
-    layer, depth, count = [value], 0, 0
-    while layer:
-        depth += 1
-        count += len(layer)
-        if count > MAX_FREE_BYTES:  # each takes one at least
-            raise _too_long(count)
-        if depth > MAX_FREE_DEPTH:
-            raise PydanticCustomError(
-                "too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found {depth} or more; flatten it"
-            )
-        inner: list[Any] = []
-        for item in layer:
-            if isinstance(item, dict):
-                inner.extend(item.values())
-            elif isinstance(item, list):
-                inner.extend(item)
-        layer = inner
-    size = len(orjson.dumps(value))
+    try:
+        size = len(orjson.dumps(value))
+    except orjson.JSONEncodeError:  # it is nested more than 254 levels deep
+        raise _TOO_DEEP from None
     if size > MAX_FREE_BYTES:
-        raise _too_long(size)
+        raise PydanticCustomError(
+            "json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found {size}; send less"
+        )
+    if _depth(value) > MAX_FREE_DEPTH:
+        raise _TOO_DEEP
     return value
 
 
-def _too_long(size: int) -> PydanticCustomError:
-    return PydanticCustomError(
-        "json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found {size} or more; send less"
-    )
+_TOO_DEEP = PydanticCustomError(
+    "too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found more; flatten it"
+)
+
+
+def _depth(value: Any) -> int:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + max(map(_depth, inner), default=0)
 
 
 FreeJson = Annotated[Any, PlainValidator(_free_json), WithJsonSchema({})]
