@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field
-
 from map_quality import FindingCode
 
 from .replies import Index, MapReference, PoseAnswer, TimingAnswer, Verdict
@@ -13,71 +11,143 @@ from .strict import Answer
 
 
 class FindingAnswer(Answer):
-    """A finding of a check."""
+    """A finding of a check.
 
-    code: FindingCode = Field(description="stable; later versions may add codes")
-    message: str = Field(description="doubtful part and remedy, for people")
-    segments: list[Index] = Field(description="indices of the map's segments, the first 1,000")
-    count: Index = Field(description="number of all such segments")
+    Attributes
+    ----------
+    code
+        stable; later versions may add codes
+    message
+        doubtful part and remedy, for people
+    segments
+        indices of the map's segments, the first 1,000
+    count
+        number of all such segments
+    """
+
+    code: FindingCode
+    message: str
+    segments: list[Index]
+    count: Index
 
 
 class SizeAnswer(Answer):
-    """Size of a map."""
+    """Size of a map.
 
-    segment_count: Index = Field(description="number of segments, as sent")
-    walls: Index = Field(description="number of walls, with collinear segments joined")
-    length: float = Field(description="total length of the walls, metres")
-    diagonal: float = Field(description="diagonal of the box around the walls, metres")
+    Attributes
+    ----------
+    segment_count
+        number of segments, as sent
+    walls
+        number of walls, with collinear segments joined
+    length
+        total length of the walls, metres
+    diagonal
+        diagonal of the box around the walls, metres
+    """
+
+    segment_count: Index
+    walls: Index
+    length: float
+    diagonal: float
 
 
 class AdviceAnswer(Answer):
-    """Recommended properties of the map; null: no recommendation."""
+    """Recommended properties of the map; null: no recommendation.
 
-    sigma: float | None = Field(description="metres")
+    Attributes
+    ----------
+    sigma
+        metres
+    """
+
+    sigma: float | None
     oriented: bool | None
 
 
 class PlaceAnswer(Answer):
-    """A pose at which a scan looks as at another one."""
+    """A pose at which a scan looks as at another one.
+
+    Attributes
+    ----------
+    similar_pose
+        the other pose
+    """
 
     pose: PoseAnswer
-    similar_pose: PoseAnswer = Field(description="the other pose")
+    similar_pose: PoseAnswer
 
 
 class SampleAnswer(Answer):
-    """Result of one scan in the map as it is."""
+    """Result of one scan in the map as it is.
+
+    Attributes
+    ----------
+    status
+        null: the deadline left no time for it
+    """
 
     index: Index
-    status: Verdict | None = Field(description="null: the deadline left no time for it")
+    status: Verdict | None
     usable: bool
     pose: PoseAnswer | None
 
 
 class SamplesAnswer(Answer):
-    """Results of the sample scans."""
+    """Results of the sample scans.
 
-    usable: Index = Field(description="number of usable scans in the map as it is")
-    usable_as_advised: Index = Field(description="number of usable scans with the advised properties of the map")
-    wall_thickness: float | None = Field(description="metres by which walls are thicker than drawn; null: no estimate")
+    Attributes
+    ----------
+    usable
+        number of usable scans in the map as it is
+    usable_as_advised
+        number of usable scans with the advised properties of the map
+    wall_thickness
+        metres by which walls are thicker than drawn; null: no estimate
+    """
+
+    usable: Index
+    usable_as_advised: Index
+    wall_thickness: float | None
     scans: list[SampleAnswer]
 
 
 class MapCheckAnswer(Answer):
-    """Check of a map without scans."""
+    """Check of a map without scans.
 
-    findings: list[FindingAnswer] = Field(description="the most important first")
+    Attributes
+    ----------
+    findings
+        the most important first
+    places
+        poses at which a scan looks as at another pose
+    viewpoints
+        number of poses that were compared
+    complete
+        false if the deadline ended the check early
+    """
+
+    findings: list[FindingAnswer]
     size: SizeAnswer
     advice: AdviceAnswer
-    places: list[PlaceAnswer] = Field(description="poses at which a scan looks as at another pose")
-    viewpoints: Index = Field(description="number of poses that were compared")
-    complete: bool = Field(description="false if the deadline ended the check early")
+    places: list[PlaceAnswer]
+    viewpoints: Index
+    complete: bool
 
 
 class CheckAnswer(MapCheckAnswer):
-    """Check of a map, with or without sample scans."""
+    """Check of a map, with or without sample scans.
 
-    samples: SamplesAnswer | None = Field(description="null without scans")
+    Attributes
+    ----------
+    samples
+        null without scans
+    client_ref
+        returned as it was sent
+    """
+
+    samples: SamplesAnswer | None
     map: MapReference
-    client_ref: Any = Field(description="returned as it was sent")
+    client_ref: Any
     request_id: str
     timing_ms: TimingAnswer

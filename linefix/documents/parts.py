@@ -30,40 +30,58 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 
 
 class MapDocument(Strict):
-    """A map, as a file of its own or to be stored."""
+    """A map, as a file of its own or to be stored.
 
-    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
-    sigma: MapSigma | None = Field(
-        None, description="standard deviation of the map's lines, normal to the lines, metres; null: estimated"
-    )
-    oriented: bool | None = Field(
-        None,
-        description="whether free space lies on the left of its segments; null: true; a request's option has "
-        "precedence",
-    )
-    frame_id: FrameId = Field("map", description="frame of the map, as `frame_id` of the answer")
-    points: MapPointRows = Field(
-        default_factory=lambda: np.zeros((0, 2)),
-        description="`[x, y]` each, metres: objects too small for a wall, such as legs and posts; evidence for the "
-        "beams of a scan only; at most as many as `max_map_segments` of /v1/limits",
-        json_schema_extra={"default": []},
-    )
-    points_sigma: PointSigma | None = Field(
-        None, description="standard deviation of the points' positions, and half their width, metres; null: 0.05"
-    )
-    meta: FreeJson = Field(None, description="returned as it was sent")
+    Attributes
+    ----------
+    segments
+        `[x1, y1, x2, y2]` each, metres, free space on the left
+    sigma
+        standard deviation of the map's lines, normal to the lines, metres; null: estimated
+    oriented
+        whether free space lies on the left of its segments; null: true; a request's option has precedence
+    frame_id
+        frame of the map, as `frame_id` of the answer
+    points
+        `[x, y]` each, metres: objects too small for a wall, such as legs and posts; evidence for the beams of a scan
+        only; at most as many as `max_map_segments` of /v1/limits
+    points_sigma
+        standard deviation of the points' positions, and half their width, metres; null: 0.05
+    meta
+        returned as it was sent
+    """
+
+    segments: MapSegmentRows
+    sigma: MapSigma | None = None
+    oriented: bool | None = None
+    frame_id: FrameId = "map"
+    points: MapPointRows = Field(default_factory=lambda: np.zeros((0, 2)), json_schema_extra={"default": []})
+    points_sigma: PointSigma | None = None
+    meta: FreeJson = None
 
 
 class InlineMap(MapDocument):
-    """A map in the request itself."""
+    """A map in the request itself.
 
-    meta: FreeJson = Field(None, description="not used; allowed, so that a map file may be sent unchanged")
+    Attributes
+    ----------
+    meta
+        not used; allowed, so that a map file may be sent unchanged
+    """
+
+    meta: FreeJson = None
 
 
 class StoredMap(Strict):
-    """A map that was stored with PUT before."""
+    """A map that was stored with PUT before.
 
-    map_id: MapId = Field(description="id under which the map was stored")
+    Attributes
+    ----------
+    map_id
+        id under which the map was stored
+    """
+
+    map_id: MapId
 
 
 def is_oriented(asked: bool | None, own: bool | None) -> bool:
@@ -75,13 +93,21 @@ AnyMap = Annotated[InlineMap | StoredMap, OneOf("segments and map_id, found both
 
 
 class _Scan(Strict):
-    frame_id: FrameId = Field("laser", description="frame of the scan, as `child_frame_id` of the answer")
-    stamp: FreeJson = Field(None, description="returned as it was sent")
-    viewpoint: Point | None = Field(
-        default_factory=lambda: [0.0, 0.0],
-        description="position of the sensor, metres; null: several positions, and lines of sight are not used as "
-        "evidence",
-    )
+    """Fields of a scan in each form.
+
+    Attributes
+    ----------
+    frame_id
+        frame of the scan, as `child_frame_id` of the answer
+    stamp
+        returned as it was sent
+    viewpoint
+        position of the sensor, metres; null: several positions, and lines of sight are not used as evidence
+    """
+
+    frame_id: FrameId = "laser"
+    stamp: FreeJson = None
+    viewpoint: Point | None = Field(default_factory=lambda: [0.0, 0.0])
 
 
 def require_at_the_sensor(viewpoint: list[float] | None) -> None:
@@ -94,19 +120,27 @@ def require_at_the_sensor(viewpoint: list[float] | None) -> None:
 
 
 class MeasuredFields(Strict):
-    """Segments of a scan with what is known of the points behind them."""
+    """Segments of a scan with what is known of the points behind them.
 
-    segments: ScanSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, in the sensor's frame")
-    sigma: SigmaOrSigmas = Field(
-        0.02, description="standard deviation of single points normal to the wall, metres; of all or of each segment"
-    )
-    point_counts: PointCounts | None = Field(
-        None, description="number of points on each segment; default length / 0.05, and at least 2 on each wall"
-    )
-    centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
-    spreads: Spreads | None = Field(
-        None, description="second moment of those points along the segment, m^2; send it with `centroids`"
-    )
+    Attributes
+    ----------
+    segments
+        `[x1, y1, x2, y2]` each, metres, in the sensor's frame
+    sigma
+        standard deviation of single points normal to the wall, metres; of all or of each segment
+    point_counts
+        number of points on each segment; default length / 0.05, and at least 2 on each wall
+    centroids
+        mean of those points, as /v1/vectorize gives it, metres
+    spreads
+        second moment of those points along the segment, m^2; send it with `centroids`
+    """
+
+    segments: ScanSegmentRows
+    sigma: SigmaOrSigmas = 0.02
+    point_counts: PointCounts | None = None
+    centroids: CentroidRows | None = None
+    spreads: Spreads | None = None
 
     @model_validator(mode="after")
     def _both_moments(self) -> MeasuredFields:
@@ -122,11 +156,21 @@ class SegmentScan(_Scan, MeasuredFields):
 
 
 class Header(Strict):
-    """The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself."""
+    """The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself.
 
-    stamp: FreeJson = Field(None, description="returned as it was sent")
-    frame_id: FrameId = Field("", description="frame of the scan where it names none itself")
-    seq: Any = Field(None, description="sequence number of ROS 1; not used")
+    Attributes
+    ----------
+    stamp
+        returned as it was sent
+    frame_id
+        frame of the scan where it names none itself
+    seq
+        sequence number of ROS 1; not used
+    """
+
+    stamp: FreeJson = None
+    frame_id: FrameId = ""
+    seq: Any = None
 
 
 Increment = Annotated[
@@ -139,40 +183,60 @@ Increment = Annotated[
 
 
 class Laser(Strict):
-    """One turn of a scanner, as in a LaserScan message."""
+    """One turn of a scanner, as in a LaserScan message.
 
-    angle_min: Angle = Field(description="radians, of the first beam")
-    angle_increment: Increment = Field(description="radians from beam to beam; negative for a clockwise scanner")
-    ranges: Ranges = Field(
-        description="metres; null or below range_min: unknown; above range_max: no return, so free space"
-    )
-    range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = Field(None, description="metres")
-    range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
-        None, description="metres; a range of exactly this is a return"
-    )
-    header: Header | None = Field(None, description="header of a LaserScan message")
-    time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
-        None,
-        description="seconds from beam to beam; with a `twist` the motion during the scan is corrected; without it "
-        "the covariance is wider, and the answer has the warning `motion_unknown`",
-    )
-    angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
-        None,
-        description="radians, of the last beam; at most two beams or 3 degrees from that of the other fields",
-    )
-    scan_time: Any = Field(None, description="field of a LaserScan message; not used")
-    intensities: Any = Field(None, description="field of a LaserScan message; not used")
+    Attributes
+    ----------
+    angle_min
+        radians, of the first beam
+    angle_increment
+        radians from beam to beam; negative for a clockwise scanner
+    ranges
+        metres; null or below range_min: unknown; above range_max: no return, so free space
+    range_min
+        metres
+    range_max
+        metres; a range of exactly this is a return
+    header
+        header of a LaserScan message
+    time_increment
+        seconds from beam to beam; with a `twist` the motion during the scan is corrected; without it the covariance is
+        wider, and the answer has the warning `motion_unknown`
+    angle_max
+        radians, of the last beam; at most two beams or 3 degrees from that of the other fields
+    scan_time, intensities
+        field of a LaserScan message; not used
+    """
+
+    angle_min: Angle
+    angle_increment: Increment
+    ranges: Ranges
+    range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
+    range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    header: Header | None = None
+    time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
+    scan_time: Any = None
+    intensities: Any = None
 
 
 Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
 
 
 class Twist(Strict):
-    """Constant velocity of a sensor during a scan, in its own frame."""
+    """Constant velocity of a sensor during a scan, in its own frame.
 
-    vx: Speed = Field(description="m/s")
-    vy: Speed = Field(0.0, description="m/s")
-    omega: Speed = Field(description="rad/s, counter-clockwise")
+    Attributes
+    ----------
+    vx, vy
+        m/s
+    omega
+        rad/s, counter-clockwise
+    """
+
+    vx: Speed
+    vy: Speed = 0.0
+    omega: Speed
 
 
 def require_times(laser: Laser, twist: Twist | None) -> None:
@@ -184,13 +248,19 @@ def require_times(laser: Laser, twist: Twist | None) -> None:
 
 
 class RangeFields(Strict):
-    """Ranges of a sensor, measured where it stood."""
+    """Ranges of a sensor, measured where it stood.
+
+    Attributes
+    ----------
+    sigma
+        standard deviation of single ranges, metres; null: estimated
+    twist
+        velocity of the sensor during the scan, in its own frame; 0: at rest
+    """
 
     laser: Laser
-    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
-    twist: Twist | None = Field(
-        None, description="velocity of the sensor during the scan, in its own frame; 0: at rest"
-    )
+    sigma: RaySigma | None = None
+    twist: Twist | None = None
 
     @model_validator(mode="after")
     def _from_the_sensor(self) -> Self:
@@ -200,20 +270,31 @@ class RangeFields(Strict):
 
 
 class PointFields(Strict):
-    """Points of a sensor, in scanning order."""
+    """Points of a sensor, in scanning order.
 
-    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
-    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
+    Attributes
+    ----------
+    points
+        `[x, y]` each, metres, in the sensor's frame, in scanning order
+    sigma
+        standard deviation of single points, metres; null: estimated
+    """
+
+    points: PointRows
+    sigma: RaySigma | None = None
 
 
 class LaserScan(_Scan, RangeFields):
-    """A scan as ranges."""
+    """A scan as ranges.
 
-    twist: Twist | None = Field(
-        None,
-        description="velocity of the sensor during the scan, in its own frame; 0: at rest; the pose of the answer is "
-        "that of the first beam",
-    )
+    Attributes
+    ----------
+    twist
+        velocity of the sensor during the scan, in its own frame; 0: at rest; the pose of the answer is that of the
+        first beam
+    """
+
+    twist: Twist | None = None
 
 
 class PointScan(_Scan, PointFields):
@@ -221,24 +302,40 @@ class PointScan(_Scan, PointFields):
 
 
 class SoftPriorFields(Pose):
-    """A Gaussian over the pose. It is part of the score, and never fused into pose or covariance."""
+    """A Gaussian over the pose. It is part of the score, and never fused into pose or covariance.
 
-    covariance: Covariance = Field(
-        description="covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite"
-    )
-    map_id: MapId | None = Field(None, description="of several maps the one whose frame the pose is in")
+    Attributes
+    ----------
+    covariance
+        covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite
+    map_id
+        of several maps the one whose frame the pose is in
+    """
+
+    covariance: Covariance
+    map_id: MapId | None = None
 
 
 class HardPriorFields(Pose):
-    """A window that must contain the answer."""
+    """A window that must contain the answer.
 
-    radius: Annotated[float, Field(gt=0.0, le=1e6)] = Field(description="metres around (x, y)")
+    Attributes
+    ----------
+    radius
+        metres around (x, y)
+    angle
+        radians around theta
+    map_id
+        of several maps the one whose frame the pose is in
+    """
+
+    radius: Annotated[float, Field(gt=0.0, le=1e6)]
     angle: Annotated[
         float,
         AfterValidator(in_radians(5e-324, 4.0, "above 0 and up to 4")),
         Field(json_schema_extra={"exclusiveMinimum": 0.0, "maximum": 4.0}),
-    ] = Field(description="radians around theta")
-    map_id: MapId | None = Field(None, description="of several maps the one whose frame the pose is in")
+    ]
+    map_id: MapId | None = None
 
 
 AnyPrior = Annotated[
@@ -248,47 +345,54 @@ AnyPrior = Annotated[
 
 
 class SearchOptions(Strict):
-    """How to search, and what to put into the answer."""
+    """How to search, and what to put into the answer.
 
-    max_alternatives: Annotated[int, Field(ge=0, le=50)] = Field(
-        5, description="largest number of other poses to return"
-    )
-    confidence: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
-        0.9999, description="probability of not missing a better pose at which the search ends"
-    )
-    exhaustive: bool = Field(False, description="try every base, independent of `confidence`")
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of random sampling")
-    sampling: Literal["ordered", "random"] = Field(
-        "ordered", description="order of the bases: informative and cheap ones first, or random by `seed`"
-    )
-    deadline_ms: DeadlineMs | None = Field(
-        None, description="milliseconds; a longer one than `max_deadline_ms` of /v1/limits is shortened to it"
-    )
-    oriented: bool | None = Field(
-        None,
-        description="whether free space lies on the left of segments; null: as the map states, else true",
-    )
-    offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(
-        None, description="gate for offsets between scan lines and walls, metres; null: from the sigmas"
-    )
-    angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(
-        None, description="gate for angles between scan lines and walls, radians; null: from the sigmas"
-    )
-    min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        0.5, description="fraction of a scan segment's length that must lie on the map"
-    )
-    on_map: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
-        0.9, description="prior probability that the scan was taken on this map, or on one of these"
-    )
-    usable_from: Annotated[float, Field(ge=0.5, le=0.9999)] = Field(
-        0.95, description="least `probability` of a usable answer"
-    )
-    estimator: Literal["joint", "one_step"] = Field(
-        "joint", description="estimator of the final pose; `one_step` is the published closed form"
-    )
-    rotation: Literal["wahba", "mitsuta"] = Field("wahba", description="estimate of the rotation for `one_step`")
-    include: list[IncludeName] = Field(
-        default_factory=lambda: list(EVERYTHING),
-        max_length=16,
-        description="parts of the answer",
-    )
+    Attributes
+    ----------
+    max_alternatives
+        largest number of other poses to return
+    confidence
+        probability of not missing a better pose at which the search ends
+    exhaustive
+        try every base, independent of `confidence`
+    seed
+        seed of random sampling
+    sampling
+        order of the bases: informative and cheap ones first, or random by `seed`
+    deadline_ms
+        milliseconds; a longer one than `max_deadline_ms` of /v1/limits is shortened to it
+    oriented
+        whether free space lies on the left of segments; null: as the map states, else true
+    offset_tolerance
+        gate for offsets between scan lines and walls, metres; null: from the sigmas
+    angle_tolerance
+        gate for angles between scan lines and walls, radians; null: from the sigmas
+    min_overlap
+        fraction of a scan segment's length that must lie on the map
+    on_map
+        prior probability that the scan was taken on this map, or on one of these
+    usable_from
+        least `probability` of a usable answer
+    estimator
+        estimator of the final pose; `one_step` is the published closed form
+    rotation
+        estimate of the rotation for `one_step`
+    include
+        parts of the answer
+    """
+
+    max_alternatives: Annotated[int, Field(ge=0, le=50)] = 5
+    confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
+    exhaustive: bool = False
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    sampling: Literal["ordered", "random"] = "ordered"
+    deadline_ms: DeadlineMs | None = None
+    oriented: bool | None = None
+    offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = None
+    angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = None
+    min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    on_map: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9
+    usable_from: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.95
+    estimator: Literal["joint", "one_step"] = "joint"
+    rotation: Literal["wahba", "mitsuta"] = "wahba"
+    include: list[IncludeName] = Field(default_factory=lambda: list(EVERYTHING), max_length=16)

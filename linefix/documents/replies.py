@@ -21,69 +21,137 @@ Verdict = Literal["ok", "ambiguous", "degenerate", "no_match"]
 
 
 class TimingAnswer(Answer):
-    """Duration of the request, milliseconds."""
+    """Duration of the request, milliseconds.
 
-    decode: Milliseconds = Field(
-        description="from the arrival of the body until the search: reading, waiting, indexing"
-    )
-    search: Milliseconds = Field(description="the search, or the other computation of this request")
-    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+    Attributes
+    ----------
+    decode
+        from the arrival of the body until the search: reading, waiting, indexing
+    search
+        the search, or the other computation of this request
+    total
+        from the arrival of the body until the answer is written
+    """
+
+    decode: Milliseconds
+    search: Milliseconds
+    total: Milliseconds
 
 
 class PoseAnswer(Answer):
-    """The scan frame's pose in the map frame."""
+    """The scan frame's pose in the map frame.
 
-    x: float = Field(description="metres")
-    y: float = Field(description="metres")
-    theta: float = Field(description="radians, counter-clockwise, in (-pi, pi]")
+    Attributes
+    ----------
+    x, y
+        metres
+    theta
+        radians, counter-clockwise, in (-pi, pi]
+    """
+
+    x: float
+    y: float
+    theta: float
 
 
 class AmbiguityAnswer(Answer):
-    """The paper's ambiguity, with the weights used."""
+    """The paper's ambiguity, with the weights used.
 
-    translation: float = Field(description="ambiguity of the translation")
-    rotation: float = Field(description="ambiguity of the rotation")
-    total: float = Field(description="sum of both")
+    Attributes
+    ----------
+    translation
+        ambiguity of the translation
+    rotation
+        ambiguity of the rotation
+    total
+        sum of both
+    """
+
+    translation: float
+    rotation: float
+    total: float
 
 
 class RegistrationDiagnosticsAnswer(Answer):
-    """Diagnostics of a registration."""
+    """Diagnostics of a registration.
 
-    ambiguity: AmbiguityAnswer = Field(description="ambiguity at the returned pose")
-    ambiguity_before: AmbiguityAnswer = Field(description="ambiguity at the pose 0, 0, 0")
-    ambiguity_at: AmbiguityAnswer | None = Field(description="ambiguity at the pose `evaluate_at`")
-    similarity: float | None = Field(description="1 / total ambiguity; null where that is 0")
-    reliability: float = Field(description="0 to 1: how well the directions fix the translation; scale-free")
-    determinant: float = Field(description="D of equation 8 of the paper")
-    chi2: float = Field(description="joint cost at the answered pose")
-    dof: int = Field(description="degrees of freedom of `chi2`")
-    rms_offset: float = Field(description="metres")
-    rms_angle: float = Field(description="radians")
-    pairs: Index = Field(description="number of pairs")
+    Attributes
+    ----------
+    ambiguity
+        ambiguity at the returned pose
+    ambiguity_before
+        ambiguity at the pose 0, 0, 0
+    ambiguity_at
+        ambiguity at the pose `evaluate_at`
+    similarity
+        1 / total ambiguity; null where that is 0
+    reliability
+        0 to 1: how well the directions fix the translation; scale-free
+    determinant
+        D of equation 8 of the paper
+    chi2
+        joint cost at the answered pose
+    dof
+        degrees of freedom of `chi2`
+    rms_offset
+        metres
+    rms_angle
+        radians
+    pairs
+        number of pairs
+    """
+
+    ambiguity: AmbiguityAnswer
+    ambiguity_before: AmbiguityAnswer
+    ambiguity_at: AmbiguityAnswer | None
+    similarity: float | None
+    reliability: float
+    determinant: float
+    chi2: float
+    dof: int
+    rms_offset: float
+    rms_angle: float
+    pairs: Index
 
 
 class Residual(Answer):
-    """Residuals of one pair."""
+    """Residuals of one pair.
+
+    Attributes
+    ----------
+    offset
+        metres, signed, at the scan segment's midpoint
+    angle
+        radians
+    weight
+        weight of the pair in the estimate; 1/m^2 with information weighting
+    """
 
     scan: Index
     map: Index
-    offset: float = Field(description="metres, signed, at the scan segment's midpoint")
-    angle: float = Field(description="radians")
-    weight: float = Field(description="weight of the pair in the estimate; 1/m^2 with information weighting")
+    offset: float
+    angle: float
+    weight: float
 
 
 class RegisterAnswer(Answer):
-    """The pose from known correspondences."""
+    """The pose from known correspondences.
+
+    Attributes
+    ----------
+    usable
+        ok, and chi2 below its 99.9 % quantile
+    covariance
+        covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2
+    unobservable
+        unit vector in the map frame along which the position is unobservable
+    """
 
     status: Literal["ok", "degenerate"]
-    usable: bool = Field(description="ok, and chi2 below its 99.9 % quantile")
+    usable: bool
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(
-        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
-    )
-    unobservable: Row2 | None = Field(
-        description="unit vector in the map frame along which the position is unobservable"
-    )
+    covariance: Matrix | None
+    unobservable: Row2 | None
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
     request_id: str
@@ -91,200 +159,348 @@ class RegisterAnswer(Answer):
 
 
 class SegmentOfView(Answer):
-    """A segment of a scan of several views."""
+    """A segment of a scan of several views.
+
+    Attributes
+    ----------
+    scan
+        index of the segment in the view
+    """
 
     view: Index
-    scan: Index = Field(description="index of the segment in the view")
+    scan: Index
 
 
 class CorrespondenceAnswer(Residual):
-    """A scan segment found on a map segment."""
+    """A scan segment found on a map segment.
 
-    view: Index | None = Field(
-        None, description="index of the view, for a scan of several views; `scan` is then an index in this view"
-    )
-    overlap: Share = Field(description="fraction of the scan segment's length that lies on the map")
-    alternatives: list[Index] = Field(description="other map segments that pass the gates")
+    Attributes
+    ----------
+    view
+        index of the view, for a scan of several views; `scan` is then an index in this view
+    overlap
+        fraction of the scan segment's length that lies on the map
+    alternatives
+        other map segments that pass the gates
+    """
+
+    view: Index | None = None
+    overlap: Share
+    alternatives: list[Index]
 
 
 class AlternativeAnswer(Answer):
-    """Another pose that explains part of the scan."""
+    """Another pose that explains part of the scan.
+
+    Attributes
+    ----------
+    covariance
+        covariance of this pose, as `covariance` of the answer; null if the pose is degenerate
+    score
+        score of this pose, as `diagnostics.score`, nats
+    reliability
+        reliability of this pose, as `diagnostics.reliability`
+    inlier_fraction
+        fraction of the scan's length that is matched
+    probability
+        that this pose is right, as `probability` of the answer; null where the answer has no probability, or
+        contradicts the prior
+    map_id
+        of several maps the one that the pose is on
+    """
 
     pose: PoseAnswer
-    covariance: Matrix | None = Field(
-        description="covariance of this pose, as `covariance` of the answer; null if the pose is degenerate"
-    )
-    score: float = Field(description="score of this pose, as `diagnostics.score`, nats")
+    covariance: Matrix | None
+    score: float
     ambiguity: AmbiguityAnswer
-    reliability: float = Field(description="reliability of this pose, as `diagnostics.reliability`")
-    inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
-    probability: float | None = Field(
-        description="that this pose is right, as `probability` of the answer; null where the answer has no "
-        "probability, or contradicts the prior"
-    )
-    map_id: str | None = Field(None, description="of several maps the one that the pose is on")
+    reliability: float
+    inlier_fraction: float
+    probability: float | None
+    map_id: str | None = None
 
 
 class CriticalWallAnswer(Answer):
-    """The wall whose removal would move the pose most, or leave it unobservable."""
+    """The wall whose removal would move the pose most, or leave it unobservable.
 
-    scan: list[Index] | list[SegmentOfView] = Field(description="scan segments on the wall")
-    map: list[Index] = Field(description="map segments of the wall")
-    direction: Row2 = Field(description="unit vector in the map frame")
-    displacement: float = Field(
-        description="metres by which the pose would move, or the standard deviation where that is more"
-    )
+    Attributes
+    ----------
+    scan
+        scan segments on the wall
+    map
+        map segments of the wall
+    direction
+        unit vector in the map frame
+    displacement
+        metres by which the pose would move, or the standard deviation where that is more
+    """
+
+    scan: list[Index] | list[SegmentOfView]
+    map: list[Index]
+    direction: Row2
+    displacement: float
 
 
 class CorrectionsAnswer(Answer):
-    """Errors of the map around the sensor, or of the ranges, that were estimated together with the pose."""
+    """Errors of the map around the sensor, or of the ranges, that were estimated together with the pose.
 
-    scale: float = Field(description="factor on the lengths of the scan; 1: none")
-    offset: float = Field(description="metres by which all walls are nearer to the sensor than on the map")
-    strain: Row3 = Field(
-        description="elongation of the map along its x and y axis, and half of the shear, as fractions: xx, yy, xy"
-    )
+    Attributes
+    ----------
+    scale
+        factor on the lengths of the scan; 1: none
+    offset
+        metres by which all walls are nearer to the sensor than on the map
+    strain
+        elongation of the map along its x and y axis, and half of the shear, as fractions: xx, yy, xy
+    """
+
+    scale: float
+    offset: float
+    strain: Row3
 
 
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
-    """Diagnostics of a search."""
+    """Diagnostics of a search.
 
-    inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
-    score: float = Field(description="log-likelihood minus that of a scan of clutter alone, nats")
-    runner_up: float | None = Field(
-        description="best other score as a fraction of `score`; null: none above `search.complete_above`"
-    )
-    margin: float | None = Field(
-        description="`score` minus that of the best other pose, nats; null: no other pose above "
-        "`search.complete_above` of `score`"
-    )
-    critical_wall: CriticalWallAnswer | None = Field(
-        description="the wall whose removal would move the pose most, or make it unobservable"
-    )
-    corrections: CorrectionsAnswer | None = Field(
-        description="errors of the map or the ranges that the pose is corrected for; null: none"
-    )
-    turn_rate: float | None = Field(
-        description="rate at which the sensor turned during the scan, estimated from the walls, rad/s; null: `twist` "
-        "was sent, or the walls show no rotation"
-    )
+    Attributes
+    ----------
+    inlier_fraction
+        fraction of the scan's length that is matched
+    score
+        log-likelihood minus that of a scan of clutter alone, nats
+    runner_up
+        best other score as a fraction of `score`; null: none above `search.complete_above`
+    margin
+        `score` minus that of the best other pose, nats; null: no other pose above `search.complete_above` of `score`
+    critical_wall
+        the wall whose removal would move the pose most, or make it unobservable
+    corrections
+        errors of the map or the ranges that the pose is corrected for; null: none
+    turn_rate
+        rate at which the sensor turned during the scan, estimated from the walls, rad/s; null: `twist` was sent, or the
+        walls show no rotation
+    """
+
+    inlier_fraction: float
+    score: float
+    runner_up: float | None
+    margin: float | None
+    critical_wall: CriticalWallAnswer | None
+    corrections: CorrectionsAnswer | None
+    turn_rate: float | None
 
 
 class SearchAnswer(Answer):
-    """Statistics of the search."""
+    """Statistics of the search.
 
-    complete: bool = Field(description="false when deadline or budget ended it early")
-    exhaustive: bool = Field(description="whether every pair of segments was tried; true only for a complete search")
-    confidence: float = Field(description="probability that the search missed no better pose")
-    bases: Index = Field(description="bases that were tried")
-    hypotheses: Index = Field(description="poses that the bases proposed")
-    verified: Index = Field(description="poses that were scored completely")
-    seed: int = Field(description="value of the option")
-    sampling: Literal["ordered", "random"] = Field(description="value of the option")
-    complete_above: float = Field(
-        description="no pose above this fraction of the best score was missed, if its correspondences agree within "
-        "their tolerances; 1 for an incomplete search"
-    )
+    Attributes
+    ----------
+    complete
+        false when deadline or budget ended it early
+    exhaustive
+        whether every pair of segments was tried; true only for a complete search
+    confidence
+        probability that the search missed no better pose
+    bases
+        bases that were tried
+    hypotheses
+        poses that the bases proposed
+    verified
+        poses that were scored completely
+    seed, sampling
+        value of the option
+    complete_above
+        no pose above this fraction of the best score was missed, if its correspondences agree within their tolerances;
+        1 for an incomplete search
+    """
+
+    complete: bool
+    exhaustive: bool
+    confidence: float
+    bases: Index
+    hypotheses: Index
+    verified: Index
+    seed: int
+    sampling: Literal["ordered", "random"]
+    complete_above: float
 
 
 class WarningAnswer(Answer):
-    """A warning about the scan, the map or the search."""
+    """A warning about the scan, the map or the search.
 
-    code: WarningCode = Field(description="stable; later versions may add codes")
-    message: str = Field(description="fault and remedy, for people")
+    Attributes
+    ----------
+    code
+        stable; later versions may add codes
+    message
+        fault and remedy, for people
+    """
+
+    code: WarningCode
+    message: str
 
 
 class ReasonAnswer(Answer):
-    """Why an answer is not usable."""
+    """Why an answer is not usable.
 
-    code: ReasonCode = Field(description="stable; later versions may add codes")
-    message: str = Field(description="the reason and what to do, for people")
+    Attributes
+    ----------
+    code
+        stable; later versions may add codes
+    message
+        the reason and what to do, for people
+    """
+
+    code: ReasonCode
+    message: str
 
 
 class MapReference(Answer):
-    """Which map was searched; of several maps that of the pose."""
+    """Which map was searched; of several maps that of the pose.
+
+    Attributes
+    ----------
+    revision
+        of a stored map; null: the map came with the request
+    """
 
     map_id: str
-    revision: int | None = Field(description="of a stored map; null: the map came with the request")
+    revision: int | None
 
 
 class MapVerdictAnswer(MapReference):
-    """The best pose on one of several maps."""
+    """The best pose on one of several maps.
 
-    status: Verdict = Field(
-        description="of the map of the answer its status; of another map `ambiguous` where its pose explains the scan "
-        "about as well and the answer is not usable, else `no_match`"
-    )
-    score: float | None = Field(
-        description="score of the best pose on this map, with the logarithm of its weight, nats; null: none was found"
-    )
-    probability: Share | None = Field(description="probability that this pose is right; null where the answer has none")
-    pose: PoseAnswer | None = Field(description="in the frame of this map")
+    Attributes
+    ----------
+    status
+        of the map of the answer its status; of another map `ambiguous` where its pose explains the scan about as well
+        and the answer is not usable, else `no_match`
+    score
+        score of the best pose on this map, with the logarithm of its weight, nats; null: none was found
+    probability
+        probability that this pose is right; null where the answer has none
+    pose
+        in the frame of this map
+    """
+
+    status: Verdict
+    score: float | None
+    probability: Share | None
+    pose: PoseAnswer | None
 
 
 class FoundAnswer(Answer):
-    """Pose of a scan in a map, with the verdict."""
+    """Pose of a scan in a map, with the verdict.
+
+    Attributes
+    ----------
+    usable
+        whether a robot may use the pose
+    probability
+        calibrated probability that the pose is right, with the prior `options.on_map`; 0 for `no_match`, null for
+        `degenerate`, whose position is unobservable along `unobservable`
+    message
+        the verdict in words, for people
+    covariance
+        covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2
+    unobservable
+        unit vector in the map frame along which the position is not fixed
+    frame_id
+        the map's
+    child_frame_id
+        the scan's
+    stamp
+        returned as it was sent
+    correspondences
+        correspondences, if they are included
+    unmatched_scan
+        scan segments without a match; of several views with the view
+    missing_map
+        if included: map segments that the scan should contain, but does not
+    reasons
+        why it is not usable, the most important first
+    alternatives
+        if included: other distinct poses, best first
+    segments
+        where included, for a scan of ranges or points: its segments; of several views one list each, in their common
+        frame
+    map
+        of several maps that of the pose; null for `no_match`
+    maps
+        of several maps the best pose on each, the best first
+    """
 
     status: Verdict
-    usable: bool = Field(description="whether a robot may use the pose")
-    probability: Share | None = Field(
-        description="calibrated probability that the pose is right, with the prior `options.on_map`; 0 for "
-        "`no_match`, null for `degenerate`, whose position is unobservable along `unobservable`"
-    )
-    message: str = Field(description="the verdict in words, for people")
+    usable: bool
+    probability: Share | None
+    message: str
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(
-        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
-    )
-    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")
-    frame_id: str = Field(description="the map's")
-    child_frame_id: str = Field(description="the scan's")
-    stamp: Any = Field(description="returned as it was sent")
-    correspondences: list[CorrespondenceAnswer] = Field([], description="correspondences, if they are included")
-    unmatched_scan: list[Index] | list[SegmentOfView] = Field(
-        description="scan segments without a match; of several views with the view"
-    )
-    missing_map: list[Index] = Field(
-        [], description="if included: map segments that the scan should contain, but does not"
-    )
+    covariance: Matrix | None
+    unobservable: Row2 | None
+    frame_id: str
+    child_frame_id: str
+    stamp: Any
+    correspondences: list[CorrespondenceAnswer] = Field([])
+    unmatched_scan: list[Index] | list[SegmentOfView]
+    missing_map: list[Index] = Field([])
     diagnostics: AssociationDiagnosticsAnswer | None
-    reasons: list[ReasonAnswer] = Field(description="why it is not usable, the most important first")
-    alternatives: list[AlternativeAnswer] = Field([], description="if included: other distinct poses, best first")
+    reasons: list[ReasonAnswer]
+    alternatives: list[AlternativeAnswer] = Field([])
     search: SearchAnswer
-    segments: list[Row4] | list[list[Row4] | None] | None = Field(
-        None,
-        description="where included, for a scan of ranges or points: its segments; of several views one list each, "
-        "in their common frame",
-    )
+    segments: list[Row4] | list[list[Row4] | None] | None = None
     warnings: list[WarningAnswer]
-    map: MapReference | None = Field(None, description="of several maps that of the pose; null for `no_match`")
-    maps: list[MapVerdictAnswer] = Field([], description="of several maps the best pose on each, the best first")
+    map: MapReference | None = None
+    maps: list[MapVerdictAnswer] = Field([])
 
 
 class AssociateAnswer(FoundAnswer):
-    """The answer of a search."""
+    """The answer of a search.
 
-    map: MapReference | None = Field(
-        description="the stored map; of several maps that of the pose; null for `no_match` there, and where a single "
-        "map came with the request"
-    )
-    client_ref: Any = Field(description="returned as it was sent")
+    Attributes
+    ----------
+    map
+        the stored map; of several maps that of the pose; null for `no_match` there, and where a single map came with
+        the request
+    client_ref
+        returned as it was sent
+    """
+
+    map: MapReference | None
+    client_ref: Any
     request_id: str
     timing_ms: TimingAnswer
 
 
 class VectorizeAnswer(Answer):
-    """Segments, with the fields that a scan of segments takes."""
+    """Segments, with the fields that a scan of segments takes.
 
-    segments: list[Row4] = Field(description="`[x1, y1, x2, y2]`, metres, free space on the left")
-    point_counts: list[int] = Field(description="points behind each")
-    centroids: list[Row2] = Field(description="mean of those points, metres")
-    spreads: list[float] = Field(description="second moment of those points along the segment, m^2")
-    sigma: float = Field(description="standard deviation of single ranges or points, metres; as sent, or estimated")
-    sigmas: list[float] = Field(
-        description="standard deviation of each segment's points normal to the wall, metres; `sigma` of a scan"
-    )
-    rms: list[float] = Field(description="root mean square of the points' distances from their segment, metres")
-    warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, `motion_unknown`, as of /v1/associate")
+    Attributes
+    ----------
+    segments
+        `[x1, y1, x2, y2]`, metres, free space on the left
+    point_counts
+        points behind each
+    centroids
+        mean of those points, metres
+    spreads
+        second moment of those points along the segment, m^2
+    sigma
+        standard deviation of single ranges or points, metres; as sent, or estimated
+    sigmas
+        standard deviation of each segment's points normal to the wall, metres; `sigma` of a scan
+    rms
+        root mean square of the points' distances from their segment, metres
+    warnings
+        `points_not_in_order`, `motion_unknown`, as of /v1/associate
+    """
+
+    segments: list[Row4]
+    point_counts: list[int]
+    centroids: list[Row2]
+    spreads: list[float]
+    sigma: float
+    sigmas: list[float]
+    rms: list[float]
+    warnings: list[WarningAnswer]
     request_id: str
     timing_ms: TimingAnswer

@@ -28,58 +28,81 @@ from .views import AnyScan
 
 
 class KnownMap(InlineMap):
-    """The map side of known correspondences."""
+    """The map side of known correspondences.
 
-    sigma: Sigma | None = Field(
-        0.0, description="standard deviation of the map's lines, normal to the lines, metres; null: estimated"
-    )
+    Attributes
+    ----------
+    sigma
+        standard deviation of the map's lines, normal to the lines, metres; null: estimated
+    """
+
+    sigma: Sigma | None = 0.0
 
 
 class EstimatorOptions(Strict):
-    """How to register."""
+    """How to register.
 
-    estimator: Literal["joint", "one_step"] = Field(
-        "joint", description="`joint` minimizes over rotation and translation; `one_step` is the published closed form"
-    )
-    rotation: Literal["wahba", "mitsuta"] = Field("wahba", description="estimate of the rotation for `one_step`")
-    k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        1.0, description="coefficient of the translation in the ambiguity"
-    )
-    k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        1.0, description="coefficient of the rotation in the ambiguity"
-    )
-    evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
-    oriented: bool | None = Field(
-        None,
-        description="whether free space lies on the left of segments; null: as the map states, else true",
-    )
+    Attributes
+    ----------
+    estimator
+        `joint` minimizes over rotation and translation; `one_step` is the published closed form
+    rotation
+        estimate of the rotation for `one_step`
+    k_translation
+        coefficient of the translation in the ambiguity
+    k_rotation
+        coefficient of the rotation in the ambiguity
+    evaluate_at
+        also give the ambiguity at this pose
+    oriented
+        whether free space lies on the left of segments; null: as the map states, else true
+    """
+
+    estimator: Literal["joint", "one_step"] = "joint"
+    rotation: Literal["wahba", "mitsuta"] = "wahba"
+    k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
+    k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
+    evaluate_at: Pose | None = None
+    oriented: bool | None = None
 
 
 class RegisterRequest(Strict):
-    """Known correspondences."""
+    """Known correspondences.
+
+    Attributes
+    ----------
+    correspondences
+        `[scan, map]` indices; default i with i
+    weights
+        one per correspondence; replaces `weighting`
+    weighting
+        weights of the correspondences: all equal, the shorter length, or the information
+    """
 
     map: KnownMap
     scan: MeasuredFields
-    correspondences: PairRows | None = Field(None, description="`[scan, map]` indices; default i with i")
-    weights: Weights | None = Field(None, description="one per correspondence; replaces `weighting`")
-    weighting: Literal["uniform", "shorter_length", "information"] = Field(
-        "information", description="weights of the correspondences: all equal, the shorter length, or the information"
-    )
+    correspondences: PairRows | None = None
+    weights: Weights | None = None
+    weighting: Literal["uniform", "shorter_length", "information"] = "information"
     options: EstimatorOptions = EstimatorOptions()
 
 
 class OnMaps(Strict):
-    """A request that names the map to search, or several maps."""
+    """A request that names the map to search, or several maps.
 
-    map: AnyMap | None = Field(None, description="the map to search, or the id of a stored one; or `maps`")
-    maps: SeveralMaps | None = Field(
-        None, description="2 to 256 maps, or a prefix of the ids of stored ones, to search together"
-    )
-    map_weights: MapWeights | None = Field(
-        None,
-        description="probability of maps by id; the other maps share the rest equally. It is part of the score, and "
-        "never fused",
-    )
+    Attributes
+    ----------
+    map
+        the map to search, or the id of a stored one; or `maps`
+    maps
+        2 to 256 maps, or a prefix of the ids of stored ones, to search together
+    map_weights
+        probability of maps by id; the other maps share the rest equally. It is part of the score, and never fused
+    """
+
+    map: AnyMap | None = None
+    maps: SeveralMaps | None = None
+    map_weights: MapWeights | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -88,12 +111,22 @@ class OnMaps(Strict):
 
 
 class AssociateRequest(OnMaps):
-    """Unknown correspondences."""
+    """Unknown correspondences.
 
-    scan: AnyScan = Field(description="the scan: segments, ranges, points or views")
-    prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
+    Attributes
+    ----------
+    scan
+        the scan: segments, ranges, points or views
+    prior
+        prior knowledge of the pose; null: none
+    client_ref
+        returned as it was sent
+    """
+
+    scan: AnyScan
+    prior: AnyPrior | None = None
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = Field(None, description="returned as it was sent")
+    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _map_of_prior(self) -> Self:
@@ -104,17 +137,23 @@ class AssociateRequest(OnMaps):
 
 
 class BatchRequest(OnMaps):
-    """Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other."""
+    """Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other.
+
+    Attributes
+    ----------
+    scans
+        scans, each as `scan` of /v1/associate
+    priors
+        one prior per scan, as `prior` of /v1/associate, or null
+    client_ref
+        returned as it was sent
+    """
 
     # Each is validated separately, as `BatchItem`.
-    scans: list[Annotated[AnyScan, SkipValidation]] = Field(
-        min_length=1, description="scans, each as `scan` of /v1/associate"
-    )
-    priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = Field(
-        None, description="one prior per scan, as `prior` of /v1/associate, or null"
-    )
+    scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1)
+    priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = None
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = Field(None, description="returned as it was sent")
+    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
@@ -139,18 +178,24 @@ MOST_SAMPLES = 64
 
 
 class CheckRequest(Strict):
-    """Sample scans to check a map by, and where they were taken, as far as that is known."""
+    """Sample scans to check a map by, and where they were taken, as far as that is known.
 
-    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)] = Field(
-        description="each as `scan` of /v1/associate"
-    )
-    poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
-        None, description="one per scan, or null: the known or assumed pose of the scan's frame in the map frame"
-    )
-    deadline_ms: DeadlineMs | None = Field(
-        None, description="milliseconds; parts that it leaves no time for are omitted"
-    )
-    client_ref: FreeJson = Field(None, description="returned as it was sent")
+    Attributes
+    ----------
+    scans
+        each as `scan` of /v1/associate
+    poses
+        one per scan, or null: the known or assumed pose of the scan's frame in the map frame
+    deadline_ms
+        milliseconds; parts that it leaves no time for are omitted
+    client_ref
+        returned as it was sent
+    """
+
+    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)]
+    poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = None
+    deadline_ms: DeadlineMs | None = None
+    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _as_many(self) -> CheckRequest:
@@ -162,31 +207,47 @@ class CheckRequest(Strict):
 
 
 class VectorizeOptions(Strict):
-    """How to cut points into segments."""
+    """How to cut points into segments.
 
-    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
-    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number of points on a segment")
-    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="least length of a segment, metres")
-    max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(
-        None, description="metres between neighbours on one segment; null: by the angle between the beams"
-    )
+    Attributes
+    ----------
+    sigma
+        standard deviation of single ranges, metres; null: estimated
+    min_points
+        least number of points on a segment
+    min_length
+        least length of a segment, metres
+    max_gap
+        metres between neighbours on one segment; null: by the angle between the beams
+    """
+
+    sigma: RaySigma | None = None
+    min_points: Annotated[int, Field(ge=3, le=1000)] = 4
+    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = 0.1
+    max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = None
 
 
 class VectorizeRequest(Strict):
-    """Ranges or points; exactly one of the two."""
+    """Ranges or points; exactly one of the two.
 
-    laser: Laser | None = Field(None, description="ranges, as in a LaserScan message")
-    points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
-    twist: Twist | None = Field(
-        None,
-        description="velocity of the sensor during the scan, in its own frame; 0: at rest; segments are in the frame "
-        "of the first beam",
-    )
-    viewpoint: Point | None = Field(
-        default_factory=lambda: [0.0, 0.0],
-        description="position of the sensor, metres, on the left of every segment; null: several positions, for "
-        "example of a contour, and segments run in the order of their points",
-    )
+    Attributes
+    ----------
+    laser
+        ranges, as in a LaserScan message
+    points
+        `[x, y]` each, metres, in scanning order
+    twist
+        velocity of the sensor during the scan, in its own frame; 0: at rest; segments are in the frame of the first
+        beam
+    viewpoint
+        position of the sensor, metres, on the left of every segment; null: several positions, for example of a contour,
+        and segments run in the order of their points
+    """
+
+    laser: Laser | None = None
+    points: PointRows | None = None
+    twist: Twist | None = None
+    viewpoint: Point | None = Field(default_factory=lambda: [0.0, 0.0])
     options: VectorizeOptions = VectorizeOptions()
 
     @model_validator(mode="after")

@@ -15,9 +15,15 @@ FEWEST_MAPS, MOST_MAPS = 2, 256
 
 
 class NamedMap(InlineMap):
-    """A map in the request itself, with a name for the answer."""
+    """A map in the request itself, with a name for the answer.
 
-    map_id: MapId = Field(description="name of the map in the answer")
+    Attributes
+    ----------
+    map_id
+        name of the map in the answer
+    """
+
+    map_id: MapId
 
 
 def _named_kind(value: Any) -> str:
@@ -30,11 +36,15 @@ NamedOrStored = Annotated[
 
 
 class MapPrefix(Strict):
-    """All stored maps whose ids begin alike."""
+    """All stored maps whose ids begin alike.
 
-    prefix: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)] = Field(
-        description="beginning of the ids of the maps"
-    )
+    Attributes
+    ----------
+    prefix
+        beginning of the ids of the maps
+    """
+
+    prefix: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]
 
 
 def _several_kind(value: Any) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from inspect import cleandoc
 from itertools import chain, islice
 from typing import Annotated, Any, Self, get_args
 
@@ -16,6 +18,7 @@ from pydantic import (
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     PlainValidator,
     WithJsonSchema,
     model_validator,
@@ -28,6 +31,8 @@ MAX_MAGNITUDE = 1e9
 MAX_FREE_BYTES = 16_384
 MAX_FREE_DEPTH = 32
 LIKE = 0.7  # of two names, 0 to 1; from there on one is taken for the other misspelt
+_ATTRIBUTES = "Attributes\n----------\n"
+_ATTRIBUTE = re.compile(r"^(\w.*)\n((?: {4}.*\n?)+)", re.MULTILINE)
 _names: set[str] = set()
 
 
@@ -36,7 +41,24 @@ def nearest_name(name: str) -> str | None:
     return None if name in _names else next(iter(get_close_matches(name, sorted(_names), 1, LIKE)), None)
 
 
-class Strict(BaseModel):
+class Described(BaseModel):
+    """Has the descriptions of its fields in its docstring, as other classes; the schema reads them there."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema, with the descriptions of the model and of its fields."""
+        schema = handler(core)
+        model = handler.resolve_ref_schema(schema)
+        for kind in reversed(cls.__mro__[: cls.__mro__.index(Described)]):
+            summary, _, attributes = cleandoc(kind.__doc__ or "").partition(_ATTRIBUTES)
+            model["description"] = summary.strip()
+            for names, text in _ATTRIBUTE.findall(attributes):
+                for name in names.split(", "):
+                    model["properties"][cls.model_fields[name].alias or name]["description"] = " ".join(text.split())
+        return schema
+
+
+class Strict(Described):
     """Takes numbers for numbers only, and no field that it does not know."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
@@ -60,7 +82,7 @@ class Strict(BaseModel):
         return {name: value[name] for name in chain(cls.model_fields.keys() & value.keys(), unknown)}
 
 
-class Answer(BaseModel):
+class Answer(Described):
     """Model of an answer: documents the JSON, is never built for an answer."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)  # seldom asked for
@@ -157,8 +179,16 @@ Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 
 
 class Pose(Strict):
-    """The scan frame's pose in the map frame: ``p_map = R(theta) p_scan + [x, y]``."""
+    """The scan frame's pose in the map frame: ``p_map = R(theta) p_scan + [x, y]``.
 
-    x: Coordinate = Field(description="metres")
-    y: Coordinate = Field(description="metres")
-    theta: Angle = Field(description="radians, counter-clockwise")
+    Attributes
+    ----------
+    x, y
+        metres
+    theta
+        radians, counter-clockwise
+    """
+
+    x: Coordinate
+    y: Coordinate
+    theta: Angle

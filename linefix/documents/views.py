@@ -18,20 +18,26 @@ class SensorPose(Pose):
 
 
 class _View(Strict):
+    """Fields of a view in each form.
+
+    Attributes
+    ----------
+    flipped
+        mounted upside down: y becomes -y in the sensor's data before `pose`
+    covariance
+        covariance of the step from the view `relative_to`: of additive (x, y, theta) of this pose in the frame of that
+        view; m^2, m rad, rad^2; deviations of at most 10 m and 10 rad; null: exact
+    relative_to
+        index of the view that `covariance` is relative to; null: the scan's frame itself
+    viewpoint
+        position of the sensor in its own frame, metres; null: several positions
+    """
+
     pose: SensorPose
-    flipped: bool = Field(False, description="mounted upside down: y becomes -y in the sensor's data before `pose`")
-    covariance: StepCovariance | None = Field(
-        None,
-        description="covariance of the step from the view `relative_to`: of additive (x, y, theta) of this pose in the "
-        "frame of that view; m^2, m rad, rad^2; deviations of at most 10 m and 10 rad; null: exact",
-    )
-    relative_to: Annotated[int, Field(ge=0)] | None = Field(
-        None, description="index of the view that `covariance` is relative to; null: the scan's frame itself"
-    )
-    viewpoint: Point | None = Field(
-        default_factory=lambda: [0.0, 0.0],
-        description="position of the sensor in its own frame, metres; null: several positions",
-    )
+    flipped: bool = False
+    covariance: StepCovariance | None = None
+    relative_to: Annotated[int, Field(ge=0)] | None = None
+    viewpoint: Point | None = Field(default_factory=lambda: [0.0, 0.0])
 
 
 class SegmentView(_View, MeasuredFields):
@@ -53,11 +59,21 @@ AnyView = Annotated[OneView, OneOf("segments, laser and points", BY_FORM)]
 
 
 class ViewsScan(Strict):
-    """A scan of several views: of the sensors of a robot, or from places along its way."""
+    """A scan of several views: of the sensors of a robot, or from places along its way.
 
-    views: list[AnyView] = Field(min_length=1, description="the views, at most `max_views` of /v1/limits")
-    frame_id: FrameId = Field("base_link", description="frame that the views share; `child_frame_id` of the answer")
-    stamp: FreeJson = Field(None, description="returned as it was sent")
+    Attributes
+    ----------
+    views
+        the views, at most `max_views` of /v1/limits
+    frame_id
+        frame that the views share; `child_frame_id` of the answer
+    stamp
+        returned as it was sent
+    """
+
+    views: list[AnyView] = Field(min_length=1)
+    frame_id: FrameId = "base_link"
+    stamp: FreeJson = None
 
     @model_validator(mode="before")
     @classmethod
