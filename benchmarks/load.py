@@ -48,6 +48,7 @@ class Service:
         self.port = int(url.rsplit(":", 1)[1])
         self.pid = pid
         self.cores = cores
+        self.started_mb = self.memory_mb()
         self._bodies: list[bytes] = []
         rng = np.random.default_rng(0)
         for number in range(FLOORS):
@@ -58,6 +59,8 @@ class Service:
                 laser = one_turn(world, rng)
                 asked = {"map": {"map_id": str(number)}, "scan": {"laser": laser, "sigma": SCANNER.sigma}}
                 self._bodies.append(orjson.dumps(asked, option=orjson.OPT_SERIALIZE_NUMPY))
+                # The first request indexes the map. That is no part of the capacity, however short a run is.
+                assert self.call("POST", "/v1/associate", self._bodies[-1]) == 200
 
     def call(self, method: str, path: str, body: object) -> int:
         """Send one request with the robot's key; return the status."""
@@ -182,9 +185,9 @@ def large(service: Service, rounds: int) -> list[Row]:
     ends = begins + np.random.default_rng(1).uniform(-1.0, 1.0, (LARGE_SEGMENTS, 2))
     rows = orjson.dumps(np.hstack([begins, ends]), option=orjson.OPT_SERIALIZE_NUMPY)
     size = len(rows) / 1e6
-    scan = b'"scan": {"segments": [[0.0, 1.0, 5.0, 1.0], [5.0, 1.0, 5.0, 4.0]]}, "options": {"deadline_ms": 2000}}'
+    scan = b'"scan": {"segments": [[0.0, 1.0, 5.0, 1.0], [5.0, 1.0, 5.0, 4.0]]}}'
     statuses: list[int] = []
-    seconds, before = 12.0 * rounds, service.memory_mb()
+    seconds = 12.0 * rounds
     probes = (service.port, [request_of("/livez")], PROBES, seconds)
     with beside(at_rate, *probes) as answers, highest(service.memory_mb) as most:
         end = time.monotonic() + seconds
@@ -204,9 +207,9 @@ def large(service: Service, rounds: int) -> list[Row]:
         at_most("not answered with 2xx", sum(not 200 <= status < 300 for status in statuses), 0, form=".0f"),
         at_most(f"/livez meanwhile, p99 of {len(probed)}, ms", 1e3 * quantile(probed, 0.99), PROBE_MS, form=".1f"),
         Row("/livez meanwhile, longest, ms", f"{1e3 * max(probed):.1f}"),
-        at_most("memory of all processes together, at most, MB", max(most), MEMORY_MB, form=".0f"),
-        Row("  before, MB", f"{before:.0f}"),
-        Row("  with a map in the cache, MB", f"{service.memory_mb():.0f}"),
+        Row("after the start, MB", f"{service.started_mb:.0f}"),
+        Row("with a map of 200,000 segments in the cache, MB", f"{service.memory_mb():.0f}"),
+        at_most("while another such map is read and indexed, MB", max(most), MEMORY_MB, form=".0f"),
     ]
 
 
