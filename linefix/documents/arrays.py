@@ -6,9 +6,8 @@ in C, and only a bad one is gone through, for its first `MAX_FAULTS` rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,85 +25,16 @@ NUMBERS_OR_NULL = frozenset((int, float, type(None)))
 INTEGERS = frozenset((int,))
 
 
-def _refuse(faults: Iterable[tuple[int, str]]) -> PydanticCustomError:
-    rows: list[tuple[int, str]] = []
-    for fault in faults:
-        rows.append(fault)
-        if len(rows) == MAX_FAULTS:
-            break
-    return PydanticCustomError("rows", "some rows are wrong", {"rows": rows})
+KINDS = {type(None): "null", int: "an integer", float: "a decimal number", str: "a string", list: "an array"}
 
 
 def _kind(value: Any) -> str:
     """Return the type of a JSON value in words; the value itself is not repeated."""
-    match value:
-        case None:
-            return "null"
-        case bool():
-            return "true or false"
-        case int():
-            return "an integer"
-        case float():
-            return "a decimal number"
-        case str():
-            return "a string"
-        case list():
-            return "an array"
-    return "an object"
+    return "true or false" if isinstance(value, bool) else KINDS.get(type(value), "an object")
 
 
 def _not_an_array(value: Any) -> PydanticCustomError:
     return PydanticCustomError("not_an_array", f"expected an array, found {_kind(value)}")
-
-
-def _listed(value: Any, info: ValidationInfo, counted: tuple[str, str]) -> list[Any]:
-    """Return an array that is within its limit; `counted` are the limit's name in `Limits` and what it counts.
-
-    Stored arrays are read without limits: they may have changed since.
-    """
-    if type(value) is not list:
-        raise _not_an_array(value)
-    name, what = counted
-    limits: Limits | None = info.context
-    if limits is not None and len(value) > getattr(limits, name):
-        raise TooManyError("", getattr(limits, name), what)
-    return value
-
-
-def _number_fault(item: Any, types: frozenset[type], low: float, high: float) -> str | None:
-    if type(item) not in types:
-        return f"expected {'an integer' if types is INTEGERS else 'a number'}, found {_kind(item)}"
-    if item is not None and not low <= item <= high:
-        return f"expected a number from {low:g} to {high:g}"
-    return None
-
-
-def _row_fault(row: Any, width: int, types: frozenset[type], low: float, high: float) -> str | None:
-    if type(row) is not list:
-        return f"expected an array of {width} numbers, found {_kind(row)}"
-    if len(row) != width:
-        return f"expected {width} numbers, found {len(row)}"
-    return next((fault for item in row if (fault := _number_fault(item, types, low, high))), None)
-
-
-def _rows(value: list[Any], width: int, types: frozenset[type], low: float, high: float) -> Floats:
-    if not value:
-        return np.zeros((0, width))
-    if set(map(type, value)) == {list} and set(map(len, value)) == {width}:
-        flat = list(chain.from_iterable(value))
-        if set(map(type, flat)) <= types:
-            array = np.array(flat, dtype=np.float64).reshape(-1, width)
-            if ((array >= low) & (array <= high)).all():
-                return array
-    raise _refuse((i, fault) for i, row in enumerate(value) if (fault := _row_fault(row, width, types, low, high)))
-
-
-def _column(value: list[Any], types: frozenset[type], low: float, high: float) -> Floats:
-    if set(map(type, value)) <= types:
-        array = np.array([np.nan if item is None else item for item in value], dtype=np.float64)
-        if not ((array < low) | (array > high)).any():
-            return array
-    raise _refuse((i, fault) for i, item in enumerate(value) if (fault := _number_fault(item, types, low, high)))
 
 
 def _number(low: float = -MAX_MAGNITUDE, high: float = MAX_MAGNITUDE) -> dict[str, Any]:
@@ -152,14 +82,48 @@ class _Array:
         return {"type": "array", "items": item}
 
     def validate(self, value: Any, info: ValidationInfo) -> Floats:
-        """Return the numbers."""
-        rows = _listed(value, info, self.counted)
+        """Return the numbers; stored arrays are read without limits, which may have changed since."""
+        if type(value) is not list:
+            raise _not_an_array(value)
+        limits: Limits | None = info.context
+        name, what = self.counted
+        if limits is not None and len(value) > getattr(limits, name):
+            raise TooManyError("", getattr(limits, name), what)
+        return self.numbers(value)
+
+    def numbers(self, value: list[Any]) -> Floats:
+        """Return the numbers of a list; raises an error with the first wrong rows."""
+        flat, width = value, self.width
+        in_rows = width is None or (set(map(type, value)) <= {list} and set(map(len, value)) <= {width})
+        if in_rows and width is not None:
+            flat = list(chain.from_iterable(value))
+        if in_rows and set(map(type, flat)) <= self.types:
+            array = np.array(flat, dtype=np.float64)  # null is NaN
+            fits = (array >= self.low) & (array <= self.high)
+            if (fits | np.isnan(array) if self.types is NUMBERS_OR_NULL else fits).all():
+                return array if width is None else array.reshape(-1, width)
+        faults = ((i, fault) for i, one in enumerate(value) if (fault := self._fault(one)))
+        raise PydanticCustomError("rows", "some rows are wrong", {"rows": list(islice(faults, MAX_FAULTS))})
+
+    def _fault(self, one: Any) -> str | None:
         if self.width is None:
-            return _column(rows, self.types, self.low, self.high)
-        return _rows(rows, self.width, self.types, self.low, self.high)
+            return self.number_fault(one)
+        if type(one) is not list:
+            return f"expected an array of {self.width} numbers, found {_kind(one)}"
+        if len(one) != self.width:
+            return f"expected {self.width} numbers, found {len(one)}"
+        return next((fault for item in one if (fault := self.number_fault(item))), None)
+
+    def number_fault(self, item: Any) -> str | None:
+        """Return what is wrong with a number."""
+        if type(item) not in self.types:
+            return f"expected {'an integer' if self.types is INTEGERS else 'a number'}, found {_kind(item)}"
+        if item is not None and not self.low <= item <= self.high:
+            return f"expected a number from {self.low:g} to {self.high:g}"
+        return None
 
 
-_M, SIGMA_MAX = MAX_MAGNITUDE, 1e3
+SIGMA_MAX = 1e3
 _MAP, _SCAN = ("map_segments", "map segments"), ("scan_segments", "scan segments")
 _BEAMS = ("beams", "ranges or points")
 _SIGMAS = _Array(_SCAN, low=0, high=SIGMA_MAX)
@@ -180,7 +144,7 @@ Weights = Annotated[Floats, _Array(("pairs", "weights"), low=0, high=1e100, leas
 def _sigma(value: Any, info: ValidationInfo) -> Floats | float:
     if type(value) is list:
         return _SIGMAS.validate(value, info)
-    if fault := _number_fault(value, NUMBERS, 0, SIGMA_MAX):
+    if fault := _SIGMAS.number_fault(value):
         raise PydanticCustomError("sigma", fault)
     return float(value)
 
@@ -204,7 +168,7 @@ def _symmetric(value: Any) -> Floats:
         )
     if len(value) != 3:
         raise PydanticCustomError("covariance", f"expected 3 rows of 3 numbers, found {len(value)} items")
-    matrix = _rows(value, 3, NUMBERS, -_M, _M)
+    matrix = _Array(_SCAN, 3).numbers(value)
     unequal = np.argwhere(~np.isclose(matrix, matrix.T, rtol=1e-9, atol=0.0))
     if len(unequal):
         row, column = unequal[0]
