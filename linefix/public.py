@@ -41,8 +41,6 @@ from .updating import update_map
 if TYPE_CHECKING:
     from formats import ImportOptions, LineMap, LogOptions, draw_map, read_log, read_map, write_map
 
-_OF_FORMATS = frozenset(("ImportOptions", "LineMap", "LogOptions", "draw_map", "read_log", "read_map", "write_map"))
-
 __all__ = [
     "AssociationOptions",
     "AssociationResult",
@@ -93,7 +91,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the readers and writers of files on first use: their libraries may be missing."""
-    if name not in _OF_FORMATS:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
         return getattr(importlib.import_module("formats"), name)

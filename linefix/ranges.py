@@ -39,22 +39,18 @@ class MountedScan(Protocol):
     @property
     def laser(self) -> LaserScan:
         """Return the ranges."""
-        ...
 
     @property
     def time_increment(self) -> float:
         """Return the seconds from beam to beam."""
-        ...
 
     @property
     def mount(self) -> RigidTransform | None:
         """Return base_from_sensor."""
-        ...
 
     @property
     def flipped(self) -> bool:
         """Return whether the sensor is upside down."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

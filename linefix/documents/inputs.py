@@ -30,7 +30,7 @@ from .parts import HardPriorFields, LaserScan, MapDocument, SearchOptions, SoftP
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
 from .scans import Scanned, scanned_of, transform_of
-from .updates import ApplyRequest, ProposedChange, SharpenedWalls, UpdateRequest
+from .updates import ApplyRequest, SharpenedWalls, UpdateRequest
 from .views import OneScan, ViewsScan
 
 # Options of a search that have the same names and values in a request.
@@ -163,12 +163,13 @@ def index_of(document: MapDocument, *, oriented: bool, deadline: Deadline | None
 
 def replacements_of(asked: ApplyRequest) -> dict[int, Replacement]:
     """Return the accepted changes of a map, by their indices in the request."""
-    return {number: _replacement_of(one, number) for number, one in enumerate(asked.changes) if one.accepted}
-
-
-def _replacement_of(one: ProposedChange, number: int) -> Replacement:
-    new = Segments.from_array([each.segment for each in one.new], argument=f"changes.{number}.new")
-    return Replacement(one.code, tuple(one.segments), new.endpoints, np.array([each.sigma for each in one.new]))
+    found = {}
+    for number, one in enumerate(asked.changes):
+        if one.accepted:
+            new = Segments.from_array([each.segment for each in one.new], argument=f"changes.{number}.new")
+            sigma = np.array([each.sigma for each in one.new])
+            found[number] = Replacement(one.code, tuple(one.segments), new.endpoints, sigma)
+    return found
 
 
 def sharpened_of(asked: SharpenedWalls | None) -> Sharpened:

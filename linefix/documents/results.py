@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,27 +42,19 @@ MOST_INDICES = 1000  # of one finding
 SEAL = frozenset(("client_ref", "request_id", "timing_ms"))  # of the request, not of its result
 
 
-def _models_in(annotation: Any) -> Iterator[type[Answer]]:
+def _model_in(annotation: Any) -> type[Answer] | None:
     if isinstance(annotation, type) and issubclass(annotation, Answer):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)
-
-
-def _holds_lists(annotation: Any) -> bool:
-    return annotation is Any or get_origin(annotation) is list or any(map(_holds_lists, get_args(annotation)))
+        return annotation
+    return next((model for model in map(_model_in, get_args(annotation)) if model is not None), None)
 
 
 @cache
-def _plan(model: type[Answer]) -> tuple[tuple[str, str, Callable[[Any], Any] | None, Any], ...]:
-    """Return of each field its name in the answer, its attribute in a result, its conversion, and its default."""
-    plan = []
-    for name, one in model.model_fields.items():
-        inner = next(_models_in(one.annotation), None)
-        convert = _plain if _holds_lists(one.annotation) else None
-        if inner is not None:
-            convert = partial(_inner, inner)
-        plan.append((one.alias or name, name, convert, one.get_default(call_default_factory=True)))
+def _plan(model: type[Answer]) -> tuple[tuple[str, str, type[Answer] | None, Any], ...]:
+    """Return of each field its name in the answer, its attribute in a result, its model, and its default."""
+    plan = (
+        (one.alias or name, name, _model_in(one.annotation), one.get_default(call_default_factory=True))
+        for name, one in model.model_fields.items()
+    )
     return tuple(one for one in plan if one[0] not in SEAL)
 
 
@@ -72,33 +64,27 @@ def answer_of(model: type[Answer], result: object, /, **given: Any) -> Json:
     Each field of the model is the attribute of its name, unless it is given. One with a default may be missing.
     """
     answer: Json = {}
-    for name, attribute, convert, default in _plan(model):
+    for name, attribute, inner, default in _plan(model):
         if name in given:
             answer[name] = given[name]
-            continue
-        if default is PydanticUndefined:
-            value = getattr(result, attribute)
-        else:
-            value = getattr(result, attribute, default)
-            if value == default or value == ():
-                continue  # left out
-        answer[name] = value if convert is None else convert(value)
+        elif default is PydanticUndefined:
+            answer[name] = _json(getattr(result, attribute), inner)
+        elif (value := getattr(result, attribute, default)) not in (default, ()):
+            answer[name] = _json(value, inner)
     return answer
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _inner(model: type[Answer], value: Any) -> Any:
-    if value is None:
-        return None
-    return answers_of(model, value) if isinstance(value, tuple | list) else answer_of(model, value)
 
 
 def answers_of(model: type[Answer], results: Iterable[object]) -> list[Json]:
     """Return results as answers of one model."""
     return [answer_of(model, one) for one in results]
+
+
+def _json(value: Any, model: type[Answer] | None = None) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if model is None or value is None:
+        return value
+    return answers_of(model, value) if isinstance(value, tuple | list) else answer_of(model, value)
 
 
 def registration_json(
@@ -116,22 +102,6 @@ def registration_json(
     )
     status = "degenerate" if result.degenerate else "ok"
     return answer_of(replies.RegisterAnswer, result, status=status, residuals=residuals)
-
-
-@dataclass(frozen=True, slots=True)
-class _Names:
-    """Names of the segments of a scan: the index, or of several views the view and the index in it."""
-
-    starts: Indices | None
-
-    def fields(self, scan: int) -> Json:
-        if self.starts is None:
-            return {"scan": scan}
-        view = int(np.searchsorted(self.starts, scan, side="right")) - 1
-        return {"view": view, "scan": scan - int(self.starts[view])}
-
-    def listed(self, scans: Sequence[int]) -> list[Any]:
-        return list(scans) if self.starts is None else [self.fields(scan) for scan in scans]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +130,17 @@ class Included:
     segments: list[Any] | None = None
     starts: Indices | None = None
 
+    def named(self, scan: int) -> Json:
+        """Return the fields that name a segment of the scan."""
+        if self.starts is None:
+            return {"scan": scan}
+        view = int(np.searchsorted(self.starts, scan, side="right")) - 1
+        return {"view": view, "scan": scan - int(self.starts[view])}
+
+    def listed(self, scans: Sequence[int]) -> list[Any]:
+        """Return the names of segments of the scan, by index alone where it is of a single view."""
+        return list(scans) if self.starts is None else [self.named(scan) for scan in scans]
+
 
 def association_json(
     result: AssociationResult, included: Included, references: Mapping[str, Json] = MappingProxyType({})
@@ -168,12 +149,11 @@ def association_json(
 
     `references` are id and revision of each of several maps, by name.
     """
-    named, parts = _Names(included.starts), included.parts
     given: Json = {name: getattr(included, name) for name in ("frame_id", "child_frame_id", "stamp")}
-    given["unmatched_scan"] = named.listed(result.unmatched_scan)
-    given["diagnostics"] = _diagnostics_json(result.diagnostics, named)
+    given["unmatched_scan"] = included.listed(result.unmatched_scan)
+    given["diagnostics"] = _diagnostics_json(result.diagnostics, included)
     given["correspondences"] = [
-        answer_of(replies.CorrespondenceAnswer, pair, **named.fields(pair.scan)) for pair in result.correspondences
+        answer_of(replies.CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences
     ]
     given["segments"] = included.segments
     given["alternatives"] = answers_of(replies.AlternativeAnswer, result.alternatives)
@@ -184,16 +164,16 @@ def association_json(
         ]
         given["map"] = None if result.map_id is None else references[result.map_id]
     answer = answer_of(replies.FoundAnswer, result, message=message_of(result), **given)
-    for name in {"correspondences", "alternatives", "missing_map", "segments"} - parts:
+    for name in {"correspondences", "alternatives", "missing_map", "segments"} - included.parts:
         del answer[name]
     return answer
 
 
-def _diagnostics_json(diagnostics: AssociationDiagnostics | None, named: _Names) -> Json | None:
+def _diagnostics_json(diagnostics: AssociationDiagnostics | None, included: Included) -> Json | None:
     if diagnostics is None:
         return None
     wall = diagnostics.critical_wall
-    critical = None if wall is None else answer_of(replies.CriticalWallAnswer, wall, scan=named.listed(wall.scan))
+    critical = None if wall is None else answer_of(replies.CriticalWallAnswer, wall, scan=included.listed(wall.scan))
     return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical)
 
 
@@ -227,7 +207,7 @@ def vectorization_json(found: Vectorization, moving: AssociationWarning | None =
 
 def map_json(line_map: LineMap) -> Json:
     """Return a map as a map document; one without points does not mention them."""
-    return {name: _plain(value) for name, value in line_map.document.items()}
+    return {name: _json(value) for name, value in line_map.document.items()}
 
 
 def import_json(imported: ImportedMap, found: MapCheck) -> Json:
