@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from benchmarks.worlds.measured.goals import BEFORE, rows
 from benchmarks.worlds.measured.outcomes import WorldOutcome, answer, read, share_read, write
 from benchmarks.worlds.measured.questions import FORMS, question
 from benchmarks.worlds.measured.running import Choice, Chunk, outcomes_of, run
-from benchmarks.worlds.measured.tables import could_be_told, held, quantile_bins, worst_gap
+from benchmarks.worlds.measured.tables import could_be_told, held
 from registration import RigidTransform
 
 FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=125)
@@ -90,15 +89,6 @@ def test_beams_tell_where_a_scan_was_not_taken() -> None:
     assert share_read(replace(case, ranges=ranges), case.truth) == pytest.approx(1.0 / 3.0, abs=0.04)
 
 
-def test_what_brings_no_return_agrees_with_a_map_that_shows_nothing() -> None:
-    case = draw_case("garage", "clean", 0)
-    nothing = np.isinf(case.ranges)
-    assert nothing.any()
-    assert share_read(case, case.truth) > 0.99
-    near = replace(case, ranges=np.where(nothing, 0.5 * case.scanner.range_max, case.ranges))
-    assert share_read(near, case.truth) == pytest.approx(1.0 - nothing.mean(), abs=0.02)
-
-
 @pytest.mark.long
 def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_path) -> None:
     alone, together = run(FEW, Processes(1)), run(FEW, Processes(2))
@@ -167,14 +157,3 @@ def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
             main()
         assert caught.value.code == 2
         assert told in capsys.readouterr().err
-
-
-def test_bins_hold_as_many_answers_as_asked_and_the_rest_in_the_last() -> None:
-    found = [replace(ANSWER, probability=k / 25, distance=0.1 if k >= 10 else 5.0) for k in range(25)]
-    found.append(replace(ANSWER, pose=None))
-    bins = quantile_bins(found, 10)
-    assert [count for count, _, _ in bins] == [10, 15]
-    assert bins[0][1:] == (pytest.approx(0.18), 0.0)
-    assert bins[1][1:] == (pytest.approx(0.68), 1.0)
-    assert worst_gap(bins) == pytest.approx(32.0)
-    assert math.isnan(worst_gap(quantile_bins([], 10)))

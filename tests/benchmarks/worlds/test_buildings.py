@@ -9,9 +9,7 @@ import pytest
 
 from benchmarks.worlds import FAMILIES, FLOOR_KINDS, draw_floors, free_place, free_places
 from benchmarks.worlds.buildings import FIXED, Building
-from benchmarks.worlds.buildings.plan import Plan
 from benchmarks.worlds.buildings.shapes import box, crosses, edges
-from benchmarks.worlds.places import distances, is_free
 from registration import Segments
 from simulation import Scanner, SimulationError, scan
 
@@ -59,70 +57,7 @@ def test_things_are_closed_outlines_that_stand_apart(name: str) -> None:
         assert not crosses(sides, building.segments.endpoints[building.things != thing])
 
 
-@pytest.mark.parametrize("name", FAMILIES)
-def test_what_can_be_moved_is_marked(name: str) -> None:
-    found = [draw(name, seed) for seed in range(6)]
-    assert sum(len(building.kinds) for building in found) > 0
-    if name not in ("mine", "facades", "round_rooms", "museum"):
-        assert all(len(building.doors) > 0 for building in found)
-    for building in found:
-        widths = np.hypot(*(building.doors[:, 2:] - building.doors[:, :2]).T)
-        assert ((widths > 0.7) & (widths < 2.6)).all()
-
-
-def test_half_of_the_families_are_kept_for_the_report() -> None:
-    assert len(FAMILIES) >= 14
-    assert sum(family.held_out for family in FAMILIES.values()) == len(FAMILIES) // 2
-
-
-def test_an_opening_in_no_wall_is_refused() -> None:
-    plan = Plan()
-    plan.room(box(0.0, 0.0, 4.0, 3.0))
-    plan.opening((1.0, 0.0), (2.0, 0.0), 0.2)
-    with pytest.raises(SimulationError) as caught:
-        plan.building("no room behind")
-    assert caught.value.argument == "opening"
-
-
-def test_outlines_that_cross_are_told_from_those_that_touch() -> None:
-    square = edges(box(0, 0, 1, 1))
-    assert crosses(square, np.array([[0.5, 0.5, 2.0, 0.5]]))
-    assert not crosses(square, np.array([[1.0, 0.0, 1.0, 1.0], [1.5, 0.0, 1.5, 1.0], [0.2, 0.2, 0.8, 0.8]]))
-    assert not crosses(square, np.zeros((0, 4)))
-    # Across the line of a side, but not across the side.
-    angle = edges(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]))
-    assert not crosses(angle, np.array([[0.5, 0.5, 0.5, 1.5], [1.2, 1.2, 1.8, 1.8]]))
-    assert crosses(angle, np.array([[0.5, 0.6, 1.5, 1.8]]))
-
-
 ROOM = np.vstack([edges(box(0, 0, 6, 4)), edges(box(2, 1, 3, 2)[::-1])])  # with a pillar
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "free"),
-    [(1.0, 1.0, True), (4.5, 2.0, True), (0.3, 2.0, False), (2.5, 1.5, False), (3.3, 1.5, False), (7.0, 2.0, False)],
-)
-def test_a_place_is_free_away_from_walls_and_on_their_free_side(x: float, y: float, free: bool) -> None:
-    assert is_free(Segments.from_array(ROOM), x, y) is free
-
-
-def test_a_place_from_which_nothing_is_seen_is_none() -> None:
-    far = Segments.from_array([[0.0, 0.0, 1.0, 0.0]])
-    assert not is_free(far, 0.5, 10.0)
-
-
-def test_distances_are_those_of_segments_and_not_of_lines() -> None:
-    walls = Segments.from_array([[0, 0, 2, 0], [5, 0, 5, 1]])
-    np.testing.assert_allclose(distances(walls, 1.0, 3.0), [3.0, np.hypot(4.0, 2.0)])
-
-
-def test_places_are_spread_over_all_that_is_free() -> None:
-    rng = np.random.default_rng(1)
-    places = [free_place(Segments.from_array(ROOM), rng) for _ in range(400)]
-    x = np.array([p.x for p in places])
-    # 0.4 m off all walls: 5.2 m by 3.2 m less a pillar; a third of it is right of 4 m.
-    assert np.mean(x > 4.0) == pytest.approx(1.6 * 3.2 / (5.2 * 3.2 - 1.8**2), abs=0.08)
-    assert len({round(p.theta, 6) for p in places}) == 400
 
 
 def test_where_there_is_no_room_there_is_an_error() -> None:
