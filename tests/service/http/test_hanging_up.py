@@ -42,18 +42,6 @@ async def waited(result: asyncio.Future[str], ends: list[str]) -> str:
         ends.append("ended")
 
 
-def test_the_result_is_returned_and_the_watch_ends() -> None:
-    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
-        deadline, tasks = Deadline(), asyncio.all_tasks()
-        asyncio.get_running_loop().call_later(2.0 * WATCH_AFTER, result.set_result, "done")
-        assert await unless_hung_up(receive, waited(result, []), deadline) == "done"
-        assert not deadline.cancelled
-        while asyncio.all_tasks() != tasks:
-            await asyncio.sleep(0)
-
-    run(main)
-
-
 def test_the_work_for_a_client_that_hung_up_ends() -> None:
     async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
         deadline, ends = Deadline(), list[str]()
@@ -78,19 +66,5 @@ def test_a_hang_up_at_the_moment_of_the_result_cancels_nothing_later(first: str)
         asyncio.get_running_loop().call_later(2.0 * WATCH_AFTER, both)
         assert await unless_hung_up(receive, waited(result, []), Deadline()) == "done"
         await asyncio.sleep(0)
-
-    run(main)
-
-
-def test_a_server_that_ends_is_no_hang_up() -> None:
-    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
-        deadline, ends = Deadline(), list[str]()
-        task = asyncio.ensure_future(unless_hung_up(receive, waited(result, ends), deadline))
-        await asyncio.sleep(0)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        assert deadline.cancelled
-        assert ends == ["ended"]
 
     run(main)

@@ -8,7 +8,6 @@ import tracemalloc
 import pytest
 
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
-from service.errors import TooMuchHeldError
 from service.http.bodies import unpack as unpack_counted
 
 MEGABYTE = 1 << 20
@@ -59,17 +58,3 @@ def test_a_body_in_many_pieces() -> None:
 def test_what_is_not_gzip(packed: bytes, message: str) -> None:
     with pytest.raises(NotJsonError, match=message):
         unpack(packed, 1000)
-
-
-def test_what_comes_out_is_counted_as_it_comes() -> None:
-    packed = gzip.compress(bytes(10 * MEGABYTE))
-    counted: list[int] = []
-    unpack_counted(packed, 10 * MEGABYTE, counted.append)
-    assert sum(counted) == 10 * MEGABYTE
-    assert max(counted) <= MEGABYTE
-
-    def full(count: int) -> None:
-        raise TooMuchHeldError
-
-    with pytest.raises(TooMuchHeldError):
-        unpack_counted(packed, 10 * MEGABYTE, full)

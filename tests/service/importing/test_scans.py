@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,20 +12,7 @@ from PIL import Image
 
 from formats import GridPicture
 from registration import RigidTransform
-from service.importing.reader import MOST_PIXELS, picture_json, spread
-
-
-@pytest.mark.parametrize("most", [1, 2, 3, 7, 100])
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 8, 9, 50])
-def test_scans_are_spread_evenly(count: int, most: int) -> None:
-    scans: Any = iter(range(count))
-    kept, counted = spread(scans, most)
-    assert counted == count
-    assert min(count, (most + 1) // 2) <= len(kept) <= most
-    steps = set(np.diff(kept).tolist())  # type: ignore[arg-type]
-    assert len(steps) <= 1
-    if count:
-        assert kept[0] == 0  # type: ignore[comparison-overlap]
+from service.importing.reader import MOST_PIXELS, picture_json
 
 
 def test_a_large_picture_is_reduced_and_stays_in_its_place() -> None:
