@@ -27,7 +27,6 @@ from association import (
     associate_on_maps,
     map_set,
 )
-from association.scan.alignment import aligned
 from registration import Segments
 
 from .scenes import (
@@ -274,16 +273,6 @@ def test_uncertain_views_of_a_building_that_repeats_itself_end_soon_after_their_
         result = answer_of(index, scan, deadline=deadline, max_alternatives=50)
         assert not result.usable
         assert result.search.complete or deadline.left > -80
-
-
-def test_the_deadline_is_looked_at_for_each_view_that_is_laid_on_others() -> None:
-    here = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
-    scan = assemble([View(here, pose(0.01 * k), 1e-4 * np.eye(3) if k else None) for k in range(24)])
-    laid, cut = (aligned(scan, Looks(left)).views for left in (MANY, 10))
-    assert laid is not None
-    assert cut is not None
-    assert laid.found.any()
-    assert not cut.found.any()
 
 
 def test_an_answer_takes_little_memory() -> None:

@@ -32,7 +32,7 @@ from association import (
     explain_verdict,
     message_of,
 )
-from simulation import corridor, l_room, rectangle_room, square_room
+from simulation import rectangle_room, square_room
 
 from .scenes import (
     CORRIDOR,
@@ -155,12 +155,6 @@ def whole_of(world: Any) -> AssociationResult:
     return associate(MapIndex.build(world.segments, 0.0), scan_of(ends))
 
 
-def test_the_message_of_a_usable_answer_states_its_probability() -> None:
-    result = whole_of(l_room())
-    percent = 100.0 * min(probability_in(result), 0.9999)
-    assert message_of(result) == f"The robot is at this pose with a probability of {percent:.2f} %."
-
-
 @pytest.mark.parametrize(
     ("world", "count"), [(rectangle_room(), "1 other pose fits"), (square_room(), "3 other poses fit")]
 )
@@ -169,22 +163,6 @@ def test_the_message_counts_poses_that_fit_about_as_well(world: Any, count: str)
     assert message_of(result) == f"{count} the scan about as well. The scan alone does not decide between them."
     near = [one for one in result.alternatives if one.score >= diagnostics_in(result).score - AS_WELL]
     assert len(near) == int(count[0])
-
-
-def test_the_message_names_an_unobservable_direction() -> None:
-    assert message_of(whole_of(corridor())) in (
-        "The position along the direction (1.00, 0.00) is unknown, and the heading may be reversed.",
-        "The position along the direction (-1.00, 0.00) is unknown, and the heading may be reversed.",
-    )
-
-
-def test_messages_of_no_match_and_of_doubts() -> None:
-    nothing = answer_of(ROOM_INDEX, scan_of(np.zeros((0, 4))))
-    assert message_of(nothing) == "No pose on this map explains the scan."
-    result = answer_of(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]))
-    unsure = message_of(replace(result, usable=False, status=Status.AMBIGUOUS, reasons=(), probability=0.62))
-    assert "62.00 %" in unsure
-    assert "reasons" in unsure
 
 
 # --- The critical wall ------------------------------------------------------------------------------------------------

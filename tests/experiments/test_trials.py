@@ -7,13 +7,11 @@ import pytest
 
 from experiments.accuracy import (
     Means,
-    correlation,
     correlation_over_poses,
     correlation_over_scans,
     correlation_pooled,
     correlation_within_poses,
     gain,
-    mean_of_pairs,
     means,
     over_bound,
     slopes,
@@ -87,13 +85,6 @@ def test_correlation_over_scans_poses_and_within():
     expected = np.corrcoef(a.ravel(), d.ravel())[0, 1]
     assert correlation_over_scans(trials, "unweighted")[0] == pytest.approx(expected)
     assert correlation_pooled([trials, trials], "unweighted")[0] == pytest.approx(expected)
-
-
-def test_correlations_of_nothing_are_no_numbers():
-    assert np.isnan(correlation(np.array([1.0, 2.0, np.nan]), np.array([1.0, 2.0, 3.0])))
-    assert np.isnan(correlation(np.ones(5), np.arange(5.0)))
-    assert mean_of_pairs([(1.0, np.nan), (3.0, np.nan)])[0] == 2.0
-    assert np.isnan(mean_of_pairs([(1.0, np.nan), (3.0, np.nan)])[1])
 
 
 def test_slopes_are_the_powers_of_points_and_noise():

@@ -24,10 +24,9 @@ from registration import (
     register,
     wrap_angle,
 )
-from registration.layout import Floats
 
 from . import reference
-from .scenes import assert_close, correspondences, diagonal, drawn, noisy_pairs
+from .scenes import assert_close, correspondences, diagonal, noisy_pairs
 
 POSES = st.builds(RigidTransform, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
 
@@ -208,23 +207,6 @@ def test_gather(seed: int) -> None:
     expected = zip(*reference.pair_rows(map_segments, scan, pairs), strict=True)
     for name, column in zip(COLUMNS, expected, strict=True):
         np.testing.assert_allclose(getattr(found, name), column, rtol=1e-15, atol=1e-15, err_msg=name)
-
-
-@given(SEEDS)
-@settings(max_examples=20, deadline=None)
-def test_moved_origins(seed: int) -> None:
-    rng, pairs, _, _ = drawn(seed)
-    on_map, of_scan = rng.uniform(-5.0, 5.0, (2, 2))
-    moved = pairs.about(on_map, of_scan)
-    assert_close(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1))
-    assert_close(moved.map_midpoints, pairs.map_midpoints - on_map)
-    assert_close(moved.offsets, pairs.offsets - reference_normals(pairs) @ of_scan)
-    assert_close(moved.centroids, pairs.centroids - of_scan)
-
-
-def reference_normals(pairs: Correspondences) -> Floats:
-    normals: Floats = pairs.directions @ reference.TURN.T
-    return normals
 
 
 @given(SEEDS)

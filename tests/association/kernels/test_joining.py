@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from numpy.typing import ArrayLike
 
 from association import AssociationOptions, Scan, mirrored
-from association.layout import LINE_PARTS, MODEL, VARIANCES, record
-from association.scan.kernels.joining import describe_lines, join_lines
+from association.layout import LINE_PARTS
+from association.scan.kernels.joining import join_lines
 from association.scan.scan_lines import ScanLines, variances_of
 from association.scan.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
 from registration import MeasuredSegments, Segments
@@ -114,22 +114,6 @@ def test_what_continues_or_repeats_another_is_of_its_line(other: list[float], on
         assert (len(joined(measured_of(np.random.default_rng(0), ends))[1]) == 1) is one_line
 
 
-@given(SEEDS)
-@settings(max_examples=60, deadline=None)
-def test_join_segments(seed: int) -> None:
-    """Lines of one segment and of many; some segments are exact."""
-    rng = np.random.default_rng(seed)
-    measured = measured_of(rng, in_pieces(rng))
-    if seed % 3 == 0:
-        measured = replace(measured, sigma=np.where(rng.random(len(measured)) < 0.2, 0.0, measured.sigma))
-    labels = twin.collinear_segments(measured, LINE_LATERAL, LINE_COSINE)
-    expected = twin.join_segments(measured, labels)
-    got_labels, got = joined(measured)
-    order = [labels[got_labels.index(k)] for k in range(len(got))]
-    assert (np.diff(got["length"]) <= 0.0).all()
-    assert_records(got, expected[order], rtol=1e-8, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("ends", "points", "expected"),
     [
@@ -148,29 +132,6 @@ def test_points_of_a_line(ends: list[list[float]], points: list[float] | None, e
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.03, points)
     (line,) = joined(measured)[1]
     assert line["variance"] == pytest.approx(0.03**2 / expected)
-
-
-@given(SEEDS)
-@settings(max_examples=60, deadline=None)
-def test_describe_lines(seed: int) -> None:
-    """Some are equally long; variances are below and above what they come to at least."""
-    rng = np.random.default_rng(seed)
-    measured = measured_of(rng, in_pieces(rng))
-    lines = twin.join_segments(measured, list(range(len(measured))))
-    lines = lines[twin.longest_first(lines["length"])]
-    lines["spread"] *= rng.choice([1e-6, 1.0], len(lines))
-    lines["variance"] *= rng.choice([0.0, 1.0], len(lines))
-    lines["covered"] *= rng.uniform(0.5, 1.0, len(lines))
-    names = ("map", "common", "least_offset", "least_angle")
-    variances = record(VARIANCES, **dict(zip(names, rng.choice([0.0, 1e-10, 1e-3, 1.0], 4), strict=True)))
-    model = record(MODEL, wall_variance=float(rng.choice([1e-4, 1e-2])), free_distance=0.3, free_angle=0.1)
-    _, expected = twin.describe_lines(lines, variances[0], model[0])
-    got, seen = describe_lines(lines, variances, model)
-    assert_records(got, expected, rtol=1e-8, atol=1e-12)
-    assert seen["row"].tolist() == list(range(len(got)))
-    assert (seen["sensor"] == 0).all()
-    for name in ("dx", "dy", "x", "y", "length"):
-        np.testing.assert_array_equal(seen[name], got[name])
 
 
 def assert_rows(got: Records, expected: Records, rtol: float) -> None:

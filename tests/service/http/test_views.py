@@ -98,20 +98,6 @@ def test_two_scanners_on_opposite_corners(client: httpx.Client, flipped: bool) -
     assert {pair["view"] for pair in answer["correspondences"]} == {0, 1}
 
 
-def test_a_scan_taken_while_turning(client: httpx.Client) -> None:
-    angles, step = np.linspace(-math.pi, math.pi, 720, endpoint=False), 0.1 / 720
-    ranges = []
-    for k, angle in enumerate(angles.tolist()):
-        t = k * step
-        ranges += read_from(HERE.compose(RigidTransform(0.0, 0.0, 2.0 * t)), np.array([angle]))
-    laser = {"angle_min": angles[0], "angle_increment": angles[1] - angles[0], "ranges": ranges, "time_increment": step}
-    told = asked(client, {"laser": laser, "twist": {"vx": 0.0, "vy": 0.0, "omega": 2.0}})
-    assert_here(told, distance=0.01)
-    untold = asked(client, {"laser": laser})["pose"]
-    assert abs(untold["theta"] - HERE.theta) > 0.05
-    assert abs(told["pose"]["theta"] - HERE.theta) < 0.005
-
-
 VIEW = {"segments": examples.SEEN, "pose": EXACT}
 
 
