@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,63 +12,19 @@ from association import Deadline
 from registration import Segments
 
 from . import tuning
-from .beams import NOTHING, Chunks
+from .beams import Chunks
 from .evidence import Judged, WallEvidence, are_enough
-from .result import Change, ChangeCode, Evidence
+from .result import Change, Evidence
 from .scans import blocks, go_on
-from .walls import Bools, find_cuts, runs
+from .walls import NO_SIGMA, NO_WALLS, Bools, Draft, find_cuts, runs
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
-NO_WALLS = np.zeros((0, 4))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Draft:
-    """A change before its evidence is counted.
-
-    Attributes
-    ----------
-    code : ChangeCode
-    segments : tuple of int
-        Of the map, that it replaces.
-    new : (k, 4)
-    sigma : (k,)
-    gone, there : (c,)
-        Chunks that it says are not there, and are there.
-    door : bool
-        True if a part of it may be the leaf of a door.
-    """
-
-    code: ChangeCode
-    segments: tuple[int, ...]
-    new: Floats = field(default_factory=lambda: NO_WALLS)
-    sigma: Floats = field(default_factory=lambda: np.zeros(0))
-    gone: Indices = field(default_factory=lambda: NOTHING)
-    there: Indices = field(default_factory=lambda: NOTHING)
-    door: bool = False
-
-    @property
-    def chunks(self) -> Indices:
-        """All chunks that it is about."""
-        return np.concatenate([self.gone, self.there])
-
-    def with_also(self, other: Draft, code: ChangeCode | None = None) -> Draft:
-        """Return one change that does both."""
-        return Draft(
-            code or self.code,
-            tuple(dict.fromkeys((*self.segments, *other.segments))),
-            np.concatenate([self.new, other.new]),
-            np.concatenate([self.sigma, other.sigma]),
-            np.concatenate([self.gone, other.gone]),
-            np.concatenate([self.there, other.there]),
-            self.door or other.door,
-        )
 
 
 def draft_changes(
-    evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, deadline: Deadline
-) -> list[Draft]:
+    evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, names: Sequence[str], deadline: Deadline
+) -> list[tuple[Draft, Change]]:
     """Return the changes that the evidence shows.
 
     Parameters
@@ -81,22 +37,28 @@ def draft_changes(
         Of the walls that may be new, metres.
     sigma : float
         Of the map's walls, metres.
+    names : sequence of str
+        Of the visits.
     deadline : Deadline
     """
+
+    def shown(drafts: Sequence[Draft]) -> list[tuple[Draft, Change]]:
+        go_on(deadline)
+        told = [(one, change_of(one, evidence, names)) for one in drafts]
+        return [(one, change) for one, change in told if change is not None]
+
     judged = evidence.judge()
-    cuts = find_cuts(evidence, judged, len(known), deadline)
-    removed = [Draft("removed", (cut.wall,), gone=cut.chunks) for cut in cuts if not len(cut.left)]
-    shortened = [
-        Draft("shortened", (cut.wall,), cut.left, np.full(len(cut.left), sigma), cut.chunks)
-        for cut in cuts
-        if len(cut.left)
-    ]
-    extended, added = _new_walls(judged, known, {cut.wall for cut in cuts}, sigmas, sigma, deadline)
-    ends = [known.endpoints[list(one.segments)] for one in removed]
-    removed = _joined(removed, ends, tuning.JOINED, deadline)
-    added = _joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline)
-    moved, removed, added = _moves(removed, added, known, deadline)
-    return [*moved, *removed, *added, *extended, *shortened]
+    cuts = find_cuts(evidence, judged, known, sigma, deadline)
+    extended, added = _new_walls(judged, known, {cut.segments[0] for cut in cuts}, sigmas, sigma, deadline)
+    added = [one for one, _ in shown(_joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline))]
+    # What remains of a wall that moved is not seen again; its faces may have no end in common.
+    whole = [replace(cut, code="removed", new=NO_WALLS, sigma=NO_SIGMA) for cut in cuts if not cut.rest_read]
+    gone = [one for one, _ in shown(_joined_in_map(whole, known, tuning.NEW_JOINED, deadline))]
+    moved, added = _moves(gone, added, known, deadline)
+    taken = {segment for one in moved for segment in one.segments}
+    cuts = [cut for cut in cuts if cut.segments[0] not in taken]
+    removed = _joined_in_map([cut for cut in cuts if cut.code == "removed"], known, tuning.JOINED, deadline)
+    return shown([*moved, *removed, *added, *extended, *(cut for cut in cuts if cut.code == "shortened")])
 
 
 def _new_walls(
@@ -193,6 +155,10 @@ def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Float
     return np.concatenate([place + min(reach) * along, place + max(reach) * along])
 
 
+def _joined_in_map(drafts: Sequence[Draft], known: Segments, gap: float, deadline: Deadline) -> list[Draft]:
+    return _joined(drafts, [known.endpoints[list(one.segments)] for one in drafts], gap, deadline)
+
+
 def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float, deadline: Deadline) -> list[Draft]:
     """Join changes of walls whose ends are near one another: they are one thing."""
     label = np.arange(len(drafts))
@@ -209,29 +175,22 @@ def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float, deadlin
 
 
 def _moves(
-    removed: list[Draft], added: list[Draft], known: Segments, deadline: Deadline
-) -> tuple[list[Draft], list[Draft], list[Draft]]:
-    """Pair things that are gone with new ones of the same sides nearby; return moves, and what is left of both."""
-    moves, taken = [], set()
-    left = []
-    for old in removed:
+    gone: Sequence[Draft], added: Sequence[Draft], known: Segments, deadline: Deadline
+) -> tuple[list[Draft], list[Draft]]:
+    """Pair things that are gone with new ones of the same sides nearby; return moves, and what is new and left."""
+    moves, left = [], list(added)
+    for old in gone:
         go_on(deadline)
-        sides = known.lengths[list(old.segments)]
-        middle = known.midpoints[list(old.segments)].mean(axis=0)
-        near = []
-        for k, new in enumerate(added):
-            if k in taken or not _fits(np.hypot(*(new.new[:, 2:] - new.new[:, :2]).T), sides):
-                continue
-            away = float(np.hypot(*(new.new.reshape(-1, 2).mean(axis=0) - middle)))
-            if away <= tuning.NEAR_MOVE:
-                near.append((away, k))
+        sides, middle = known.lengths[list(old.segments)], known.midpoints[list(old.segments)].mean(axis=0)
+        near = [
+            (away, k)
+            for k, new in enumerate(left)
+            if (away := float(np.hypot(*(new.new.reshape(-1, 2).mean(axis=0) - middle)))) <= tuning.NEAR_MOVE
+            and _fits(np.hypot(*(new.new[:, 2:] - new.new[:, :2]).T), sides)
+        ]
         if near:
-            _, k = min(near)
-            taken.add(k)
-            moves.append(old.with_also(added[k], "moved"))
-        else:
-            left.append(old)
-    return moves, left, [one for k, one in enumerate(added) if k not in taken]
+            moves.append(old.with_also(left.pop(min(near)[1]), "moved"))
+    return moves, left
 
 
 def _fits(new: Floats, old: Floats) -> bool:
@@ -239,7 +198,7 @@ def _fits(new: Floats, old: Floats) -> bool:
     free = sorted(old.tolist())
     for length in sorted(new.tolist(), reverse=True):
         best = min(free, key=lambda one: abs(one - length), default=None)
-        if best is None or abs(best - length) > tuning.SAME_LENGTH:
+        if best is None or abs(best - length) > max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length):
             return False
         free.remove(best)
     return True

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -180,23 +182,25 @@ class Localized:
         return Correspondences.of(self.on, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
 
 
-def visit_numbers(scans: Sequence[VisitScan]) -> tuple[list[str], list[int]]:
-    """Return the names of the visits in the order in which they came, and the number of each scan's visit."""
-    names = list(dict.fromkeys(one.visit for one in scans))
-    numbers = {name: k for k, name in enumerate(names)}
-    return names, [numbers[one.visit] for one in scans]
+def by_content(scans: Iterable[VisitScan]) -> list[VisitScan]:
+    """Return scans visit by visit, the visits in an order that depends on their ranges alone."""
+    visits: dict[str, list[VisitScan]] = {}
+    for one in scans:
+        visits.setdefault(one.visit, []).append(one)
+    return [one for some in sorted(visits.values(), key=_digest) for one in some]
 
 
-def held_back(visits: Sequence[int]) -> list[bool]:
+def _digest(scans: Iterable[VisitScan]) -> bytes:
+    ranges = [one.scan.beams.ranges for one in scans if one.scan.beams is not None]
+    return hashlib.blake2b(np.concatenate(ranges).tobytes()).digest()
+
+
+def held_back(visits: Iterable[Hashable]) -> list[bool]:
     """Return which scans are held back: one in ten of each visit, others where visits repeat a route."""
-    counts: dict[int, int] = {}
-    held = []
+    held, places = [], dict[Hashable, Iterator[int]]()
     for visit in visits:
-        counts[visit] = counts.get(visit, -1) + 1
-        held.append(
-            counts[visit] % tuning.HELD_BACK
-            == (tuning.HELD_BACK // 2 + tuning.NEXT_HELD_BACK * visit) % tuning.HELD_BACK
-        )
+        first = tuning.HELD_BACK // 2 - tuning.NEXT_HELD_BACK * len(places)
+        held.append(next(places.setdefault(visit, itertools.count(first))) % tuning.HELD_BACK == 0)
     return held
 
 
@@ -256,17 +260,14 @@ def choose_evidence(
     A visit of another building has few usable scans. A laser with a wrong scale leaves residuals that grow with the
     distance of the walls.
     """
-    chosen: list[Localized] = []
-    refused: list[RefusedVisit] = []
+    refused: dict[int, RefusedVisit] = {}
     for number, name in enumerate(names):
         own = [one for one in found if one.visit == number]
-        precise = [one for one in own if one.precise]
-        told = _doubt(own, precise, sigma)
-        if told is None:
-            chosen += [one for one in precise if not one.held_back]
-        else:
-            refused.append(RefusedVisit(name, told))
-    return chosen, refused
+        told = _doubt(own, [one for one in own if one.precise], sigma)
+        if told is not None:
+            refused[number] = RefusedVisit(name, told)
+    chosen = [one for one in found if one.precise and not one.held_back and one.visit not in refused]
+    return chosen, list(refused.values())
 
 
 def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float) -> str | None:

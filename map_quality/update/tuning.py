@@ -49,7 +49,8 @@ LOOP_GAP = 0.01  # m; corners that are nearer are one
 LEAST_GONE_OF_THING = 0.3  # fraction of its outline that beams pass through, drawn
 FEW_ON_THING = 0.03  # fraction of the beams, drawn
 LEAST_CUT = 0.5  # m; a wall is shortened by no less
-LEAST_PIECE = 0.2  # m; that remains of a wall, or is added
+LEAST_PIECE = 0.2  # m; that is added
+LONGEST_STUB = 0.32  # m; below it nothing remains of a wall; as accurate as its end is known
 LEAST_SEEN = 0.25  # m; shorter lines of a scan do not suggest a wall
 SAME_ANGLE = math.radians(4.0)  # between lines of scans that show one wall
 SAME_LINE = 0.08  # m, likewise
@@ -65,7 +66,7 @@ JAMB = 0.25  # m; between a leaf and the end of a wall that it is fixed to, or s
 DOOR_VISITS = 4  # that show a wall which may be a leaf; on fewer a door may happen to stand alike
 JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
-SAME_LENGTH = 0.15  # m; by which a side of a moved thing may differ
+SAME_LENGTH, SAME_FRACTION = 0.15, 0.05  # m, and fraction; by which a side of a moved thing may differ
 
 # --- Sharper walls ----------------------------------------------------------------------------------------------------
 

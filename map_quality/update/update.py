@@ -18,7 +18,7 @@ from . import tuning
 from .additions import candidates, unexplained
 from .applying import apply, apply_changes, with_ends
 from .beams import Chunks, sees
-from .changes import Draft, change_of, draft_changes
+from .changes import draft_changes
 from .evidence import Gatherer, WallEvidence
 from .odometry import Carrying
 from .result import Change, MapUpdate, RefusedVisit, Sharpened
@@ -27,16 +27,17 @@ from .scans import (
     TimeOverError,
     UpdateError,
     VisitScan,
+    by_content,
     choose_evidence,
     go_on,
     held_back,
     is_vouched,
     on_map,
     search,
-    visit_numbers,
 )
 from .sharpening import sharpen
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
+from .walls import Draft
 
 Floats = NDArray[np.float64]
 Drafts = Sequence[tuple[Draft, Change]]
@@ -115,13 +116,12 @@ def updating(
     if accept is not None and not 0.0 <= accept <= 1.0:
         raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
     begun = _Update.of(index, scans, deadline or Deadline())
-    names, _ = visit_numbers(scans)
     first = yield from begun.localize()
-    chosen, refused = choose_evidence(names, first, begun.sigma)
+    chosen, refused = begun.choose_evidence(first)
     proposed = Proposed()
     with contextlib.suppress(TimeOverError):
-        proposed = yield from begun.propose(chosen, first, names)
-        proposed = yield from begun.sharpen(proposed, first, names)
+        proposed = yield from begun.propose(chosen, first)
+        proposed = yield from begun.sharpen(proposed, first)
     return begun.proposal(proposed, first, refused, accept, refuse)
 
 
@@ -131,6 +131,7 @@ class _Update:
 
     index: MapIndex
     scans: list[VisitScan]  # with the poses that odometry carries to them
+    names: list[str]  # of the visits, in the order in which they came
     deadline: Deadline
     gatherer: Gatherer
     latest: dict[int, Localized] = field(default_factory=dict)  # by the number of a scan: its last search
@@ -143,7 +144,9 @@ class _Update:
             tuning.USUAL_SIGMA if index.sigma is None else index.sigma,
             len(index.segments) == index.directed,
         )
-        return cls(index, list(scans), deadline, Gatherer(known, sigma, oriented, deadline))
+        names = list(dict.fromkeys(one.visit for one in scans))
+        # What is proposed must not depend on the order of the visits.
+        return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, oriented, deadline))
 
     @property
     def known(self) -> Segments:
@@ -157,8 +160,7 @@ class _Update:
 
     def localize(self) -> Generator[None, None, list[Localized]]:
         """Search all scans that there is time for: each alone, and those that are not usable by odometry."""
-        _, visits = visit_numbers(self.scans)
-        held, found = held_back(visits), []
+        held, found = held_back(one.visit for one in self.scans), []
         now = time.monotonic()
         at = math.inf if self.deadline.at is None else now + FIRST_SEARCHES * (self.deadline.at - now)
         for number, one in enumerate(self.scans):
@@ -169,39 +171,37 @@ class _Update:
             result = search(self.index, one, self.deadline)
             vouched = is_vouched(one, result)
             found.append(
-                Localized(number, visits[number], one.scan, result, self.index.segments, held[number], vouched)
+                Localized(
+                    number, self.names.index(one.visit), one.scan, result, self.index.segments, held[number], vouched
+                )
             )
             yield
         yield from Carrying(self.index, self.scans, found, self.deadline, at).carry()
         return found
 
-    def propose(
-        self, chosen: Sequence[Localized], first: Sequence[Localized], names: Sequence[str]
-    ) -> Generator[None, None, Proposed]:
+    def choose_evidence(self, found: Sequence[Localized]) -> tuple[list[Localized], list[RefusedVisit]]:
+        """Return the scans that give evidence, and the visits that give none."""
+        return choose_evidence(self.names, found, self.sigma)
+
+    def propose(self, chosen: Sequence[Localized], first: Sequence[Localized]) -> Generator[None, None, Proposed]:
         """Draft changes until they show no more scans, and verify them."""
         latest = first
         shown: list[tuple[str, tuple[int, ...], int]] = []
         for number in range(tuning.ROUNDS):
-            drafts, evidence = yield from self.draft(chosen, names)
+            drafts, evidence = yield from self.draft(chosen)
             before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
             if shown == before or number == tuning.ROUNDS - 1:
                 break
             latest = yield from self.search_others(drafts, first, latest)
-            chosen, _ = choose_evidence(names, latest, self.sigma)
+            chosen, _ = self.choose_evidence(latest)
         return (yield from self.verify(drafts, evidence, first))
 
-    def draft(
-        self, chosen: Sequence[Localized], names: Sequence[str]
-    ) -> Generator[None, None, tuple[Drafts, WallEvidence]]:
+    def draft(self, chosen: Sequence[Localized]) -> Generator[None, None, tuple[Drafts, WallEvidence]]:
         """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
         known, deadline = self.known, self.deadline
         new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
         evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
-        told = []
-        for one in draft_changes(evidence, known, sigmas, self.sigma, deadline):
-            go_on(deadline)
-            told.append((one, change_of(one, evidence, names)))
-        return [(one, change) for one, change in told if change is not None], evidence
+        return draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
 
     def verify(
         self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]
@@ -231,9 +231,7 @@ class _Update:
         seen = np.array([[sees(one, scan, self.sigma, self.deadline) for scan in lost] for one in walls])
         return blamed(seen, most_lost(len(first)))
 
-    def sharpen(
-        self, proposed: Proposed, first: Sequence[Localized], names: Sequence[str]
-    ) -> Generator[None, None, Proposed]:
+    def sharpen(self, proposed: Proposed, first: Sequence[Localized]) -> Generator[None, None, Proposed]:
         """Estimate the walls from all scans, and search all scans on the sharper map.
 
         Returns
@@ -244,7 +242,7 @@ class _Update:
         if self.index.sigma is None or self.index.sigma < tuning.LEAST_BLUR:
             return proposed
         found = proposed.found or tuple(first)
-        chosen, _ = choose_evidence(names, found, self.sigma)
+        chosen, _ = self.choose_evidence(found)
         if not chosen:
             return proposed
         segments, kept = apply(self.known, proposed.changes)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import tuning
-from .changes import Draft
 from .evidence import WallEvidence
 from .result import NOT_SHARPENED, Change, Sharpened, Usable
 from .scans import Localized
+from .walls import Draft
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,9 +1,9 @@
-"""Walls of the map that are gone, whole or in part."""
+"""Drafts of changes, and walls of the map that are gone, whole or in part."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from association import Deadline
+from registration import Segments
 
 from . import tuning
-from .beams import Chunks
+from .beams import NOTHING, Chunks
 from .evidence import Judged, WallEvidence, are_enough
+from .result import ChangeCode
 from .scans import go_on
 
 Floats = NDArray[np.float64]
@@ -22,23 +24,53 @@ Indices = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 
+NO_WALLS, NO_SIGMA = np.zeros((0, 4)), np.zeros(0)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Cut:
-    """A wall of the map of which something is gone.
+class Draft:
+    """A change before its evidence is counted.
 
     Attributes
     ----------
-    wall : int
-        Index of the map segment.
-    chunks : (k,)
-        Its chunks that are gone.
-    left : (p, 4)
-        Its pieces that remain, metres; none if all of it is gone.
+    code : ChangeCode
+    segments : tuple of int
+        Of the map, that it replaces.
+    new : (k, 4)
+    sigma : (k,)
+    gone, there : (c,)
+        Chunks that it says are not there, and are there.
+    door : bool
+        True if a part of it may be the leaf of a door.
+    rest_read : bool
+        True if a visit reads what it leaves of a wall.
     """
 
-    wall: int
-    chunks: Indices
-    left: Floats
+    code: ChangeCode
+    segments: tuple[int, ...]
+    new: Floats = field(default_factory=lambda: NO_WALLS)
+    sigma: Floats = field(default_factory=lambda: NO_SIGMA)
+    gone: Indices = field(default_factory=lambda: NOTHING)
+    there: Indices = field(default_factory=lambda: NOTHING)
+    door: bool = False
+    rest_read: bool = False
+
+    @property
+    def chunks(self) -> Indices:
+        """All chunks that it is about."""
+        return np.concatenate([self.gone, self.there])
+
+    def with_also(self, other: Draft, code: ChangeCode | None = None) -> Draft:
+        """Return one change that does both."""
+        return Draft(
+            code or self.code,
+            tuple(dict.fromkeys((*self.segments, *other.segments))),
+            np.concatenate([self.new, other.new]),
+            np.concatenate([self.sigma, other.sigma]),
+            np.concatenate([self.gone, other.gone]),
+            np.concatenate([self.there, other.there]),
+            self.door or other.door,
+        )
 
 
 def runs(chosen: Bools) -> list[tuple[int, int]]:
@@ -47,21 +79,24 @@ def runs(chosen: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def find_cuts(evidence: WallEvidence, judged: Judged, walls: int, deadline: Deadline) -> list[Cut]:
-    """Return which of the first so many walls are gone, whole or in part."""
+def find_cuts(evidence: WallEvidence, judged: Judged, known: Segments, sigma: float, deadline: Deadline) -> list[Draft]:
+    """Return which walls of the map are gone, whole or in part: a draft for each, removed or shortened."""
     chunks = evidence.chunks
-    cuts = {cut.wall: cut for cut in _gone_things(evidence, walls, deadline)}
+    cuts = {cut.segments[0]: cut for cut in _gone_things(evidence, len(known), deadline)}
     for wall in np.unique(chunks.walls_of(judged.seen[judged.gone])).tolist():
-        if wall < walls and wall not in cuts:
+        if wall < len(known) and wall not in cuts:
             go_on(deadline)
             gone, _, open_, read = judged.of_wall(wall)
-            cut = _cut(chunks, wall, gone, read, open_)
+            own = np.arange(chunks.first[wall], chunks.first[wall + 1])
+            if _is_gone_whole(evidence, own, tuning.LEAST_GONE):
+                gone[:] = True
+            cut = _cut(chunks, wall, gone, read, open_, sigma)
             if cut is not None:
                 cuts[wall] = cut
     return [cuts[wall] for wall in sorted(cuts)]
 
 
-def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iterator[Cut]:
+def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iterator[Draft]:
     """Yield the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
 
     A thing that beams pass through is not solid, so its other sides are gone, too, whether they were seen or not.
@@ -82,30 +117,30 @@ def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iter
         if len(mine) < 3 or chunks.walls.lengths[mine].sum() > tuning.THING or (at[np.unique(corner[mine])] != 2).any():
             continue
         own = [np.arange(chunks.first[wall], chunks.first[wall + 1]) for wall in mine]
-        if _is_gone_whole(evidence, np.concatenate(own)):
+        if _is_gone_whole(evidence, np.concatenate(own), tuning.LEAST_GONE_OF_THING):
             for wall, part in zip(mine.tolist(), own, strict=True):
                 rows = evidence.rows_of(part)
                 gone = np.unique(evidence.chunk[rows][evidence.counts[rows, 0] > 0])
-                yield Cut(wall, gone, np.zeros((0, 4)))
+                yield Draft("removed", (wall,), gone=gone)
 
 
-def _is_gone_whole(evidence: WallEvidence, chunks: Indices) -> bool:
-    """Return whether beams of several visits and poses pass through a good part of a thing, and nothing reads it."""
+def _is_gone_whole(evidence: WallEvidence, chunks: Indices, least: float) -> bool:
+    """Return whether beams of several visits and poses pass through this fraction of chunks, and nothing reads them."""
     rows = evidence.rows_of(chunks)
     through, on, _ = evidence.counts[rows].sum(axis=0)
     if on > tuning.FEW_ON_THING * (through + on) or evidence.visits_of(rows, on=True) or evidence.is_read(rows):
         return False
     passed = len(np.unique(evidence.chunk[rows][evidence.counts[rows, 0] > 0])) / len(chunks)
     visits, poses = evidence.visits_of(rows, on=False), evidence.places_of(rows, on=False)
-    return bool(are_enough(len(visits), poses) and passed >= tuning.LEAST_GONE_OF_THING)
+    return bool(are_enough(len(visits), poses) and passed >= least)
 
 
-def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools) -> Cut | None:
+def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools, sigma: float) -> Draft | None:
     """Return what is gone of a wall; None where that is too little to be sure of."""
     first, length = int(chunks.first[wall]), float(chunks.walls.lengths[wall])
     step = length / len(gone)
     if gone.mean() >= tuning.LEAST_GONE and not (read & ~gone).any():
-        return Cut(wall, first + np.flatnonzero(gone), np.zeros((0, 4)))
+        return Draft("removed", (wall,), gone=first + np.flatnonzero(gone))
     out = np.zeros(len(gone), dtype=bool)
     for begin, end in runs(gone):
         if (end - begin) * step < tuning.LEAST_CUT:
@@ -115,10 +150,12 @@ def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools) -> C
         while end < len(gone) and open_[end]:
             end += 1
         out[begin:end] = True
-    for begin, end in runs(~out):  # what is too short to be a wall, and is not read
-        if (end - begin) * step < tuning.LEAST_PIECE + 0.5 * step and not read[begin:end].any() and out.any():
-            out[begin:end] = True
     if not out.any():
         return None
-    left = [chunks.part(wall, begin, end) for begin, end in runs(~out)]
-    return Cut(wall, first + np.flatnonzero(out & gone), np.array(left).reshape(-1, 4))
+    for begin, end in runs(~out):  # too short to be a wall; at a corner, beams that end on the next wall read it
+        if (end - begin) * step < tuning.LONGEST_STUB:
+            out[begin:end] = True
+    left = np.array([chunks.part(wall, begin, end) for begin, end in runs(~out)]).reshape(-1, 4)
+    code: ChangeCode = "shortened" if len(left) else "removed"
+    sigmas, rest_read = np.full(len(left), sigma), bool((read & ~out).any())
+    return Draft(code, (wall,), left, sigmas, first + np.flatnonzero(out & gone), rest_read=rest_read)

@@ -33,8 +33,8 @@ def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
     chunk, scan = np.divmod(np.arange(6 * len(wall)), 6)
     counts = np.stack([9 * ~on[chunk], 9 * on[chunk], 0 * chunk], axis=1)
     evidence = WallEvidence(chunks, chunk, scan, scan % 2, scan % 3, counts)
-    drafts = draft_changes(evidence, MAP, sigmas, 0.005, Deadline())
-    return np.concatenate([one.new for one in drafts if one.code == "added"])
+    drafts = draft_changes(evidence, MAP, sigmas, 0.005, ["monday", "tuesday"], Deadline())
+    return np.concatenate([one.new for one, _ in drafts if one.code == "added"])
 
 
 @pytest.mark.parametrize("across", [0.18, -0.18])

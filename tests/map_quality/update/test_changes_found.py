@@ -182,3 +182,45 @@ def test_changes_are_applied_in_the_order_of_the_segments() -> None:
     assert applied.endpoints.tolist() == np.array(expected).tolist()
     assert sigma == 0.02
     assert apply(old, changes)[1].tolist() == [0, -1, 2, 4, -1, -1]
+
+
+def partition(x: float) -> list[list[float]]:
+    """Return a wall that stands out from the outline."""
+    return [[x, 0.0, x, 3.0], [x, 3.0, x + 0.15, 3.0], [x + 0.15, 3.0, x + 0.15, 0.0]]
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_a_wall_that_moved_by_a_pace_is_one_change_without_a_stub(count: int) -> None:
+    hall, today = segments(RACK, PILLAR, partition(5.7)), segments(RACK, PILLAR, partition(6.4))
+    (one,) = updated(hall, *visits(*[today] * count)).changes
+    assert (one.code, one.segments) == ("moved", (20, 21, 22))
+    assert off_walls(one.new, today).max() < 0.05
+
+
+def test_both_faces_of_a_wall_without_ends_move_together() -> None:
+    old, new = ([[4, y, 10, y], [10, y + 0.15, 4, y + 0.15]] for y in (5.0, 5.7))
+    hall, today = segments(RACK, PILLAR, old), segments(RACK, PILLAR, new)
+    (one,) = updated(hall, *visits(*[today] * 5)).changes
+    assert (one.code, one.segments) == ("moved", (20, 21))
+
+
+def test_an_outer_wall_that_moved_is_one_change() -> None:
+    walls = [[-0.7, 0, 12, 0], *OUTLINE[1:10], [5.5, 8, -0.7, 8], [-0.7, 8, -0.7, 0], *RACK, *PILLAR]
+    hall, today = segments(RACK, PILLAR), Segments.from_array(np.array(walls, dtype=float))
+    found = {one.segments: one.code for one in updated(hall, *visits(*[today] * 5)).changes}
+    assert found[(11,)] == "moved"
+    assert set(found.values()) <= {"moved", "extended"}
+
+
+def test_the_order_of_the_visits_does_not_matter() -> None:
+    """Neither to the changes, nor to the scans that are held back; the first visit is named as it was sent."""
+    hall, today = segments(RACK, PILLAR), segments(RACK, box(9.1, 4.4, 9.7, 5.0), CART)
+    days = visits(*[today] * 5)
+    found = [updated(hall, *some) for some in (days, days[::-1], days[2:] + days[:2])]
+    assert len(found[0].changes) == 2
+    for one in found[1:]:
+        assert (one.held_back, one.usable) == (found[0].held_back, found[0].usable)
+        for change, same in zip(one.changes, found[0].changes, strict=True):
+            assert (change.code, change.segments, change.confidence) == (same.code, same.segments, same.confidence)
+            assert change.new.tolist() == same.new.tolist()
+    assert [one.changes[0].evidence.first for one in found] == ["day 0", "day 4", "day 2"]

@@ -11,11 +11,11 @@ import pytest
 import map_quality
 from association import Deadline, MapIndex
 from map_quality import MapUpdate, VisitScan
-from map_quality.update.changes import Draft
 from map_quality.update.odometry import Carrying
 from map_quality.update.result import Change, Evidence
 from map_quality.update.scans import Localized, search
 from map_quality.update.update import _Update
+from map_quality.update.walls import Draft
 from registration import RigidTransform, Segments
 
 from .rooms import FIRST, IN_HALL, SECOND, drive, places_in, rooms, with_odometry

@@ -13,10 +13,10 @@ import pytest
 from association import Deadline, MapIndex, Reason, ReasonCode
 from map_quality import VisitScan
 from map_quality.update.beams import Chunks, sees
-from map_quality.update.changes import Draft
 from map_quality.update.evidence import Gatherer
 from map_quality.update.scans import Localized, is_vouched, on_map, search
 from map_quality.update.verifying import blamed, is_better, keeps_usable
+from map_quality.update.walls import Draft
 from registration import Segments
 
 from .hall import PILLAR, RACK, segments, visit
