@@ -19,8 +19,7 @@ import numpy as np
 import linefix
 from registration import IDENTITY, InputError, RigidTransform, Segments, wrap_angle
 from ros2.agreement import Agreement, Event, Observation
-from ros2.messages import Time
-from ros2.searching import OPTIONS, Located
+from ros2.searching import OPTIONS, observation_of
 from simulation import Scanner, scan
 
 from .outcomes import progress
@@ -92,7 +91,7 @@ def observe(index: linefix.MapIndex, laser: linefix.LaserScan, stamp: int) -> Ob
         answer = linefix.locate(index, laser, options=OPTIONS)
     except InputError:
         return Observation(stamp, None, None, False)
-    return Located(Time(), answer).observation(None, stamp)
+    return observation_of(answer, None, stamp)
 
 
 def with_odometry(

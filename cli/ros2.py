@@ -26,7 +26,6 @@ MAX_FRAME = 255  # characters
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
 READ = "linefix.ros2"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "stdout_logs", "help")
-OF_ALL_NODES = ("use_sim_time",)  # which changes nothing here: times are those of messages
 LEAST = "Minimum standard deviation"
 TOGETHER = "Search scans of several topics as one if they are so close in time; 0: never."
 STOP_TF = "Stop the transform of --publish-tf this long after the last scan with ranges; 0: never."
@@ -56,7 +55,7 @@ def _read(context: typer.Context, parameter: typer.CallbackParam, value: Any) ->
     values = {} if file is None else parameters_of(file, spaces[-1] if spaces else read.get("namespace"), known)
     given = {name: one for rule in rules for name, one in given_parameter(rule).items()}
     for name in {**values, **given}:
-        if name not in known and name not in OF_ALL_NODES:
+        if name not in known:
             expected = ", ".join(sorted("map" if one == "on" else one for one in known))
             source = "-p" if name in given else file
             raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
@@ -93,6 +92,11 @@ class RobotOptions:
     ] = 0.0349
     publish_tf: Annotated[bool, option(PUBLISH_TF)] = False
     tf_max_age_s: Annotated[float, option(STOP_TF, "SECONDS", min=0.0, max=3600.0)] = 0.0
+    surface: Annotated[
+        float | None,
+        option("Depth of walls' surfaces in the map's cells.", "CELLS", min=0.0, max=10.0),
+    ] = None
+    use_sim_time: Annotated[bool, option("Use the time of /clock.")] = False
     hardware_id: Annotated[str, option("Hardware id of the diagnostics. Default: the namespace.", "NAME")] = ""
 
 

@@ -160,7 +160,7 @@ def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
     return ImportedMap(line_map, notes.report(found.format, (name,)), picture_of(found.grid))
 
 
-def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
+def map_of_grid(message: Any, name: str = "OccupancyGrid", surface: float | None = None) -> ImportedMap:
     """Return the faces of the walls in a ``nav_msgs/OccupancyGrid`` as a map.
 
     Parameters
@@ -169,6 +169,8 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
         With the fields of the message, whatever library it comes from.
     name : str
         Its name in errors and in the report.
+    surface : float, optional
+        As of `ImportOptions`.
 
     Raises
     ------
@@ -177,7 +179,9 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
     """
     notes = Notes()
     grid, frame = grid_of(message, name, notes)
-    return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)), picture_of(grid))
+    return ImportedMap(
+        _from_grid(grid, notes, name, frame, surface), notes.report("occupancy_grid", (name,)), picture_of(grid)
+    )
 
 
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str, surface: float | None = None) -> LineMap:

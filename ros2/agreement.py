@@ -6,8 +6,10 @@ The state is a list of hypotheses, each a pose of the robot in a map that odomet
 2. A usable scan that disagrees counts against a hypothesis; so does one that is not usable, where the prediction is
    neither its pose nor one of its alternatives although all poses that explain it as well are listed.
 3. A hypothesis is agreed when the scans that support it, less those against it, are as many as needed, and the robot
-   has moved far enough between them, or has rested long enough while nothing spoke against it.
-4. The agreed hypothesis stays until another one is agreed; what speaks against it meanwhile is reported at once.
+   has moved far enough between them, or has rested long enough while nothing spoke against it. Where another pose was
+   likely, twice as many scans over twice the way are needed, and rest is no evidence.
+4. The agreed hypothesis stays until another one is agreed; what speaks against it meanwhile is reported at once. It is
+   also supported over a short time in which odometry is not known.
 """
 
 from __future__ import annotations
@@ -66,6 +68,8 @@ class Observation:
         Other poses that explain the scan.
     conclusive : bool
         True when every pose that explains the scan about as well is `pose` or one of `others`.
+    rival : bool
+        True when one of `others` is likely.
     map_id : str or None
         Of several maps the one that `pose` is on.
     """
@@ -79,6 +83,7 @@ class Observation:
     unknown_s: float = 0.0
     others: Sequence[Place] = ()
     conclusive: bool = False
+    rival: bool = False
     map_id: str | None = None
 
 
@@ -102,9 +107,11 @@ class _Hypothesis:
     against: int = 0
     moved: float = 0.0
     turned: float = 0.0
+    rival: bool = False
 
     def support(self, scan: Observation) -> None:
         """Take a usable scan that agrees; scans of nearly the same place and time count once."""
+        self.rival = self.rival or scan.rival
         whole = step_between(self.first, scan) or IDENTITY
         self.moved = max(self.moved, math.hypot(whole.x, whole.y))
         self.turned = max(self.turned, abs(whole.theta))
@@ -119,10 +126,27 @@ class _Hypothesis:
         self.latest = scan
 
     def agreed(self, needed: int) -> bool:
-        if self.supporting - self.against < needed:
-            return False
-        rested = self.against == 0 and self.latest.stamp - self.first.stamp >= tuning.RESTED_NS
-        return needed == 1 or self.moved >= tuning.MOVED or self.turned >= tuning.TURNED or rested
+        if needed == 1:
+            return self.supporting > self.against
+        times = 2 if self.rival else 1
+        rested = times == 1 and self.against == 0 and self.latest.stamp - self.first.stamp >= tuning.RESTED_NS
+        driven = self.moved >= times * tuning.MOVED or self.turned >= times * tuning.TURNED
+        return self.supporting - self.against >= times * needed and (driven or rested)
+
+    def verdict(self, scan: Observation, *, agreed: bool) -> bool | None:
+        """Return whether a scan agrees; None where that is undecided.
+
+        Before the agreement all of the way since the first scan counts, so that a robot whose odometry is missing or
+        frozen does not seem to rest. Afterwards it is the way since a scan that was taken elsewhere or a second ago.
+        """
+        begin = self.counted if agreed else self.first
+        step = step_between(begin, scan)
+        if step is not None and (scan.odometry is not None or not agreed):
+            return _verdict(begin, scan, step, abs(scan.unknown_s - begin.unknown_s))
+        seconds = (scan.stamp - self.latest.stamp) / 1e9
+        if not agreed or seconds > tuning.UNKNOWN_SECONDS:
+            return None
+        return _verdict(self.latest, scan, IDENTITY, seconds)
 
 
 @dataclass(slots=True)
@@ -139,6 +163,7 @@ class Agreement:
     _hypotheses: list[_Hypothesis] = field(default_factory=list)
     _agreed: _Hypothesis | None = None
     _newest: int | None = None
+    _held: Observation | None = None  # whose stamp fits that of no other scan yet
     _contradicted: bool = False
 
     @property
@@ -152,6 +177,11 @@ class Agreement:
         return self._contradicted
 
     @property
+    def refuted(self) -> bool:
+        """Return whether so many scans contradict the agreed hypothesis that it is not to be used any more."""
+        return self._agreed is not None and self._agreed.against >= tuning.LOST_SCANS
+
+    @property
     def progress(self) -> tuple[int, float, float]:
         """Scans for the best hypothesis less those against it, metres and radians that the robot has moved."""
         best = max(self._hypotheses, key=lambda one: one.supporting - one.against, default=None)
@@ -160,25 +190,34 @@ class Agreement:
     def reset(self) -> None:
         """Forget everything, as when the robot was carried, or the map changed."""
         self._hypotheses, self._agreed, self._newest, self._contradicted = [], None, None, False
+        self._held = None
 
     def take(self, scan: Observation) -> Event:
         """Take the next scan.
 
-        Scans that are older than the last one are left out; where the clock was set back, everything is forgotten.
+        Scans that are a little older than the last one are left out. One whose stamp is far from that of the last is
+        taken when the next one confirms its clock; where that was set back, everything is forgotten.
         """
-        if self._newest is not None and scan.stamp < self._newest:
-            if self._newest - scan.stamp <= tuning.CLOCK_BACK_NS:
+        held, self._held = self._held, None
+        if self._newest is not None and not _near(self._newest, scan.stamp):
+            if held is None or scan.stamp < held.stamp:
+                self._held = scan
                 return Event.NOTHING
-            self.reset()
+            if held.stamp < self._newest:
+                self.reset()
+            self._take(held)
+        elif self._newest is not None and scan.stamp < self._newest:
+            return Event.NOTHING
+        return self._take(scan)
+
+    def _take(self, scan: Observation) -> Event:
         self._newest = scan.stamp
         self._hypotheses = [
             one
             for one in self._hypotheses
             if one is self._agreed or scan.stamp - one.latest.stamp <= tuning.FORGOTTEN_NS
         ]
-        # Without odometry a robot rests or not since the first scan: from scan to scan a slow one always seems to.
-        known = scan.odometry is not None
-        verdicts = [(one, _verdict(one.latest if known else one.first, scan)) for one in self._hypotheses]
+        verdicts = [(one, one.verdict(scan, agreed=one is self._agreed)) for one in self._hypotheses]
         for one, agrees in verdicts:
             if agrees is False:
                 one.against += 1
@@ -191,7 +230,7 @@ class Agreement:
         return self._event(supported, {id(one): agrees for one, agrees in verdicts})
 
     def _begin(self, scan: Observation) -> None:
-        self._hypotheses.append(_Hypothesis(scan, scan, scan))
+        self._hypotheses.append(_Hypothesis(scan, scan, scan, rival=scan.rival))
         if len(self._hypotheses) > tuning.MAX_HYPOTHESES:
             self._hypotheses.remove(
                 min((one for one in self._hypotheses if one is not self._agreed), key=lambda one: one.latest.stamp)
@@ -258,15 +297,18 @@ def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> floa
     return float(difference @ np.linalg.solve(covariance, difference))
 
 
-def _verdict(begin: Observation, scan: Observation) -> bool | None:
+def _near(newest: int, stamp: int) -> bool:
+    return -tuning.CLOCK_BACK_NS <= stamp - newest <= tuning.CLOCK_AHEAD_NS
+
+
+def _verdict(begin: Observation, scan: Observation, step: RigidTransform, unknown_s: float) -> bool | None:
     """Return whether a scan agrees with what odometry predicts; None where that is undecided.
 
     Poses of different maps never agree.
     """
-    step = step_between(begin, scan)
-    if step is None or scan.pose is None:
+    if scan.pose is None:
         return None
-    predicted, covariance = predict(begin, step, abs(scan.unknown_s - begin.unknown_s))
+    predicted, covariance = predict(begin, step, unknown_s)
     if scan.usable and scan.map_id != begin.map_id:
         return False
     if scan.usable:

@@ -114,6 +114,7 @@ class Endpoints:
         self._participant, self._topic, self._own, self._writers = participant, topic, own, writers
         self._reader: Any = None
         self._known: dict[Any, bool] = {}
+        self._lossy: set[Any] = set()
 
     @property
     def connected(self) -> frozenset[Any]:
@@ -125,6 +126,12 @@ class Endpoints:
         """Return whether there are some whose quality of service does not fit."""
         return not all(self._found().values())
 
+    @property
+    def best_effort(self) -> bool:
+        """Return whether one of them is best effort."""
+        self._found()
+        return bool(self._lossy)
+
     def _found(self) -> dict[Any, bool]:
         """Take what has changed; return for each id whether it fits."""
         if self._reader is None:
@@ -134,8 +141,11 @@ class Endpoints:
             for one in changed:
                 if one.sample_info.instance_state != InstanceState.Alive:
                     self._known.pop(one.key, None)
+                    self._lossy.discard(one.key)
                 elif one.topic_name == self._topic and one.participant_key != self._participant.guid:
                     self._known[one.key] = self._fits(one.qos)
+                    if not _reliable(one.qos):
+                        self._lossy.add(one.key)
         return self._known
 
     def _fits(self, other: Qos) -> bool:

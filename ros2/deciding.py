@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from registration import RigidTransform, wrap_angle
 
 from .agreement import Event, Observation
+from .clock import NS
 from .options import When
-from .tuning import ALWAYS_SECONDS, CORRECTION_SPEED, CORRECTION_TURN_RATE, LOST_SECONDS
+from .tuning import ALWAYS_SECONDS, CORRECTION_SPEED, CORRECTION_TURN_RATE, LOST_SECONDS, UNCONFIRMED_SECONDS
 
 
 @dataclass(slots=True)
@@ -68,9 +69,6 @@ class InitialPose:
         self._wanted, self._published, self._at = not subscribed, True, now
 
 
-SECOND = 1_000_000_000
-
-
 @dataclass(slots=True)
 class MapToOdom:
     """Follows the agreed poses; small corrections are spread over time, a newly agreed pose holds at once.
@@ -84,17 +82,23 @@ class MapToOdom:
     current: RigidTransform | None = None
     _target: RigidTransform | None = None
     _stamp: int = 0
+    _part: tuple[int, ...] = ()  # of odometry, which the correction is of,
+    _unknown_s: float = 0.0  # and how long odometry was not known before
 
     def take(self, event: Event, scan: Observation) -> None:
         """Take a scan that is agreed or confirmed; others, and those without odometry, change nothing."""
         if event not in (Event.AGREED, Event.CONFIRMED) or scan.pose is None or scan.odometry is None:
             return
         self._target = scan.pose.compose(scan.odometry.inverse())
-        if event is Event.AGREED or self.current is None:
+        other = (scan.part, scan.unknown_s) != (self._part, self._unknown_s)
+        if event is Event.AGREED or self.current is None or other:
             self.current, self._stamp = self._target, scan.stamp
+        self._part, self._unknown_s = scan.part, scan.unknown_s
 
-    def advance(self, stamp: int, odometry: RigidTransform) -> RigidTransform | None:
-        """Return map_from_odom at a time.
+    def advance(
+        self, stamp: int, odometry: RigidTransform, part: tuple[int, ...] = (), unknown_s: float = 0.0
+    ) -> RigidTransform | None:
+        """Return map_from_odom at a time; None before a scan confirms odometry that jumped, or was not known for long.
 
         Parameters
         ----------
@@ -102,10 +106,13 @@ class MapToOdom:
             Nanoseconds.
         odometry : RigidTransform
             odom_from_base: the correction is limited where the robot is, not at the origin of odometry.
+        part, unknown_s : tuple of int, float
+            As of `Observation`.
         """
-        if self.current is None or self._target is None:
+        doubtful = part != self._part or unknown_s - self._unknown_s > UNCONFIRMED_SECONDS
+        if self.current is None or self._target is None or doubtful:
             return None
-        seconds = min(1.0, max(0.0, (stamp - self._stamp) / SECOND))
+        seconds = min(1.0, max(0.0, (stamp - self._stamp) / NS))
         self._stamp = stamp
         here, there = self.current.compose(odometry), self._target.compose(odometry)
         distance, angle = math.hypot(there.x - here.x, there.y - here.y), wrap_angle(there.theta - here.theta)
@@ -113,9 +120,9 @@ class MapToOdom:
         if needed <= seconds:
             self.current = self._target
         elif seconds > 0.0:
-            part = seconds / needed
+            done = seconds / needed
             mixed = RigidTransform(
-                here.x + part * (there.x - here.x), here.y + part * (there.y - here.y), here.theta + part * angle
+                here.x + done * (there.x - here.x), here.y + done * (there.y - here.y), here.theta + done * angle
             )
             self.current = mixed.compose(odometry.inverse())
         return self.current

@@ -10,7 +10,6 @@ from enum import StrEnum
 
 from .messages import DiagnosticArray, DiagnosticStatus, Header, Time
 from .reporting import ERROR, OK, WARN, status_of
-from .transforms import NS
 from .tuning import LOG_SECONDS, REPEAT_SECONDS
 from .wire import Publisher
 
@@ -39,12 +38,6 @@ STATES = {
     State.LOST: (ERROR, "the pose of the localizer differs from that of the scans"),
     State.STALE: (ERROR, "the agreed pose is not confirmed any more"),
 }
-
-
-def current_time() -> Time:
-    """Return the time of the clock."""
-    now = time.time_ns()
-    return Time(now // NS, now % NS)
 
 
 @dataclass(slots=True)
@@ -101,7 +94,7 @@ class Health:
         self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [status]))
 
     def beat(self, state: State, stamp: Time, values: Mapping[str, str], doubt: str = "") -> None:
-        """Publish the state, with why it is stale: at once where it or the map has changed, else once a second."""
+        """Publish the state, with why it is no better: at once where it or the map has changed, else once a second."""
         now = time.monotonic()
         changed, map_changed = state is not self._state, values.get("map") != self._map
         if not changed and not map_changed and now - self._beat < 1.0:
@@ -109,7 +102,7 @@ class Health:
         self._beat, self._map = now, values.get("map")
         values = {"state": state.value, **values}
         level, message = STATES[state]
-        verdict = level, f"{message}: {doubt}" if state is State.STALE else message
+        verdict = level, f"{message}: {doubt}" if doubt and level != OK else message
         self.publish("localization", stamp, verdict, values)
         prefix, hardware_id = self.names
         self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, verdict, values))

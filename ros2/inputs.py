@@ -4,51 +4,77 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .clock import NS, Clock, nanoseconds
 from .messages import LaserScan
-from .odometry import OdometryHistory, nanoseconds
-from .options import NodeOptions
+from .odometry import OdometryHistory
+from .options import NodeOptions, quoted
 from .topics import Topics
-from .tuning import CLOCKS_APART, ENDED_SECONDS, SILENT_SECONDS
+from .tuning import CLOCKS_APART, ENDED_SECONDS, MISSED_PERIODS, SILENT_SECONDS
 from .wire import Subscription
 
 
+@dataclass(slots=True)
+class _Seen:
+    """When something was last received, and how long after the one before; seconds."""
+
+    last: float = -math.inf
+    period: float = 0.0
+
+    def note(self, now: float) -> None:
+        self.period, self.last = min(now - self.last, SILENT_SECONDS), now
+
+
 class Inputs:
-    """Watches the inputs; logs what is missing for `SILENT_SECONDS`.
+    """Watches the inputs; logs what is missing for `SILENT_SECONDS`, and what contradicts itself.
 
     Parameters
     ----------
     options : NodeOptions
     topics : Topics
     odometry : OdometryHistory
+    clock : Clock
     log : callable
         Takes a line; the same line again and again.
     """
 
     def __init__(
-        self, options: NodeOptions, topics: Topics, odometry: OdometryHistory, log: Callable[[str], None]
+        self,
+        options: NodeOptions,
+        topics: Topics,
+        odometry: OdometryHistory,
+        clock: Clock,
+        log: Callable[[str], None],
     ) -> None:
-        self._options, self._topics, self._odometry, self._log = options, topics, odometry, log
-        self._began = self._searched = self._looked = time.monotonic()
-        self._scanned = self._ranged = -math.inf  # a scan, and one with ranges
+        self._options, self._topics, self._odometry, self._clock, self._log = options, topics, odometry, clock, log
+        self._began: float | None = None
+        self._looked = time.monotonic()
+        self._scans, self._ranges, self._searched = _Seen(), _Seen(), _Seen()
+        self._senders: dict[tuple[str, Any], float] = {}  # when publishers last sent scans of a frame
         self._latency: int | None = None  # ns from the stamp of the last scan to its reception
         self._apart = 0  # scans one after the other whose clock differs from that of odometry
+        self._disagreeing: float | None = None  # since when scans are usable, but none is agreed
         self._mapped = options.map_topic is None
 
     def scan(self, scan: LaserScan) -> None:
         """Note that a scan has come."""
         if self._latency is None:
             self._log(f"first scan on {self._topics.scans[0].name}")
-        self._scanned, stamp = time.monotonic(), nanoseconds(scan.header.stamp)
+        now, received, stamp = self._now, self._clock.steady(), nanoseconds(scan.header.stamp)
+        self._scans.note(now)
         ranges = np.asarray(scan.ranges)
         if ((ranges >= scan.range_min) & (ranges <= scan.range_max)).any():
-            self._ranged = self._scanned
-        self._latency = time.monotonic_ns() - stamp
-        offset = self._odometry.clock_offset(stamp, time.monotonic_ns())
+            self._ranges.note(now)
+            publisher = getattr(getattr(scan, "sample_info", None), "publication_handle", None)
+            self._senders = {key: at for key, at in self._senders.items() if now - at < ENDED_SECONDS}
+            self._senders[scan.header.frame_id, publisher] = now
+        self._latency = received - stamp
+        offset = self._odometry.clock_offset(stamp, received)
         self._apart = self._apart + 1 if abs(offset) > CLOCKS_APART and self._odometry.silent_s < ENDED_SECONDS else 0
 
     def map(self) -> None:
@@ -57,94 +83,123 @@ class Inputs:
 
     def searched(self) -> None:
         """Note that a scan is searched."""
-        self._searched = time.monotonic()
+        self._searched.note(self._now)
+
+    def result(self, *, usable: bool, agreed: bool) -> None:
+        """Note whether the result of a scan is usable, and whether it is agreed."""
+        if agreed:
+            self._disagreeing = None
+        elif usable and self._disagreeing is None:
+            self._disagreeing = self._now
 
     def received(self, stamp: int) -> int | None:
-        """Return when a scan with a stamp was received, as `time.monotonic_ns` counts."""
+        """Return when a scan with a stamp was received, as `Clock.steady` counts."""
         return None if self._latency is None else stamp + self._latency
+
+    @property
+    def _now(self) -> float:
+        return self._clock.steady() / NS
+
+    @property
+    def shared(self) -> str:
+        """The frame of which several publishers send scans: all but one are not where it is; empty: none."""
+        frames = [name for (name, _), at in self._senders.items() if self._now - at < ENDED_SECONDS]
+        return next((name for name in frames if frames.count(name) > 1), "")
 
     @property
     def doubt(self) -> str:
         """Why the present inputs do not confirm a pose; empty where they may."""
-        now, odometry = time.monotonic(), self._odometry
-        if now - self._scanned > ENDED_SECONDS:
-            return f"no scan arrives on {', '.join(one.name for one in self._topics.scans)}"
-        if now - self._ranged > ENDED_SECONDS:
-            return "no scan has a range between range_min and range_max"
-        if odometry.source and odometry.silent_s > ENDED_SECONDS:
-            return f"no odometry arrives any more on {odometry.source}"
-        if odometry.jump:
-            return f"odometry on {odometry.source} contradicts itself"
-        if self._apart >= 3:
-            return f"the clocks of scans and of odometry on {odometry.source} differ"
-        return ""
+        return next((doubt for doubt, _ in self._problems(ENDED_SECONDS) if doubt), "")
 
     @property
     def transform_stops(self) -> bool:
         """Return whether the transform is not to be published any more."""
-        most = self._options.tf_max_age_s
-        return 0.0 < most < time.monotonic() - self._ranged
+        return 0.0 < self._options.tf_max_age_s < self._now - self._ranges.last
 
     @property
     def values(self) -> dict[str, str]:
         """Ages of the inputs, and what is wrong with them, as keys and values for diagnostics."""
-        now = time.monotonic()
-        ages = {"scan": now - self._scanned, "ranges": now - self._ranged, "odometry": self._odometry.silent_s}
-        told = {f"{name} age": f"{age:.1f} s" if math.isfinite(age) else "never" for name, age in ages.items()}
-        return {**told, "odometry source": self._odometry.source, "input problem": self.doubt}
+        now, odometry = self._now, self._odometry
+        ages = {"scan": now - self._scans.last, "ranges": now - self._ranges.last, "odometry": odometry.silent_s}
+        shown = {f"{name} age": f"{age:.1f} s" if math.isfinite(age) else "never" for name, age in ages.items()}
+        return {**shown, "odometry source": odometry.source, "input problem": self.doubt}
 
     def look(self) -> None:
         """Log missing and contradicting inputs."""
-        now = time.monotonic()
-        if now - self._looked < min(1.0, SILENT_SECONDS):
+        if time.monotonic() - self._looked >= min(1.0, SILENT_SECONDS):
+            self._looked = time.monotonic()
+            for _, line in self._problems(SILENT_SECONDS):
+                self._log(line)
+
+    def _problems(self, patience: float) -> Iterator[tuple[str, str]]:
+        """Yield what is missing for some seconds, and what contradicts itself: the doubt, and a line with the remedy.
+
+        Inputs that were never there are no doubt.
+        """
+        topics, odometry, now = self._topics, self._odometry, self._now
+        if not self._clock.started:
+            yield "", "no message on /clock; start the simulation, or unset use_sim_time"
             return
-        self._looked = now
-        silent = now - max(self._began, self._scanned) >= SILENT_SECONDS
-        if silent:
-            for topic in self._topics.scans:
-                self._log(self._reason(topic))
-        elif self._latency is not None and now - max(self._began, self._ranged) >= SILENT_SECONDS:
-            self._log(
-                f"no scan has had a range between range_min and range_max for {SILENT_SECONDS:g} s; check the laser"
+        self._began = began = now if self._began is None else min(self._began, now)
+
+        def silent(seen: _Seen) -> bool:
+            return now - max(began, seen.last) > max(patience, min(SILENT_SECONDS, MISSED_PERIODS * seen.period))
+
+        if silent(self._scans):
+            names = ", ".join(one.name for one in topics.scans)
+            yield from ((f"no scan arrives on {names}", self._reason(one)) for one in topics.scans)
+        elif self._latency is not None and silent(self._ranges):
+            told = "no scan has a range between range_min and range_max"
+            yield told, f"{told} for {SILENT_SECONDS:g} s; check the laser"
+        if not self._mapped and now - began > patience:
+            yield "", self._reason(topics.maps[0])
+        elif not silent(self._scans) and silent(self._searched):
+            yield "", "scans arrive, but none can be searched; read the problem on /diagnostics"
+            yield from (("", _best_effort(one.subscription)) for one in topics.transforms if one.lossy)
+        if min(odometry.silent_s, now - began) > patience:
+            reason = f"{self._reason(topics.odometry)}; or set --odom-frame, if it comes in tf"
+            doubt = f"no odometry arrives any more on {odometry.source}" if odometry.source else ""
+            yield doubt, f"no odometry: {reason}. Without it, scans agree only at rest"
+        elif odometry.jump:
+            yield f"odometry on {odometry.source} contradicts itself", self._jump
+        elif self._apart >= 3:
+            yield f"the clocks of scans and of odometry on {odometry.source} differ", self._clocks
+        if self.shared:
+            frame = f"several publishers send scans of the frame {quoted(self.shared)}"
+            yield frame, f"{frame}, expected one; stop the others, or give each laser a frame of its own"
+        if self._disagreeing is not None and now - self._disagreeing > SILENT_SECONDS:
+            yield (
+                "usable scans do not agree",
+                f"scans are usable, but have not agreed for {SILENT_SECONDS:g} s; drive 0.5 m or rotate by 30 degrees. "
+                "If the robot has driven, scans contradict odometry: check odometry and the mount of the laser",
             )
-        if not self._mapped:
-            self._log(self._reason(self._topics.maps[0]))
-        elif not silent and now - self._searched >= SILENT_SECONDS:
-            self._log("scans arrive, but none can be searched; read the problem on /diagnostics")
-        self._look_at_odometry()
-        for one in self._topics.transforms:
-            if one.subscription.incompatible:
-                name = one.subscription.name
-                self._log(f"a publisher of {name} has an incompatible QoS; publish {name} with reliable QoS")
-        if self._topics.initial.incompatible:
-            self._log(
-                f"a subscriber of {self._topics.initial.name} requests an incompatible QoS; expected reliable or best "
-                "effort, volatile"
+        if topics.initial.incompatible:
+            yield (
+                "",
+                f"a subscriber of {topics.initial.name} requests an incompatible QoS; expected reliable or best "
+                "effort, volatile",
             )
 
-    def _look_at_odometry(self) -> None:
-        odometry, topic = self._odometry, self._topics.odometry
-        if min(odometry.silent_s, time.monotonic() - self._began) >= SILENT_SECONDS:
-            self._log(f"no odometry: {self._reason(topic)}; without it, scans agree only at rest")
-        elif odometry.jump:
-            count = topic.publishers
-            remedy = (
-                f"stop all but one of the {count} publishers of {topic.name}"
-                if count > 1
-                else "its publisher was reset, or merges two sources"
-            )
-            self._log(
-                f"odometry on {odometry.source} contradicts itself: {odometry.jump}; {remedy}. Odometry near such "
-                "steps is not used"
-            )
-        elif self._apart >= 3 and self._latency is not None:
-            now = time.monotonic_ns()
-            offset = odometry.clock_offset(now - self._latency, now)
-            self._log(
-                f"the stamps of scans are {abs(offset):.1f} s {'behind' if offset > 0.0 else 'ahead of'} those of "
-                f"odometry on {odometry.source}; expected at most {CLOCKS_APART:g} s. Synchronize the clocks; "
-                "odometry is not used until then"
-            )
+    @property
+    def _jump(self) -> str:
+        topic, odometry = self._topics.odometry, self._odometry
+        remedy = "its publisher was reset, or merges two sources"
+        if topic.publishers > 1:
+            remedy = f"stop all but one of the {topic.publishers} publishers of {topic.name}"
+        return (
+            f"odometry on {odometry.source} contradicts itself: {odometry.jump}; {remedy}. Odometry near such steps is "
+            "not used"
+        )
+
+    @property
+    def _clocks(self) -> str:
+        now = self._clock.steady()
+        offset = self._odometry.clock_offset(now - (self._latency or 0), now)
+        return (
+            f"the stamps of scans are {abs(offset):.1f} s {'behind' if offset > 0.0 else 'ahead of'} those of odometry "
+            f"on {self._odometry.source}; expected at most {CLOCKS_APART:g} s. Synchronize the clocks; odometry is not "
+            "used until then"
+        )
 
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._options.domain
@@ -156,3 +211,10 @@ class Inputs:
                 f"the publisher of {topic.name} in domain {domain} has an incompatible QoS; publish with reliable QoS"
             )
         return f"no publisher on {topic.name} in domain {domain}; check the topic, ROS_DOMAIN_ID and the network"
+
+
+def _best_effort(topic: Subscription[Any]) -> str:
+    return (
+        f"a publisher of {topic.name} is best effort, so that earlier messages are lost; publish reliable and "
+        "transient local"
+    )

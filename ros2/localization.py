@@ -6,21 +6,23 @@ import math
 import time
 from collections.abc import Callable
 
+import linefix
 from formats.logs.tuning import MOST_GAP_NS
 
 from .agreement import Agreement, Event, Observation
+from .clock import NS, Clock, nanoseconds, time_of
 from .deciding import InitialPose, MapToOdom
 from .frames import Frames
-from .health import Health, State, current_time
+from .health import Health, State
 from .maps import UNNAMED, Maps
 from .messages import PoseWithCovarianceStamped, String, Time
-from .odometry import OdometryHistory, nanoseconds
-from .options import NodeOptions
+from .odometry import OdometryHistory
+from .options import NodeOptions, quoted
 from .reporting import at_least, map_marker, stamped_pose, transform_of
 from .requests import Requests
-from .searching import Located
+from .searching import observation_of
 from .topics import Topics
-from .transforms import NS
+from .transforms import FrameError
 from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
 from .watching import Watch
 
@@ -36,16 +38,23 @@ class Localization:
     frames : Frames
     odometry : OdometryHistory
         The node owns both.
+    clock : Clock
     """
 
     def __init__(
-        self, options: NodeOptions, topics: Topics, health: Health, frames: Frames, odometry: OdometryHistory
+        self,
+        options: NodeOptions,
+        topics: Topics,
+        health: Health,
+        frames: Frames,
+        odometry: OdometryHistory,
+        clock: Clock,
     ) -> None:
         self._maps: Maps | None = None
         self._map_name = UNNAMED  # of the last agreed pose
         self._localizer_map: str | None = None  # of the last pose that was published to a localizer
         self._options, self._topics, self._health = options, topics, health
-        self._frames, self._odometry = frames, odometry
+        self._frames, self._odometry, self._clock = frames, odometry, clock
         self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
         self._watch, self._correction = Watch(transforms=not options.publish_tf), MapToOdom()
         self._requests = Requests(topics.named_requests, topics.results)
@@ -95,14 +104,22 @@ class Localization:
         Raises
         ------
         FrameError
-            When it is no pose.
+            When it is no pose, or one in another frame than a map.
         """
+        frame = pose.header.frame_id.strip("/")
+        if self._maps is not None and frame and frame not in self._maps.frames.values():
+            raise FrameError(f"found a pose in {quoted(frame)}, expected one in the frame of a map; it is not used")
         self._watch.take(pose)
 
-    def take(self, located: Located, received: Callable[[int], int | None]) -> None:
-        """Take the result of a scan; `received` returns when a scan with a stamp was received."""
-        stamp = nanoseconds(located.stamp) or time.time_ns()
-        scan = located.observation(self._odometry.known(stamp, received(stamp)), stamp)
+    def take(
+        self, answer: linefix.AssociationResult, stamped: Time, received: Callable[[int], int | None]
+    ) -> Observation | None:
+        """Take the result of a scan, and return it where it is agreed.
+
+        `received` returns when a scan with a stamp was received.
+        """
+        stamp = nanoseconds(stamped) or nanoseconds(self._clock.now())
+        scan = observation_of(answer, self._odometry.known(stamp, received(stamp)), stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
             self._correction.reset()  # where the clock was set back, the agreement forgets the pose
@@ -111,7 +128,7 @@ class Localization:
             self._pending = None
             self._health.note("a scan contradicts the agreed pose; drive on until a new pose is agreed")
         if event not in (Event.AGREED, Event.CONFIRMED):
-            return
+            return None
         self._follow(scan.map_id)
         names = self._frame_of(scan), self.odom_frame
         # The same coordinates on another map are another place, and the map of the localizer is known by what it got.
@@ -121,7 +138,8 @@ class Localization:
         else:
             self._initial.want()
         reason = self._initial.decide(event, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
-        self._publish_agreed(located.stamp, scan, reason)
+        self._publish_agreed(stamped, scan, reason)
+        return scan
 
     def _follow(self, map_id: str | None) -> None:
         """Publish the map of the agreed pose where it is another one than before."""
@@ -160,7 +178,7 @@ class Localization:
         if scan.pose is None or scan.covariance is None:
             return
         if reason == "lost":
-            self._health.beat(State.LOST, current_time(), self.values)
+            self._health.beat(State.LOST, self._clock.now(), self.values)
         subscribed = self._topics.initial.subscribed
         self._initial.published(subscribed=subscribed, now=time.monotonic())
         self._watch.reset()
@@ -182,16 +200,18 @@ class Localization:
         newest = self._odometry.newest
         if self._topics.tf is None or newest is None:
             return
-        stamp, odometry = newest
+        stamp, odometry, known = newest
         if -MOST_GAP_NS < stamp - self._transformed < TRANSFORM_PERIOD_NS:
             return
-        map_from_odom = self._correction.advance(stamp, odometry)
-        if map_from_odom is None:
+        map_from_odom = self._correction.advance(stamp, odometry, known.part, known.unknown_ns / NS)
+        if map_from_odom is None or self._agreement.refuted:
             return
-        self._transformed = stamp
-        ahead = stamp + TRANSFORM_TOLERANCE_NS
+        # On a grid of times: messages end the waiting at any time, and the rate would be less.
+        next_one = self._transformed + TRANSFORM_PERIOD_NS
+        self._transformed = next_one if 0 <= stamp - next_one < TRANSFORM_PERIOD_NS else stamp
+        ahead = time_of(stamp + TRANSFORM_TOLERANCE_NS)
         frames = self._frame_of(self._agreement.latest), self.odom_frame
-        self._topics.tf.publish(transform_of(Time(ahead // NS, ahead % NS), frames, map_from_odom))
+        self._topics.tf.publish(transform_of(ahead, frames, map_from_odom))
 
     def state(self, *, searched: bool) -> State:
         """Return the state of the pose; `searched` is whether the last scans could be searched."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,9 +16,10 @@ from formats.report import Notes
 from linefix.ranges import motion_warning
 from registration import IDENTITY, InputError, RigidTransform
 
+from .clock import nanoseconds
 from .frames import Frames
 from .messages import LaserScan, Time
-from .odometry import OdometryHistory, Speed, nanoseconds
+from .odometry import OdometryHistory, Speed
 from .options import MAX_NAME, NodeOptions, quoted
 from .transforms import FrameError, Mount
 
@@ -157,7 +158,11 @@ class Gathering:
 
 
 def looks_of(
-    scans: Sequence[LaserScan], frames: Frames, options: NodeOptions, odometry: OdometryHistory
+    scans: Sequence[LaserScan],
+    frames: Frames,
+    options: NodeOptions,
+    odometry: OdometryHistory,
+    unprefixed: Callable[[str], str] = lambda _: "",
 ) -> tuple[list[Look], list[str]]:
     """Return scans with the poses that they were taken from, relative to the robot at the time of the first.
 
@@ -169,6 +174,8 @@ def looks_of(
     options : NodeOptions
         The base frame, and whether scans are corrected for motion.
     odometry : OdometryHistory
+    unprefixed : callable
+        Returns the topic on which a frame comes without the prefix of the robot; empty if on none.
 
     Returns
     -------
@@ -182,7 +189,7 @@ def looks_of(
         stamp, frame = scan.header.stamp, quoted(scan.header.frame_id)
         step = odometry.step(looks[0].stamp if looks else stamp, stamp)
         try:
-            mount = _mount_of(scan, frames, options)
+            mount = _mount_of(scan, frames, options, unprefixed)
             if step is None:
                 raise FrameError(f"no odometry between the newest scan and that of {frame}, which is left out")
             looks.append(look_of(scan, mount, odometry, step, motion=options.motion))
@@ -193,7 +200,7 @@ def looks_of(
     return looks, missing
 
 
-def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions) -> Mount:
+def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions, unprefixed: Callable[[str], str]) -> Mount:
     name = scan.header.frame_id
     if not name.strip("/"):
         raise FrameError(
@@ -205,8 +212,12 @@ def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions) -> Mount:
     base = options.base_of(frame)
     mount = frames.mount(base, frame, nanoseconds(scan.header.stamp))
     if mount is None:
+        topic, remedy = unprefixed(frame), "publish it, or name the base frame with --base"
+        if topic:
+            rules = "-r tf:=/tf -r tf_static:=/tf_static"
+            remedy = f"{topic} has it without the prefix {options.prefix}: if only this robot uses it, add {rules}"
         raise FrameError(
             f"no transform from {quoted(frame)} to {quoted(base)} on {options.topic('/tf_static')} or "
-            f"{options.topic('/tf')}; publish it, or name the base frame with --base"
+            f"{options.topic('/tf')}; {remedy}"
         )
     return mount

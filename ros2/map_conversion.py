@@ -17,6 +17,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from typing import Any, Literal
 
 import numpy as np
@@ -55,10 +56,12 @@ class MapConverter:
     ----------
     done : callable
         Called in another thread when a result can be taken.
+    surface : float, optional
+        As of `NodeOptions`.
     """
 
-    def __init__(self, done: Callable[[], None]) -> None:
-        self._done = done
+    def __init__(self, done: Callable[[], None], surface: float | None = None) -> None:
+        self._done, self._surface = done, surface
         self._grids: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._results: queue.SimpleQueue[Converted] = queue.SimpleQueue()
         self._digest = b""
@@ -97,9 +100,7 @@ class MapConverter:
         return not self._thread.is_alive()
 
     def _run(self) -> None:
-        process = self._started()
-        if process is not None:
-            process.wait_until_ready()
+        self._answer(b"")  # starts the process, which loads the code
         self.ready.set()
         idle: float | None = None
         while not self._ended:
@@ -118,27 +119,10 @@ class MapConverter:
             idle = CONVERSION_IDLE
         self._stop()
 
-    def _started(self) -> _Process | None:
-        """Return the process, started where there is none; None after the end."""
-        with self._starting:
-            if self._ended:
-                return None
-            if self._process is None or not self._process.alive:
-                self._process = _Process()
-            return self._process
-
-    def _stop(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            process.end()
-
     def _convert(self, grid: bytes) -> Converted:
         if len(grid) > MAX_GRID_BYTES:
             return Converted(problem=f"found {len(grid)} bytes, expected at most {MAX_GRID_BYTES}")
-        process = self._started()
-        if process is None:
-            return Converted(problem="the node ends")
-        converted = process.convert(grid)
+        converted = self._answer(grid)
         if converted is None:
             self._stop()
             return Converted(
@@ -147,49 +131,42 @@ class MapConverter:
             )
         return converted
 
+    def _answer(self, grid: bytes) -> Converted | None:
+        """Return what the process makes of a grid; None where it ended, or takes too long."""
+        with self._starting:
+            if self._ended:
+                return None
+            if self._process is None or not self._process.is_alive():
+                self._process = _Process(self._surface)
+        return self._process.convert(grid)
 
-class _Process:
+    def _stop(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.join()
+            process.connection.close()
+
+
+class _Process(SpawnProcess):
     """The process that converts."""
 
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs,), name="map conversion", daemon=True)
-        self._process.start()
+    def __init__(self, surface: float | None) -> None:
+        self.connection, theirs = multiprocessing.Pipe()
+        super().__init__(target=_serve, args=(theirs, surface), name="map conversion", daemon=True)
+        self.start()
         theirs.close()
 
-    @property
-    def alive(self) -> bool:
-        return self._process.is_alive()
-
-    def wait_until_ready(self) -> None:
-        with contextlib.suppress(OSError, EOFError):
-            self._connection.send_bytes(b"")
-            if self._connection.poll(CONVERSION_PATIENCE):
-                self._connection.recv_bytes()
-
     def convert(self, grid: bytes) -> Converted | None:
-        """Return the result; None where the process ended, or takes too long."""
-        try:
-            self._connection.send_bytes(grid)
-            if self._connection.poll(CONVERSION_PATIENCE):
-                converted: Converted = pickle.loads(self._connection.recv_bytes())
+        with contextlib.suppress(OSError, EOFError):
+            self.connection.send_bytes(grid)
+            if self.connection.poll(CONVERSION_PATIENCE):
+                converted: Converted = pickle.loads(self.connection.recv_bytes())
                 return converted
-        except (OSError, EOFError):
-            pass
         return None
 
-    def kill(self) -> None:
-        self._process.kill()
 
-    def end(self) -> None:
-        """End it, and leave nothing of it behind."""
-        self._process.kill()
-        self._process.join()
-        self._connection.close()
-
-
-def convert(serialized: bytes) -> Converted:
+def convert(serialized: bytes, surface: float | None = None) -> Converted:
     """Return the map of a serialized OccupancyGrid."""
     from formats import map_of_grid
 
@@ -201,7 +178,7 @@ def convert(serialized: bytes) -> Converted:
     if not frame or len(frame) > MAX_NAME:
         return Converted(problem=f"its frame_id has {len(frame)} characters, expected 1 to {MAX_NAME}, such as map")
     try:
-        index = linefix.index_map(map_of_grid(grid))
+        index = linefix.index_map(map_of_grid(grid, surface=surface))
     except linefix.InputError as error:
         return Converted(problem=str(error))
     size = f"{grid.info.width} x {grid.info.height} cells of {grid.info.resolution:.3g} m"
@@ -219,7 +196,7 @@ def digest_of(serialized: bytes) -> bytes:
     return digest.digest()
 
 
-def _serve(connection: Connection[Any, Any]) -> None:
+def _serve(connection: Connection[Any, Any], surface: float | None) -> None:
     """Convert grids until the other process has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt at a terminal goes to all processes there
     _limit_memory()
@@ -228,7 +205,7 @@ def _serve(connection: Connection[Any, Any]) -> None:
         while True:
             grid = connection.recv_bytes(MAX_GRID_BYTES)
             _limit_time()
-            connection.send_bytes(pickle.dumps(convert(grid)) if grid else b"")
+            connection.send_bytes(pickle.dumps(convert(grid, surface) if grid else Converted()))
 
 
 def _small_grid() -> bytes:

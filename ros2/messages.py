@@ -31,6 +31,11 @@ class Time(IdlStruct, typename=_type("builtin_interfaces", "Time")):
 
 
 @dataclass
+class Clock(IdlStruct, typename=_type("rosgraph_msgs", "Clock")):
+    clock: Time = field(default_factory=Time)
+
+
+@dataclass
 class Duration(IdlStruct, typename=_type("builtin_interfaces", "Duration")):
     sec: int32 = 0
     nanosec: uint32 = 0

@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 import linefix
 from registration import IDENTITY
 
+from .clock import NS, Clock
 from .connecting import connect
 from .frames import Frames
-from .health import Health, State, current_time
+from .health import Health, State
 from .inputs import Inputs
 from .localization import Localization
 from .looking import Gathering, looks_of
@@ -25,7 +26,7 @@ from .options import NodeOptions, quoted
 from .reporting import answer_marker, stamped_pose, values_of, verdict_of
 from .searching import Found, Searcher, search_options
 from .topics import Topics
-from .transforms import NS, FrameError, planar
+from .transforms import FrameError, planar
 from .tuning import END_SECONDS, ODOMETRY_SECONDS, SAME_MAP, TRANSFORM_PERIOD_NS
 from .wire import Waiting
 
@@ -68,7 +69,8 @@ class Node:
         log: Callable[[str], None] = _to_stderr,
     ) -> None:
         self._options, self._maps, self._generation = options, maps, 0
-        self._frames, self._odometry = Frames(), OdometryHistory()
+        self._clock, self._frames = Clock(simulated=options.use_sim_time), Frames()
+        self._odometry = OdometryHistory(self._clock)
         self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
         self._unused = ""  # why the last map is not used
@@ -82,11 +84,12 @@ class Node:
         prefix = f"{options.namespace.strip('/')}/" if options.namespace else ""
         names = prefix, options.hardware_id or options.namespace.strip("/")
         self._health = Health(self._topics.diagnostics, self._topics.status, names, log)
-        self._inputs = Inputs(options, self._topics, self._odometry, self._health.remind)
-        self._localization = Localization(options, self._topics, self._health, self._frames, self._odometry)
+        self._inputs = Inputs(options, self._topics, self._odometry, self._clock, self._health.remind)
+        shared = self._frames, self._odometry, self._clock
+        self._localization = Localization(options, self._topics, self._health, *shared)
         self._waiting = Waiting(participant, self._topics.subscriptions)
         self._searcher = Searcher(search_options(options), self._waiting.wake)
-        self._converter = MapConverter(self._waiting.wake) if options.map_topic else None
+        self._converter = MapConverter(self._waiting.wake, options.surface) if options.map_topic else None
         if maps is not None:
             self._localization.use(maps)
 
@@ -127,6 +130,8 @@ class Node:
 
     def turn(self) -> None:
         """Take the messages and results that have come, and search the newest scans."""
+        for message in self._topics.clock.take()[-1:] if self._topics.clock else ():
+            self._clock.take(message)
         self._turn_transforms()
         self._turn_maps()
         self._localization.take_requests()
@@ -141,7 +146,7 @@ class Node:
         if state is State.AGREED and doubt:
             state = State.STALE
         values = {**self._localization.values, **self._inputs.values}
-        self._health.beat(state, current_time(), values, doubt)
+        self._health.beat(state, self._clock.now(), values, doubt)
 
     def _turn_transforms(self) -> None:
         for topic in self._topics.transforms:
@@ -184,7 +189,7 @@ class Node:
 
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
-            for scan in scans.take()[-1:]:
+            for scan in scans.take():
                 self._inputs.scan(scan)
                 if self._options.together_s > 0.0:
                     self._gathering.take(topic, scan)
@@ -251,7 +256,7 @@ class Node:
             )
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
             return
-        looks, missing = looks_of(scans, self._frames, self._options, self._odometry)
+        looks, missing = looks_of(scans, self._frames, self._options, self._odometry, self._topics.unprefixed)
         for problem in missing:
             self._health.problem(problem, stamp)
         for look in looks:
@@ -263,19 +268,20 @@ class Node:
             self._searcher.submit(self._maps.index, looks, self._generation)
 
     def _take_result(self, found: Found) -> None:
-        if found.located is None:
-            self._health.problem(found.problem, found.stamp)
+        answer, stamp = found.answer, found.stamp
+        if answer is None:
+            self._health.problem(found.problem, stamp)
             return
         if found.generation != self._generation or self._maps is None:
             return  # the map has changed meanwhile
-        located, milliseconds = found.located, 1e3 * found.seconds
-        frame = self._maps.frame_of(located.answer.map_id)
-        if located.answer.usable and located.pose is not None and located.covariance is not None:
-            pose = stamped_pose(located.stamp, located.pose, located.covariance, frame)
-            self._topics.pose.publish(pose)
-        self._topics.markers.publish(answer_marker(located, frame))
-        self._localization.take(located, self._inputs.received)
-        self._health.publish("scan", located.stamp, verdict_of(located), values_of(located, milliseconds))
+        frame = self._maps.frame_of(answer.map_id)
+        if answer.usable and answer.pose is not None and answer.covariance is not None:
+            self._topics.pose.publish(stamped_pose(stamp, answer.pose, answer.covariance, frame))
+        self._topics.markers.publish(answer_marker(answer, stamp, frame))
+        if not self._inputs.shared:
+            agreed = self._localization.take(answer, stamp, self._inputs.received)
+            self._inputs.result(usable=answer.usable, agreed=agreed is not None)
+        self._health.publish("scan", stamp, verdict_of(answer), values_of(answer, 1e3 * found.seconds))
 
     @property
     def _state(self) -> State:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from formats.logs.tracks import Known, Track
 from registration import IDENTITY, RigidTransform
 
+from .clock import NS, Clock, nanoseconds
 from .messages import Odometry, Time
-from .transforms import NS, Floats, matrix_in_space, matrix_of, planar
+from .transforms import Floats, matrix_in_space, matrix_of, planar
 from .tuning import ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
@@ -34,13 +34,12 @@ class Speed:
         return Speed(c * vx + s * vy, c * vy - s * vx, self.omega)
 
 
-def nanoseconds(stamp: Time) -> int:
-    """Return a time as one number."""
-    return int(stamp.sec) * NS + int(stamp.nanosec)
-
-
 class OdometryHistory:
     """The newest poses and speeds of the robot in its odometry frame, by messages or else by transforms.
+
+    Parameters
+    ----------
+    clock : Clock, optional
 
     Attributes
     ----------
@@ -50,11 +49,13 @@ class OdometryHistory:
         The topic; empty before the first value.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock | None = None) -> None:
+        self._clock = clock or Clock()
         self.frame = self.source = ""
         self._track = Track(static=False, most=KEPT)
+        self._tracks = 0  # that came before, of other sources
         self._speeds: deque[tuple[int, Speed]] = deque(maxlen=KEPT)
-        self._received = 0  # the newest value, by `time.monotonic_ns`
+        self._received = 0  # the newest value, by the clock
 
     def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY, topic: str = "odometry") -> None:
         """Take a message; messages go before transforms.
@@ -95,21 +96,22 @@ class OdometryHistory:
     def _add(self, stamp: int, odom_from_base: Floats, frame: str, source: str) -> None:
         if (frame, source) != (self.frame, self.source):
             self.frame, self.source, self._track = frame, source, Track(static=False, most=KEPT)
-        self._received = time.monotonic_ns()
+            self._tracks += 1
+        self._received = self._clock.steady()
         self._track.add(stamp, odom_from_base, received=self._received)
 
     @property
-    def newest(self) -> tuple[int, RigidTransform] | None:
-        """The time now by the clock of odometry, nanoseconds, and the newest odom_from_base; None where it ended."""
-        if not len(self._track) or self.silent_s > ENDED_SECONDS:
+    def newest(self) -> tuple[int, RigidTransform, Known] | None:
+        """The time now by the clock of odometry, nanoseconds, and the newest value; None where it ended or jumped."""
+        known = self.known(self._track.newest[0]) if len(self._track) else None
+        if known is None or self.silent_s > ENDED_SECONDS:
             return None
-        stamp, matrix = self._track.newest
-        return stamp + time.monotonic_ns() - self._received, planar(matrix)[0]
+        return self._track.newest[0] + self._clock.steady() - self._received, planar(known.matrix)[0], known
 
     @property
     def silent_s(self) -> float:
         """Seconds since the newest value was received; infinite where none was."""
-        return (time.monotonic_ns() - self._received) / NS if len(self._track) else math.inf
+        return (self._clock.steady() - self._received) / NS if len(self._track) else math.inf
 
     @property
     def jump(self) -> str:
@@ -146,4 +148,5 @@ class OdometryHistory:
 
     def known(self, stamp: int, received: int | None = None) -> Known | None:
         """Return odom_from_base of something with a stamp and a time of reception; None where it is not known."""
-        return self._track.known(stamp, received) if len(self._track) else None
+        known = self._track.known(stamp, received) if len(self._track) else None
+        return None if known is None else replace(known, part=(self._tracks, *known.part))

@@ -115,6 +115,10 @@ class NodeOptions:
         Publish the transform from the map to `odom_frame`.
     tf_max_age_s : float
         Stop the transform this long after the last scan with ranges, seconds; 0: never.
+    surface : float or None
+        Depth of the walls' surface behind the front of the occupied cells of an OccupancyGrid, cells; None: estimated.
+    use_sim_time : bool
+        Ages of inputs, and stamps of diagnostics, are those of ``/clock``.
     domain : int
         ``ROS_DOMAIN_ID``.
     hardware_id : str
@@ -139,6 +143,8 @@ class NodeOptions:
     min_sigma_theta: float = 0.0349  # 2 degrees
     publish_tf: bool = False
     tf_max_age_s: float = 0.0
+    surface: float | None = None
+    use_sim_time: bool = False
     domain: int = 0
     hardware_id: str = ""
 

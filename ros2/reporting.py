@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 import linefix
 
 from . import messages as ros
-from .searching import Located
 
 OK, WARN, ERROR, STALE = range(4)  # as DiagnosticStatus counts
 ARROW, LINES = 0, 5  # as Marker counts
@@ -73,14 +72,14 @@ def map_marker(walls: linefix.Segments, frame: str) -> ros.MarkerArray:
     return ros.MarkerArray([_marker(frame, ros.Time(), "map", LINES, GREY, points=points)])
 
 
-def answer_marker(located: Located, frame: str) -> ros.MarkerArray:
+def answer_marker(answer: linefix.AssociationResult, stamp: ros.Time, frame: str) -> ros.MarkerArray:
     """Return the robot where it was found: green where that is usable, amber where not, gone where there is none."""
-    color = GREEN if located.answer.usable else AMBER
-    arrow = _marker(frame, located.stamp, "robot", ARROW, color)
-    if located.pose is None:
+    color = GREEN if answer.usable else AMBER
+    arrow = _marker(frame, stamp, "robot", ARROW, color)
+    if answer.pose is None:
         arrow.action = DELETE
     else:
-        arrow.pose, arrow.scale = pose_of(located.pose), ros.Vector3(0.6, 0.12, 0.12)
+        arrow.pose, arrow.scale = pose_of(answer.pose), ros.Vector3(0.6, 0.12, 0.12)
     return ros.MarkerArray([arrow])
 
 
@@ -92,9 +91,8 @@ def _marker(
     return ros.Marker(header, name, type=kind, action=ADD, scale=thin, color=color, points=points or [])
 
 
-def values_of(located: Located, milliseconds: float) -> dict[str, str]:
+def values_of(answer: linefix.AssociationResult, milliseconds: float) -> dict[str, str]:
     """Return the verdict of a scan as keys and values."""
-    answer = located.answer
     return {
         **({} if answer.map_id is None else {"map": answer.map_id}),
         "status": answer.status.value,
@@ -106,9 +104,8 @@ def values_of(located: Located, milliseconds: float) -> dict[str, str]:
     }
 
 
-def verdict_of(located: Located) -> tuple[int, str]:
+def verdict_of(answer: linefix.AssociationResult) -> tuple[int, str]:
     """Return the level and the message of a scan's verdict."""
-    answer = located.answer
     if answer.usable:
         return OK, "pose usable"
     return WARN, answer.reasons[0].message if answer.reasons else answer.status.value

@@ -2,75 +2,46 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 import linefix
 from formats.logs.tracks import Known
-from registration import InputError, RigidTransform
+from registration import InputError
 
 from .agreement import Observation, Place
+from .clock import NS
 from .looking import Look
 from .messages import Time
 from .options import NodeOptions
-from .transforms import NS, planar
-from .tuning import INCONCLUSIVE_NATS, SEARCH_SECONDS
+from .transforms import planar
+from .tuning import INCONCLUSIVE_NATS, RIVAL_NATS, SEARCH_SECONDS
 
 OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Located:
-    """The result of a scan.
+def observation_of(answer: linefix.AssociationResult, known: Known | None, stamp: int) -> Observation:
+    """Return an answer for the agreement, with odom_from_base at its stamp (nanoseconds)."""
+    best = 0.0 if answer.diagnostics is None else answer.diagnostics.score
+    odometry = () if known is None else (planar(known.matrix)[0], known.part, known.unknown_ns / NS)
+    return replace(
+        Observation(stamp, answer.pose, answer.covariance, answer.usable, *odometry),
+        others=tuple(Place(one.pose, one.map_id) for one in answer.alternatives),
+        conclusive=_conclusive(answer),
+        rival=any(one.score > best - RIVAL_NATS for one in answer.alternatives),
+        map_id=answer.map_id,
+    )
 
-    Attributes
-    ----------
-    stamp : Time
-        Of the scan, of several the newest.
-    answer : AssociationResult
-        Its poses are map_from_base.
-    """
 
-    stamp: Time
-    answer: linefix.AssociationResult
-
-    @property
-    def pose(self) -> RigidTransform | None:
-        """map_from_base."""
-        return self.answer.pose
-
-    @property
-    def covariance(self) -> NDArray[np.float64] | None:
-        """Of the pose, (3, 3): additive (x, y, theta) in the map frame."""
-        return self.answer.covariance
-
-    def observation(self, known: Known | None, stamp: int) -> Observation:
-        """Return the result for the agreement, with odom_from_base at its stamp (nanoseconds)."""
-        odometry = () if known is None else (planar(known.matrix)[0], known.part, known.unknown_ns / NS)
-        answer = self.answer
-        others = tuple(Place(one.pose, one.map_id) for one in answer.alternatives)
-        return replace(
-            Observation(stamp, answer.pose, answer.covariance, answer.usable, *odometry),
-            others=others,
-            conclusive=self._conclusive,
-            map_id=answer.map_id,
-        )
-
-    @property
-    def _conclusive(self) -> bool:
-        """Return whether each pose that explains the scan about as well is listed."""
-        answer = self.answer
-        if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
-            return False
-        unlisted = (1.0 - answer.search.complete_above) * answer.diagnostics.score
-        listed = len(answer.alternatives) < OPTIONS.max_alternatives
-        return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
+def _conclusive(answer: linefix.AssociationResult) -> bool:
+    """Return whether each pose that explains the scan about as well is listed."""
+    if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
+        return False
+    unlisted = (1.0 - answer.search.complete_above) * answer.diagnostics.score
+    listed = len(answer.alternatives) < OPTIONS.max_alternatives
+    return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 
 
 def search_options(options: NodeOptions) -> linefix.AssociationOptions:
@@ -83,10 +54,10 @@ def locate(
     looks: Sequence[Look],
     options: linefix.AssociationOptions = OPTIONS,
     deadline: linefix.Deadline | None = None,
-) -> Located:
+) -> linefix.AssociationResult:
     """Find where the robot is by one scan, or several together, at the time of the first beam of the first."""
     together = linefix.assemble([look.view for look in looks])
-    return Located(looks[0].stamp, linefix.locate(index, together, options=options, deadline=deadline))
+    return linefix.locate(index, together, options=options, deadline=deadline)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,9 +67,9 @@ class Found:
     Attributes
     ----------
     stamp : Time
-        Of the newest scan.
-    located : Located or None
-        None where the scan cannot be searched.
+        Of the scan, of several the newest.
+    answer : AssociationResult or None
+        Its poses are map_from_base; None where the scan cannot be searched.
     problem : str
         Why it cannot be searched.
     seconds : float
@@ -108,16 +79,9 @@ class Found:
     """
 
     stamp: Time
-    located: Located | None
+    answer: linefix.AssociationResult | None
     problem: str
     seconds: float
-    generation: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Task:
-    index: linefix.MapIndex | linefix.MapSet
-    looks: Sequence[Look]
     generation: int
 
 
@@ -133,48 +97,40 @@ class Searcher:
     """
 
     def __init__(self, options: linefix.AssociationOptions, found: Callable[[], None]) -> None:
-        self._options = options
-        self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
-        self._results: queue.SimpleQueue[Found] = queue.SimpleQueue()
+        self._options, self._found = options, found
         self._deadline = linefix.Deadline()
-        self._found = found
-        self.busy = False
-        self._thread = threading.Thread(target=self._run, name="searches", daemon=True)
-        self._thread.start()
+        self._pool = ThreadPoolExecutor(1, "searches")
+        self._search: Future[Found] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Return whether a result is still to be taken."""
+        return self._search is not None
 
     def submit(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> None:
         """Search a scan; only while not `busy`."""
-        self.busy = True
-        self._tasks.put(_Task(index, looks, generation))
+        self._search = self._pool.submit(self._searched, index, looks, generation)
+        self._search.add_done_callback(lambda _: self._found())
 
     def result(self) -> Found | None:
         """Return the result of the search, None where there is none yet."""
-        try:
-            found = self._results.get_nowait()
-        except queue.Empty:
+        if self._search is None or not self._search.done():
             return None
-        self.busy = False
+        found, self._search = self._search.result(), None
         return found
 
     def end(self, seconds: float) -> bool:
-        """Cancel the search, and return whether its thread has ended within a time."""
+        """Cancel the search, and return whether it has ended within a time."""
         self._deadline.cancel()
-        self._tasks.put(None)
-        self._thread.join(seconds)
-        return not self._thread.is_alive()
+        self._pool.shutdown(wait=False)
+        return self._search is None or not wait([self._search], seconds).not_done
 
-    def _run(self) -> None:
-        while (task := self._tasks.get()) is not None:
-            self._results.put(self._search(task))
-            self._found()
-
-    def _search(self, task: _Task) -> Found:
-        stamp, begun = task.looks[0].stamp, time.monotonic()
-        located, problem = None, ""
+    def _searched(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> Found:
+        begun, answer, problem = time.monotonic(), None, ""
         try:
-            located = locate(task.index, task.looks, self._options, self._deadline.within(begun + SEARCH_SECONDS))
+            answer = locate(index, looks, self._options, self._deadline.within(begun + SEARCH_SECONDS))
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan
             problem = f"a defect of linefix; please report it: {type(error).__name__}: {error}"
-        return Found(stamp, located, problem, time.monotonic() - begun, task.generation)
+        return Found(looks[0].stamp, answer, problem, time.monotonic() - begun, generation)

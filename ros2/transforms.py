@@ -20,8 +20,6 @@ from .tuning import LEVEL_TILT, MAX_MOUNT
 
 Floats = NDArray[np.float64]
 
-NS = 1_000_000_000
-
 
 class FrameError(ValueError):
     """A transform or a chain of frames cannot be used; the message names it, the reason and the remedy."""

@@ -16,6 +16,8 @@ LEVEL_TILT = math.radians(2.0)  # below this, ranges are less than 0.1 % too lon
 STALE_NS = 500_000_000  # ns; a moving transform is not used this long after its last value
 CLOCK_BACK_NS = 1_000_000_000  # ns; stamps that jump back by more are those of a clock that was set back
 
+CLOCK_AHEAD_NS = 5_000_000_000  # ns by which a scan may be newer than the last one; a laser without return has 1 Hz
+
 # Times of work.
 CONVERSION_SECONDS = 60.0  # s of a core for a grid: the slowest public plan takes 4 s, noise some minutes
 CONVERSION_PATIENCE = 300.0  # s, where others are at work on the cores
@@ -37,6 +39,8 @@ ODOMETRY_ANGLE_PER_ANGLE = 0.05
 ODOMETRY_ANGLE_PER_METRE = 0.02  # rad/m
 UNKNOWN_SPEED = 1.0  # m/s, and
 UNKNOWN_TURN_RATE = 1.0  # rad/s; standard deviations of a motion that odometry does not show
+UNKNOWN_SECONDS = 2.0  # s without odometry over which a scan may still confirm an agreed pose
+RIVAL_NATS = 15.0  # another pose whose score is lower by less is likely: more scans have to agree
 SEPARATE_DISTANCE = 0.15  # m; scans nearer to each other in place,
 SEPARATE_ANGLE = math.radians(10.0)  # heading,
 SEPARATE_NS = 1_000_000_000  # ns and time count once: their errors are the same
@@ -55,11 +59,13 @@ SETTLE_SECONDS = 1.0  # s until a new subscriber has discovered the publisher, t
 LOST_SCANS = 3  # scans that confirm another pose than the localizer's
 LOST_SECONDS = 10.0  # s between two poses for a lost localizer: it needs some time to take one
 ALWAYS_SECONDS = 0.5  # s between two poses with `--when always`
+UNCONFIRMED_SECONDS = 0.5  # s without odometry, after which a scan has to confirm the published transform
 CORRECTION_SPEED = 0.2  # m/s, and
 CORRECTION_TURN_RATE = math.radians(10.0)  # rad/s, with which the published transform follows the agreed pose
 TRANSFORM_PERIOD_NS = 50_000_000  # ns between two transforms: 20 Hz
 TRANSFORM_TOLERANCE_NS = 200_000_000  # ns that a published transform is dated ahead, as AMCL does
 ENDED_SECONDS = 2.0  # s without scans or odometry after which the pose is stale
+MISSED_PERIODS = 3  # of scans, at least, before they count as ended: slow lasers
 CLOCKS_APART = 0.5  # s by which the times from stamp to reception of scans and of odometry may differ
 SILENT_SECONDS = 10.0  # s without scans, a map or a transform, after which that is logged
 RESULT_SECONDS = 30.0  # s after which a request without an agreed pose is answered

@@ -12,9 +12,10 @@ from registration import RigidTransform
 
 from . import tuning
 from .agreement import Observation, chi_square
+from .clock import nanoseconds
 from .frames import Frames
 from .messages import PoseWithCovarianceStamped
-from .odometry import OdometryHistory, nanoseconds
+from .odometry import OdometryHistory
 from .transforms import matrix_of, planar
 
 Floats = NDArray[np.float64]

@@ -100,6 +100,11 @@ class Subscription(Generic[Message]):
         """Return whether there are publishers whose quality of service fits none of the readers."""
         return self._writers.incompatible
 
+    @property
+    def best_effort(self) -> bool:
+        """Return whether a publisher is best effort."""
+        return self._writers.best_effort
+
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
         for _ in range(MOST):

@@ -35,11 +35,13 @@ OPTIONS = {
     "min_sigma": ("", "least standard deviation of initialpose, metres"),
     "min_sigma_theta": ("", "least standard deviation of its heading, radians"),
     "tf_max_age_s": ("", "seconds without scans after which publish_tf stops; 0: never"),
+    "surface": ("", "depth of the walls' surfaces in the cells of map_topic; empty: estimated"),
     "hardware_id": ("", "of the diagnostics"),
     "params_file": ("", "a YAML file of parameters"),
 }
 FLAGS = {
     "motion": ("", "true or false: correct scans for motion"),
+    "use_sim_time": ("", "true or false: use the time of /clock"),
     "publish_tf": ("", "true or false: publish the transform from the map to the odometry frame"),
 }
 SEVERAL = ("map", "scan")

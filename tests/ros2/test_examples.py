@@ -29,7 +29,7 @@ def options() -> dict[str, Any]:
 
 def test_the_file_of_parameters_has_every_option_with_its_default(options: dict[str, Any]) -> None:
     values = parameters_of(NAV2 / "linefix.yaml")
-    assert set(values) == set(options) - {"maps", "namespace"}
+    assert set(values) == set(options) - {"maps", "namespace", "surface"}
     for name, value in values.items():
         default = options[name].default
         assert value == (["scan"] if name == "scan" else default), name

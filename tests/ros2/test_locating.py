@@ -15,7 +15,7 @@ from ros2.frames import Frames
 from ros2.looking import look_of
 from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
-from ros2.searching import Located, locate
+from ros2.searching import locate
 from ros2.transforms import Mount
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
@@ -40,7 +40,7 @@ def message(ranges: list[float], first: float, step: float, *, range_max: float)
     )
 
 
-def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> Located:
+def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> linefix.AssociationResult:
     return locate(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)])
 
 
@@ -48,7 +48,7 @@ def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) 
 def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
     located = located_in(WALLS, seen(flipped=flipped), Mount(MOUNT, flipped))
     expected = TRUTH.compose(MOUNT.inverse())
-    assert located.answer.usable
+    assert located.usable
     assert located.pose is not None
     assert math.hypot(located.pose.x - expected.x, located.pose.y - expected.y) < 0.02
 

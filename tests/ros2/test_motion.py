@@ -189,7 +189,7 @@ def test_a_scanner_upside_down_moves_the_right_way_round() -> None:
     driven.take(odometry(10))
     look = look_of(moving_scan(10, flipped=True), Mount(BASE_FROM_LASER, flipped=True), driven, IDENTITY, motion=True)
     located = locate(linefix.index_map(ROOM), [look])
-    assert located.answer.usable
+    assert located.usable
     pose = located.pose
     assert pose is not None
     assert math.hypot(pose.x - MAP_FROM_BASE.x, pose.y - MAP_FROM_BASE.y) < 0.03

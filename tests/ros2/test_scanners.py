@@ -101,10 +101,10 @@ def test_odometry_says_how_the_robot_moved_between_them() -> None:
     for nanosec, at in ((0, HERE), (40_000_000, linefix.RigidTransform(0.12, 0.01, 0.07)), (90_000_000, DRIVEN)):
         told.take(odometry(3, nanosec, at))
     alone, _ = gathered("front", told=told)
-    assert not alone.answer.usable
+    assert not alone.usable
     found, missing = gathered("front", "back", told=told)
     assert missing == []
-    assert found.answer.usable
+    assert found.usable
     assert math.hypot(found.pose.x - MAP_FROM_BASE.x, found.pose.y - MAP_FROM_BASE.y) < 0.03
 
 
@@ -112,7 +112,7 @@ def test_odometry_says_how_the_robot_moved_between_them() -> None:
 def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
     found, missing = gathered("front", "back")
     assert missing == ['no odometry between the newest scan and that of "back", which is left out']
-    assert not found.answer.usable
+    assert not found.usable
 
 
 def test_odometry_is_interpolated_and_forgotten() -> None:
