@@ -5,9 +5,9 @@
     entry                     run a command; errors become one line and an exit code
     program                   all commands together; those of the service
     one_scan, replay, batch, analyze, ros2, maps/    the commands
-    asking                    where a request goes: to a server by `linefix-client`, or to `linefix.answering`
+    asking                    the service to ask: a server by `linefix-client`, or `linefix.answering` and the store
     stored                    the store of maps of this machine
     inputs, scans, logs       files to requests
-    tracking                  a robot along a log: frames, prior, maps
+    tracking                  a robot along a log: frames, prior
     options, printing, progress    options of several commands; answers for people; what takes a while
 """

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from .asking import ask, setting
-from .errors import RefusedError, WrongUseError
+from .asking import Where, setting
+from .errors import Names, WrongUseError
 from .inputs import draw_picture, read_map_file, read_map_or_id
-from .options import AsJson, File, MapArgument, Number, Server, Text, grouped, option
-from .printing import Json, print_json, print_rows, write_json
+from .options import File, MapArgument, Number, Text, grouped, option
+from .printing import Json, Output, rows, write_json
 from .progress import compile_first, progress
 from .scans import needing_formats
 
 SUFFIXES = (".json", ".geojson")
-OPTION = re.compile(r"(?:/laser)?/(fov|beams|range_max|sigma|spacing|point|drive|landmark)\b[^:]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,53 +46,38 @@ def analyze(
     on: MapArgument,
     scanner: ScannerOptions,
     places: PlaceOptions,
+    where: Where,
+    output: Output,
     out: Annotated[File, option("Write the result as .json or .geojson.", "FILE")] = None,
     picture: Annotated[File, option("Draw the result on the map as .png.", "FILE")] = None,
-    server: Server = None,
-    as_json: AsJson = False,
 ) -> None:
     """Simulate scans on a grid of poses and report where localization succeeds."""
     if out is not None and out.suffix.lower() not in SUFFIXES:
         raise WrongUseError(f"--out: found {out.name}, expected a name that ends in {' or '.join(SUFFIXES)}")
+    if places.deadline_ms is not None and not places.deadline_ms >= 0.0:
+        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {places.deadline_ms:g}")
     target = read_map_or_id(on)
-    if picture is not None and "map_id" in target:
-        raise WrongUseError(
-            "--picture: found the id of a stored map, expected a map file; write one with linefix map get ID --out FILE"
-        )
-    answer = _analyzed({"map": target, "laser": asdict(scanner)}, places, server)
+    names = {f"/laser/{name}": f"--{name.replace('_', '-')}" for name in asdict(scanner)}
+    names |= {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(places)} | {"/map": on}
+    body = {"map": target, "laser": asdict(scanner), **asdict(places), "point": places.point and list(places.point)}
+    body["landmark"] = [] if places.landmark is None else read_map_file(places.landmark).get("segments", [])
+    answer = _analyzed(body, names, where)
     if out is not None:
         write_json(answer if out.suffix.lower() == ".json" else features(answer), out)
     if picture is not None:
-        _draw(read_map_file(on), answer, picture)
-    if as_json:
-        print_json(answer)
-    else:
-        print_rows(list(_rows(answer)))
+        _draw(where.whole_map(target), answer, picture)
+    output.print(answer, rows(_rows(answer)))
 
 
-def _analyzed(body: Json, places: PlaceOptions, server: str | None) -> Json:
+def _analyzed(body: Json, names: Names, where: Where) -> Json:
     """Return the answer of ``POST /v1/analyze``: of a server, or worked out here on all cores."""
-    if places.deadline_ms is not None and not places.deadline_ms >= 0.0:
-        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {places.deadline_ms:g}")
-    body |= asdict(places) | {"point": None if places.point is None else list(places.point)}
-    body["landmark"] = [] if places.landmark is None else read_map_file(places.landmark).get("segments", [])
-    if server is not None:
-        return ask("analyze", server, body)
+    if where.server is not None:
+        return where.ask("analyze", body, names=names)
     compile_first()
-    with progress() as show:
-        try:
-            return ask(
-                "analyze", None, body, cores=cores_here(), progress=lambda done, total: show("places", done, total)
-            )
-        except RefusedError as error:
-            named = OPTION.sub(lambda found: "--" + found[1].replace("_", "-"), str(error), count=1)
-            raise RefusedError(named, error.pointer) from None
-
-
-def cores_here() -> int:
-    """Return how many processes analyze: by the environment, else one for each core."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return setting("SEARCHES", cores)
+    with progress() as show:
+        here = {"cores": setting("SEARCHES", cores), "progress": partial(show, "places")}
+        return where.ask("analyze", body, names=names, **here)
 
 
 def features(answer: Json) -> Json:

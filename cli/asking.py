@@ -1,4 +1,4 @@
-"""The target of a command: the server at a URL, or this process and the store of maps of this machine."""
+"""The service that a command asks: the server at a URL, or this process and the store of maps of this machine."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import re
 import urllib.parse
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from .errors import (
-    NOTHING,
-    Asked,
+    NO_NAMES,
     CommandError,
+    Names,
     NoServerError,
     NoSuchMapError,
     RefusedError,
@@ -23,20 +23,22 @@ from .errors import (
     refused_at,
     refusing,
 )
+from .options import Text, option
 from .printing import Json
 from .progress import compile_first
 
 if TYPE_CHECKING:
     from linefix.answering import Within
 
-    from .stored import StoredMaps
-
 N = TypeVar("N", int, float)
+Locate = Callable[[Json], Json]
+"""From the scan and the prior of a request to the answer."""
+
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
-MAX_PAGES = 100_000  # of a list of maps
 MOST_SCANS = 10**9  # of an update: each is read from a file of this machine
-OF_STORED = {"check": "check_map", "update": "update_map"}  # methods of the client: a server has them for stored maps
+OF_STORED = {"check_map": "check", "update_map": "update"}  # a server has them for stored maps; the name in `answering`
+OF_STORE = ("put_map", "get_map", "list_maps", "delete_map")
 LIMITS = {  # by the name of the setting
     "MAX_VALUES": "values",
     "MAX_MAP_SEGMENTS": "map_segments",
@@ -48,39 +50,92 @@ BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 _HEADER = re.compile(r"[!-~]+")
 
 
-def _about(first: Any) -> Asked:
-    """Return the subject of a request, of the map of one, or of the id of a map."""
-    on = first.get("map", first) if isinstance(first, dict) else first
-    map_id = on.get("map_id") if isinstance(on, dict) else on
-    return Asked(map_id if isinstance(map_id, str) else None)
+@dataclass(frozen=True, slots=True)
+class Where:
+    """The service to ask, as an option."""
+
+    server: Annotated[Text, option("Use the service at this URL; the key is read from LINEFIX_KEY.", "URL")] = None
+
+    @contextmanager
+    def opened(self) -> Iterator[Here | Server]:
+        """Give the service, for several requests."""
+        if self.server is None:
+            yield Here()
+        else:
+            with server_at(self.server) as remote:
+                yield remote
+
+    def ask(self, method: str, *arguments: Any, names: Names = NO_NAMES, **more: Any) -> Json:
+        """Return an answer, see `Here.ask`."""
+        with self.opened() as service:
+            return service.ask(method, *arguments, names=names, **more)
+
+    def whole_map(self, on: Json) -> Json:
+        """Return the map of a request itself, also where it is stored; raises `RefusedError` where it is gone."""
+        return on if "segments" in on or "map_id" not in on else self.ask("get_map", on["map_id"])
 
 
-def ask(question: str, server: str | None, *documents: Any, **more: Any) -> Json:
-    """Return the answer to a question of `linefix.answering`: of the server at a URL, else of this process.
+class Here:
+    """The process of the command, and the store of maps of this machine."""
 
-    The first document is a request, or the map of a check or an update; `more` is for this process alone.
-    """
-    if server is not None:
-        sent = (_stored(documents[0]), *documents[1:]) if question in OF_STORED else documents
-        with server_at(server) as remote:
-            return remote.call(f"{question.title()}Answer", OF_STORED.get(question, question), *sent)
-    with answering(_about(documents[0])) as within:
-        from linefix import answering as library
+    def ask(self, method: str, *arguments: Any, names: Names = NO_NAMES, **more: Any) -> Json:
+        """Return what a method of a service's client returns.
 
-        answer: Json = getattr(library, question)(*documents, within, **more)
-        return answer
+        Parameters
+        ----------
+        method : str
+            Of the client, or a function of `linefix.answering`.
+        arguments
+            Of the method; the map of a request in place of an id for a check or an update.
+        names : mapping
+            The user's names for places in the request.
+        more
+            Arguments by name.
+        """
+        answer: Json
+        if method in OF_STORE:
+            from .stored import StoredMaps
+
+            with closing(StoredMaps(names)) as maps:
+                answer = getattr(maps, method)(*arguments, **more)
+                return answer
+        with answering(names) as within:
+            from linefix import answering as library
+
+            answer = getattr(library, OF_STORED.get(method, method))(*arguments, within, **more)
+            return answer
+
+    def locating(self, target: Json, options: Json, names: Names) -> Locate:
+        """Index the map, or the maps, of a request once; return the function that searches scans there."""
+        with answering(names) as within:
+            from linefix.answering import locating
+
+            answer = locating(target, options, within)
+
+        def located(sought: Json) -> Json:
+            with refusing(names):
+                return answer(sought)
+
+        return located
 
 
 @contextmanager
-def answering(asked: Asked = NOTHING) -> Iterator[Within]:
+def answering(names: Names) -> Iterator[Within]:
     """Give the bounds of requests in this process, once it can search; raises as `refusing`."""
     from linefix.answering import Within
     from linefix.documents.limits import Limits
 
     compile_first()
     limits = {name: setting(variable, getattr(Limits(), name)) for variable, name in LIMITS.items()}
-    with refusing(asked):
-        yield Within(Limits(**limits, batch=MOST_SCANS), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored_here)
+    with refusing(names):
+        yield Within(Limits(**limits, batch=MOST_SCANS), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored)
+
+
+def _stored(map_id: str) -> tuple[Any, Json]:
+    from .stored import StoredMaps
+
+    with closing(StoredMaps()) as maps:
+        return maps.found(map_id)
 
 
 def setting(name: str, default: N) -> N:
@@ -93,34 +148,6 @@ def setting(name: str, default: N) -> N:
     if not 0 < value < math.inf:
         raise WrongUseError(f"LINEFIX_{name} in the environment: found {text!r}, expected a number above 0")
     return value
-
-
-def _stored_here(map_id: str) -> tuple[Any, Json]:
-    from .stored import StoredMaps
-
-    with closing(StoredMaps()) as maps:
-        return maps.found(map_id)
-
-
-@contextmanager
-def keeping(server: str | None) -> Iterator[Server | StoredMaps]:
-    """Give the stored maps: those of the server at a URL, or those of this machine where there is none."""
-    if server is not None:
-        with server_at(server) as remote:
-            yield remote
-        return
-    from .stored import StoredMaps
-
-    with closing(StoredMaps()) as maps:
-        yield maps
-
-
-def whole_map(on: Json, server: str | None) -> Json:
-    """Return the map of a request itself, also where the request has its id; raises `RefusedError` where it is gone."""
-    if "segments" in on or "map_id" not in on:
-        return on
-    with keeping(server) as maps:
-        return maps.get(on["map_id"])
 
 
 @contextmanager
@@ -164,64 +191,26 @@ class Server:
     def __init__(self, url: str, client: Any) -> None:
         self._url, self._client = url, client
 
-    def import_map(self, files: list[Path], fields: Json) -> Json:
-        """Return the answer of ``POST /v1/maps:import``."""
-        named, asked = [(file.name, file.read_bytes()) for file in files], Asked(files=tuple(f.name for f in files))
-        return self.call("ImportAnswer", "import_map", named, fields, asked=asked)
+    def locating(self, target: Json, options: Json, names: Names) -> Locate:
+        """Return the function that searches scans on the map, or the maps, of a request."""
+        return lambda sought: self.ask("associate", {**target, **sought, "options": options}, names=names)
 
-    def put(self, map_id: str, document: Json) -> Json:
-        """Store a map."""
-        return self.call("MapSummaryAnswer", "put_map", map_id, document)
-
-    def get(self, map_id: str) -> Json:
-        """Return a stored map."""
-        return self.call("MapDocument", "get_map", map_id)
-
-    def maps(self) -> Iterator[Json]:
-        """Yield the summary of each stored map, page by page."""
-        cursor: str | None = None
-        for _ in range(MAX_PAGES):
-            page = self.call("MapList", "list_maps", cursor=cursor)
-            yield from page["maps"]
-            if page["next"] is None:
-                return
-            cursor = str(page["next"])
-        raise NoServerError(f"{self._url}: found more than {MAX_PAGES} pages of maps; check the URL")
-
-    def remove(self, map_id: str) -> None:
-        """Forget a stored map."""
-        self._asked(Asked(map_id), lambda: self._client.delete_map(map_id))
-
-    def call(self, kind: str, method: str, *arguments: Any, asked: Asked | None = None, **options: Any) -> Json:
+    def ask(self, method: str, *arguments: Any, names: Names = NO_NAMES, **more: Any) -> Json:
         """Return an answer whose fields are those of its route; further fields may be of a later version.
 
         Raises
         ------
         NoServerError
-            When a field is missing, or of another type.
+            When no server answers, or a field is missing or of another type.
         """
-        from pydantic import ValidationError
-
-        about = asked or (_about(arguments[0]) if arguments else NOTHING)
-        answer: Json = self._asked(about, lambda: getattr(self._client, method)(*arguments, **options))
-        try:
-            _fields(kind).validate_python(answer)
-        except ValidationError as error:
-            wrong = error.errors(include_url=False)[0]
-            place = "/" + "/".join(map(str, wrong["loc"]))
-            raise NoServerError(
-                f"the answer of {self._url} does not match this version of Linefix: {place}: {wrong['msg']}; "
-                "check the URL and the version of the server"
-            ) from None
-        return answer
-
-    def _asked(self, asked: Asked, call: Callable[[], Any]) -> Any:
         from linefix_client import LinefixError, ProblemError
 
+        if method in OF_STORED:
+            arguments = (_id_of(arguments[0]), *arguments[1:])
         try:
-            return call()
+            answer: Json = getattr(self._client, method)(*arguments, **more)
         except ProblemError as error:
-            raise self._refusal(error, asked) from None
+            raise self._refusal(error, arguments, names) from None
         except LinefixError as error:
             if error.__cause__ is None:  # a server answers, though none of Linefix
                 raise NoServerError(f"{str(error).removesuffix('; check the URL')}; check the URL") from None
@@ -230,31 +219,50 @@ class Server:
             ) from None
         except ValueError as error:  # such as a number that JSON cannot have
             raise WrongUseError(f"not sent: {error}") from None
+        self._require_fields(method, answer)
+        return answer
 
-    def _refusal(self, error: Any, asked: Asked) -> CommandError:
+    def _require_fields(self, method: str, answer: Json) -> None:
+        from pydantic import ValidationError
+
+        try:
+            _fields(method).validate_python(answer)
+        except ValidationError as error:
+            wrong = error.errors(include_url=False)[0]
+            place = "/" + "/".join(map(str, wrong["loc"]))
+            raise NoServerError(
+                f"the answer of {self._url} does not match this version of Linefix: {place}: {wrong['msg']}; "
+                "check the URL and the version of the server"
+            ) from None
+
+    def _refusal(self, error: Any, arguments: tuple[Any, ...], names: Names) -> CommandError:
         if error.status == 401:
             return NoServerError(f"{self._url} requires a key; set {KEY} in the environment")
         if error.status == 403:
             return NoServerError(f"{self._url}: {error.detail}; set {KEY} in the environment to a key with this right")
-        if error.code == "unknown_map" and asked.map_id is not None:
-            return NoSuchMapError(asked.map_id)
-        named = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
-        faults = [(one["pointer"], one["message"]) for one in named]
-        detail = ": ".join((*asked.files[:1], f"{self._url}: {error.detail}"))
-        refused = refused_at(faults, asked) if faults else RefusedError(detail)
+        on = arguments[0] if arguments else None
+        map_id = on["map"].get("map_id") if isinstance(on, dict) and isinstance(on.get("map"), dict) else on
+        if error.code == "unknown_map" and isinstance(map_id, str):
+            return NoSuchMapError(map_id)
+        found = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
+        faults = [(one["pointer"], one["message"]) for one in found]
+        detail = ": ".join((*filter(None, [names.get("")]), f"{self._url}: {error.detail}"))
+        refused = refused_at(faults, names) if faults else RefusedError(detail)
         return refused if 400 <= error.status < 500 and error.status not in BUSY else NoServerError(str(refused))
 
 
 @cache
-def _fields(kind: str) -> Any:
-    """Return what an answer is held to."""
-    from linefix_client import schema
+def _fields(method: str) -> Any:
+    """Return what the answer of a method of the client is held to."""
+    from typing import get_type_hints
+
+    from linefix_client import Client
     from pydantic import TypeAdapter
 
-    return TypeAdapter(getattr(schema, kind))
+    return TypeAdapter(get_type_hints(getattr(Client, method))["return"])
 
 
-def _stored(on: Json) -> str:
+def _id_of(on: Json) -> str:
     """Return the id of a stored map; raises `WrongUseError` where it is a map file."""
     if "map_id" not in on:
         raise WrongUseError(

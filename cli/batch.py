@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from .errors import RefusedError, WrongUseError
-from .options import AsJson, Undirected, UsableOptions, argument, flag, grouped, option
-from .printing import noted, print_json, print_rows
+from .options import Undirected, UsableOptions, argument, flag, grouped, option
+from .printing import Output, noted, rows
 from .progress import progress
 
 if TYPE_CHECKING:
@@ -17,18 +17,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class WorkerOptions:
-    """The workers of a run, as options."""
+class RunOptions:
+    """How to search the scans, as options."""
 
     workers: Annotated[int | None, option("Number of processes. Default: the number of cores.", "N", min=1)] = None
     ray: Annotated[bool, flag("Run on a Ray cluster: that of RAY_ADDRESS, or a new one.", "--ray")] = False
     block: Annotated[int, option("Number of scans in the block of a worker.", "N", min=1, max=65_536)] = 512
-
-
-@dataclass(frozen=True, slots=True)
-class SearchChoice:
-    """How to search each scan, as options."""
-
     undirected: Undirected = False
     deadline_ms: Annotated[float, option("Time limit of each search.", "MS", min=1.0)] = 10_000.0
 
@@ -38,10 +32,9 @@ def batch(
     logs: Annotated[list[str], argument("Parquet files, bags, MCAP files or CARMEN logs.", "LOGS")],
     maps: Annotated[Path, option("A map file, or a folder of map files.", "MAPS")],
     out: Annotated[Path, option("The Parquet file to write, one row per scan.", "FILE")],
-    workers: WorkerOptions,
-    search: SearchChoice,
+    run: RunOptions,
     usable: UsableOptions,
-    as_json: AsJson = False,
+    output: Output,
 ) -> None:
     """Localize the scans of many logs; the same command continues an interrupted run.
 
@@ -55,22 +48,19 @@ def batch(
     try:
         from batch import associate_many
 
-        options, engine = _options(workers.block, search, usable), _engine(workers)
+        options, engine = _options(run, usable), _engine(run)
         with progress() as show:
             summary = associate_many(
                 logs, maps, out, options, engine, lambda step: show(step.stage, step.done, step.total)
             )
     except ModuleNotFoundError as error:
-        extra = "ray" if workers.ray else "batch"
+        extra = "ray" if run.ray else "batch"
         raise RefusedError(
             f'linefix batch needs the package {error.name}: in a checkout, pip install ".[{extra}]"'
         ) from None
     except InputError as error:
         raise RefusedError(str(error)) from None
-    if as_json:
-        print_json(asdict(summary))
-    else:
-        print_rows(_rows(summary, time.monotonic() - begun))
+    output.print(asdict(summary), rows(_rows(summary, time.monotonic() - begun)))
     if summary.scans and summary.errors == summary.scans:
         raise RefusedError(f"none of the {summary.scans:,} scans could be searched; the first: {_first_error(out)}")
 
@@ -82,16 +72,16 @@ def _first_error(out: Path) -> str:
     return next((str(told) for told in pq.read_table(out, columns=["error"])["error"].to_pylist() if told), "unknown")
 
 
-def _options(block: int, chosen: SearchChoice, usable: UsableOptions) -> FleetOptions:
+def _options(chosen: RunOptions, usable: UsableOptions) -> FleetOptions:
     from association import AssociationOptions
     from batch import FleetOptions
     from linefix.compiling import compile_kernels
 
     search = AssociationOptions(max_alternatives=0, include=(), oriented=not chosen.undirected, **asdict(usable))
-    return FleetOptions(search, chosen.deadline_ms, block, compile_kernels)
+    return FleetOptions(search, chosen.deadline_ms, chosen.block, compile_kernels)
 
 
-def _engine(chosen: WorkerOptions) -> Engine | None:
+def _engine(chosen: RunOptions) -> Engine | None:
     from batch import OnRay, Processes
 
     if chosen.ray:
@@ -103,11 +93,11 @@ def _engine(chosen: WorkerOptions) -> Engine | None:
 
 def _rows(summary: Summary, seconds: float) -> list[tuple[str, str]]:
     searched = summary.scans - summary.taken_over
-    rows = [("scans", f"{summary.scans:,}, of which {summary.taken_over:,} were done before")]
-    rows += [(status, f"{count:,}") for status, count in sorted(summary.statuses.items())]
-    rows += [("usable", f"{summary.usable:,}"), ("errors", f"{summary.errors:,}")]
-    rows += [(note.kind, _noted(note)) for note in summary.notes]
-    return [*rows, ("speed", f"{searched / max(seconds, 1e-9):,.0f} scans/s")]
+    found = [("scans", f"{summary.scans:,}, of which {summary.taken_over:,} were done before")]
+    found += [(status, f"{count:,}") for status, count in sorted(summary.statuses.items())]
+    found += [("usable", f"{summary.usable:,}"), ("errors", f"{summary.errors:,}")]
+    found += [(note.kind, _noted(note)) for note in summary.notes]
+    return [*found, ("speed", f"{searched / max(seconds, 1e-9):,.0f} scans/s")]
 
 
 def _noted(note: LogNote) -> str:

@@ -11,9 +11,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 MOST_NAMED = 4  # wrong places in one line
 
@@ -68,44 +67,35 @@ class NoServerError(CommandError):
     exit_code = 4
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """The subject of a request, as the user knows it.
+Names = Mapping[str, str]
+"""Names that the user has for places in a request: of a file or an option, by the beginning of a JSON pointer."""
 
-    Attributes
-    ----------
-    map_id : str or None
-        Of the stored map that it is about.
-    files : tuple of str
-        Names of the files that were sent.
-    """
-
-    map_id: str | None = None
-    files: tuple[str, ...] = ()
-
-    def place(self, pointer: str) -> str:
-        """Return the user's name for a place in the request."""
-        if not self.files:
-            return pointer
-        first, _, rest = pointer.removeprefix("/").partition("/")
-        if first == "files":
-            return self.files[int(rest)] if rest.isdecimal() and int(rest) < len(self.files) else self.files[0]
-        option = "point" if first == "inside" else first.replace("_", "-")  # the name that `formats` has for it
-        return f"--{option}" if first else self.files[0]
+NO_NAMES: Names = {}
 
 
-NOTHING = Asked()
+def place_of(pointer: str, names: Names) -> str:
+    """Return the user's name for a place in a request, and the rest of the pointer."""
+    begin, rest = pointer, ""
+    while begin not in names and begin:
+        begin, _, last = begin.rpartition("/")
+        rest = f"/{last}{rest}"
+    name = names.get(begin)
+    if name is None:
+        return pointer
+    if name.startswith("--"):
+        return " ".join([name, *rest.split("/")[1:]])
+    return f"{name}: {rest}" if rest else name
 
 
-def refused_at(faults: Sequence[tuple[str, str]], asked: Asked = NOTHING) -> RefusedError:
+def refused_at(faults: Sequence[tuple[str, str]], names: Names) -> RefusedError:
     """Return the error for places that are wrong, each a pointer and a message: the first are named, others counted."""
-    named = [f"{place}: {message}" if (place := asked.place(pointer)) else message for pointer, message in faults]
-    more = f" (and {len(named) - MOST_NAMED} more)" if len(named) > MOST_NAMED else ""
-    return RefusedError("; ".join(named[:MOST_NAMED]) + more, faults[0][0])
+    told = [f"{place}: {message}" if (place := place_of(pointer, names)) else message for pointer, message in faults]
+    more = f" (and {len(told) - MOST_NAMED} more)" if len(told) > MOST_NAMED else ""
+    return RefusedError("; ".join(told[:MOST_NAMED]) + more, faults[0][0])
 
 
 @contextmanager
-def refusing(asked: Asked = NOTHING) -> Iterator[None]:
+def refusing(names: Names = NO_NAMES) -> Iterator[None]:
     """Raise errors of the command line in place of those about a request."""
     from linefix.answering import NotStoredError
     from linefix.documents.errors import DeadlinePassedError, InvalidRequestError, TooManyError
@@ -121,9 +111,7 @@ def refusing(asked: Asked = NOTHING) -> Iterator[None]:
         raise RefusedError(str(error)) from None
     except TooManyError as error:
         faults = [(error.pointer, str(error))]
-    except InvalidRequestError as error:
-        faults = [(one.pointer, one.message) for one in error.faults]
-    except InputError as error:
-        fault = fault_of(error)
-        faults = [(fault.pointer, fault.message)]
-    raise refused_at(faults, asked)
+    except (InvalidRequestError, InputError) as error:
+        found = error.faults if isinstance(error, InvalidRequestError) else [fault_of(error)]
+        faults = [(one.pointer, one.message) for one in found]
+    raise refused_at(faults, names)

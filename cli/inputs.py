@@ -5,17 +5,16 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .asking import whole_map
 from .errors import RefusedError, WrongUseError
-from .printing import Json, noted, plain, write_json
+from .printing import Json, noted, print_lines, rows, write_json
 from .scans import needing_formats, read_json
 
 if TYPE_CHECKING:
-    from formats import ImportReport, LineMap
+    from formats import LineMap
 
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
@@ -25,6 +24,25 @@ CHOICE = ("grids", "topic", "costmap", "orientation")  # codes of notes of the g
 IN_BAGS = "metadata.yaml"  # a file in the folder of each bag of ROS 2
 MOST_NAME = 120  # letters of a name; the contract allows 128
 NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class NamedMap:
+    """A map of a request.
+
+    Attributes
+    ----------
+    name : str
+        The id of a stored map, else that of its file without suffix; a number follows where several have it.
+    source : str
+        As the user names it.
+    document : dict
+        The map itself, or the id of a stored one.
+    """
+
+    name: str
+    source: str
+    document: Json
 
 
 def read_map_or_id(name: str) -> Json:
@@ -43,24 +61,10 @@ def read_map_or_id(name: str) -> Json:
 
 
 def read_map_file(name: str) -> Json:
-    """Return the map of a file: JSON as it is, what other tools write as read by `formats`.
-
-    Raises
-    ------
-    WrongUseError
-        When there is no such file.
-    RefusedError
-        When it is not taken.
-    """
+    """Return the map of a file: JSON as it is, what other tools write as read by `formats`; raises as the above."""
     path = existing(Path(name))
     if path.suffix.lower() != ".json":
-        with needing_formats(f"reading {path.name}"):
-            from formats import read_map
-            from linefix.documents.results import map_json
-
-            imported = read_map(path)
-        _print_choice(imported.report)
-        return map_json(imported.map)
+        return _read_other(path)
     told = read_json(name)
     if isinstance(told, list):
         return {"segments": told}
@@ -71,6 +75,20 @@ def read_map_file(name: str) -> Json:
     return told
 
 
+def _read_other(path: Path) -> Json:
+    """Return the map of another tool; print on stderr which grid of a recording it is, and what was left out."""
+    with needing_formats(f"reading {path.name}"):
+        from formats import read_map
+        from linefix.documents.results import map_json
+
+        imported = read_map(path)
+    report = asdict(imported.report)
+    if report["format"] in RECORDINGS:
+        notes = [note for kind in ("read", "assumed") for note in report[kind] if note["code"] in CHOICE]
+        print_lines(rows((("map", noted(note)) for note in (*notes, *report["dropped"])), 10), sys.stderr)
+    return map_json(imported.map)
+
+
 def existing(path: Path) -> Path:
     """Return a path; raises `WrongUseError` where there is no such file."""
     if not path.exists():
@@ -78,38 +96,20 @@ def existing(path: Path) -> Path:
     return path
 
 
-def _print_choice(report: ImportReport) -> None:
-    """Print on stderr which grid of a recording is the map, and what of the recording was left out."""
-    if report.format not in RECORDINGS:
-        return
-    for kind in ("read", "assumed", "dropped"):
-        for note in getattr(report, kind):
-            if kind == "dropped" or note.code in CHOICE:
-                print(f"{'map':10}{plain(noted(asdict(note)))}", file=sys.stderr)
-
-
 def line_map_of(document: Json) -> LineMap:
-    """Return a map as `formats` has it.
-
-    Raises
-    ------
-    InputError
-        When its segments are none.
-    """
+    """Return a map as `formats` has it; raises `InputError` where its segments are none."""
     from association import MapPoints
     from formats import LineMap
     from registration import Segments
 
-    segments = Segments.from_array(document.get("segments", []), argument="segments")
-    points = MapPoints.of(document.get("points", []), document.get("points_sigma"), path="")
+    segments, sigma = Segments.from_array(document.get("segments", []), argument="segments"), document.get("sigma")
+    points = MapPoints.of(document.get("points", []), document.get("points_sigma"), path="").positions
     directed = document.get("oriented") is not False
-    return LineMap(
-        segments, document.get("sigma"), directed, points=points.positions, points_sigma=document.get("points_sigma")
-    )
+    return LineMap(segments, sigma, directed, points=points, points_sigma=document.get("points_sigma"))
 
 
 def write_document(document: Json, out: Path) -> None:
-    """Write a map in the format of the file's name.
+    """Write a map in the format of the file's name, or draw it as PNG.
 
     Raises
     ------
@@ -133,13 +133,13 @@ def draw_picture(document: Json, out: Path, *poses: Any, **more: Any) -> None:
         draw_map(line_map_of(document), out, *poses, **more)
 
 
-def read_target(names: Sequence[str]) -> Json:
-    """Return the part of a request that names its map, or its maps: ``{"map": ...}`` or ``{"maps": [...]}``.
+def read_maps(names: Sequence[str]) -> list[NamedMap]:
+    """Return maps by name.
 
     Parameters
     ----------
     names : sequence of str
-        Each a map file, a folder of map files, or the id of a stored map. The map of a file is named after it.
+        Each a map file, a folder of map files, or the id of a stored map.
 
     Raises
     ------
@@ -148,43 +148,24 @@ def read_target(names: Sequence[str]) -> Json:
     RefusedError
         When a file is not taken.
     """
-    named = _named(names)
-    if len(named) == 1:
-        return {"map": named[0][1]}
-    return {"maps": [{**one, "map_id": name} if "segments" in one else one for name, one in named]}
-
-
-def read_maps(names: Sequence[str]) -> dict[str, Json]:
-    """Return the maps of this machine themselves, by name.
-
-    Parameters
-    ----------
-    names : sequence of str
-        As of `read_target`.
-
-    Raises
-    ------
-    WrongUseError
-        Likewise, and when a stored map is named twice.
-    RefusedError
-        When a file is not taken, or a stored map is gone.
-    """
-    maps: dict[str, Json] = {}
-    for name, document in _named(names):
-        if name in maps:
-            raise WrongUseError(f"found the map {name} twice, expected each map once; omit one of them")
-        maps[name] = whole_map(document, None)
-    return maps
-
-
-def _named(names: Sequence[str]) -> list[tuple[str, Json]]:
-    """Return the map of each file by the name of the file, and ids of stored maps."""
-    named: list[tuple[str, Json]] = []
-    for name in (name for one in names for name in _files_of(one)):
-        document, taken = read_map_or_id(name), {one for one, _ in named}
+    found: list[NamedMap] = []
+    for source in (file for name in names for file in _files_of(name)):
+        document, taken = read_map_or_id(source), {one.name for one in found}
         stored = document.get("map_id") if "segments" not in document else None
-        named.append((stored or _name_of(name, taken), document))
-    return named
+        found.append(NamedMap(stored or _name_of(source, taken), source, document))
+    return found
+
+
+def target_of(maps: Sequence[NamedMap]) -> Json:
+    """Return the part of a request that has its map, or its maps: ``{"map": ...}`` or ``{"maps": [...]}``."""
+    if len(maps) == 1:
+        return {"map": maps[0].document}
+    return {"maps": [{**one.document, "map_id": one.name} for one in maps]}
+
+
+def places_of(maps: Sequence[NamedMap]) -> dict[str, str]:
+    """Return the user's name for each map, by its place in a request."""
+    return {"/map" if len(maps) == 1 else f"/maps/{number}": one.source for number, one in enumerate(maps)}
 
 
 def _files_of(name: str) -> list[str]:
@@ -202,14 +183,3 @@ def _name_of(name: str, taken: set[str]) -> str:
     """Return the name of a file's map: that of the file without its suffix, with a number where it is taken."""
     stem = NOT_IN_NAMES.sub("-", Path(name).stem)[:MOST_NAME] or "map"
     return next(one for one in (stem, *(f"{stem}-{number}" for number in range(2, 1000))) if one not in taken)
-
-
-def documents_of(target: Json, server: str | None) -> dict[str, Json]:
-    """Return the maps of a request by name, those that are stored, too; the name of a single one may be empty."""
-    maps = {one.get("map_id", ""): whole_map(one, server) for one in target.get("maps") or [target["map"]]}
-    return {name: {key: value for key, value in one.items() if key != "map_id"} for name, one in maps.items()}
-
-
-def document_at(name: str, server: str | None) -> Json:
-    """Return a map itself: that of a file, or a stored one."""
-    return whole_map(read_map_or_id(name), server)

@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from .errors import WrongUseError
 from .inputs import existing
-from .printing import noted, plain
+from .options import TopicOptions
+from .printing import noted, print_lines, rows
 from .scans import needing_formats
 
 if TYPE_CHECKING:
-    from formats import Log, LoggedScan, LogOptions
+    from formats import Log, LoggedScan
+    from registration import RigidTransform
 
 T = TypeVar("T")
 
 
-def opened(path: Path, options: LogOptions) -> Log:
+def opened(path: Path, source: TopicOptions, mount: RigidTransform | None = None) -> Log:
     """Open a log.
 
     Raises
@@ -30,24 +32,19 @@ def opened(path: Path, options: LogOptions) -> Log:
         When it cannot be read.
     """
     with needing_formats(f"reading {existing(path).name}"):
-        from formats import read_log
+        from formats import LogOptions, read_log
 
-        return read_log(path, options)
+        return read_log(path, LogOptions(source.topic, None, source.tf_namespace, mount))
 
 
-def options_of(
-    topic: str | None, tf_namespace: str | None, mount: tuple[float, float, float] | None = None
-) -> LogOptions:
-    """Return what to take of a log; raises `WrongUseError` where the mount is no pose."""
+def mount_of(given: tuple[float, float, float] | None) -> RigidTransform | None:
+    """Return a mount that a user states; raises `WrongUseError` where it is no pose."""
     from registration import RigidTransform
 
-    with needing_formats("reading a log"):
-        from formats import LogOptions
-
-        try:
-            return LogOptions(topic, None, tf_namespace, None if mount is None else RigidTransform(*mount))
-        except ValueError as error:
-            raise WrongUseError(f"--mount: {error}") from error
+    try:
+        return None if given is None else RigidTransform(*given)
+    except ValueError as error:
+        raise WrongUseError(f"--mount: {error}") from error
 
 
 def scans_of(log: Log) -> Iterator[LoggedScan]:
@@ -56,17 +53,11 @@ def scans_of(log: Log) -> Iterator[LoggedScan]:
         yield from log
 
 
-def some_scans(log: Path, most: int, topic: str | None = None, tf_namespace: str | None = None) -> list[LoggedScan]:
-    """Return some scans of a log, evenly over all of it; print on stderr what was made of the log.
-
-    Raises
-    ------
-    WrongUseError, RefusedError
-        As of `opened`.
-    """
-    source = opened(log, options_of(topic, tf_namespace))
-    taken = thinned(scans_of(source), most)
-    print_notes(source, sys.stderr)
+def some_scans(path: Path, most: int, source: TopicOptions) -> list[LoggedScan]:
+    """Return some scans of a log, evenly over all of it; print on stderr what was made of the log; raises as above."""
+    log = opened(path, source)
+    taken = thinned(scans_of(log), most)
+    print_notes(log, sys.stderr)
     return taken
 
 
@@ -86,6 +77,5 @@ def thinned(found: Iterable[T], most: int) -> list[T]:
 
 def print_notes(log: Log, where: TextIO) -> None:
     """Print the assumptions about a log, and its parts that were left out."""
-    for kind in ("assumed", "dropped"):
-        for note in getattr(log.report, kind):
-            print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
+    report = asdict(log.report)
+    print_lines(rows(((kind, noted(one)) for kind in ("assumed", "dropped") for one in report[kind]), 10), where)

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated
 
-from .asking import ask
-from .errors import WrongUseError
-from .inputs import read_map_file, read_target
+from .asking import Where
+from .errors import Names, WrongUseError
+from .inputs import NamedMap, places_of, read_map_file, read_maps, target_of
 from .options import (
     LIKELY,
-    AsJson,
     File,
     MapArgument,
     MapsArgument,
     Number,
     ScanArgument,
-    Server,
     Text,
     Texts,
     Undirected,
@@ -27,20 +25,30 @@ from .options import (
     grouped,
     option,
 )
-from .printing import Json, pose_text, print_json, print_rows, print_table, verdict_rows, write_json
+from .printing import Json, Output, pose_text, rows, table, verdict_rows, write_json
 from .scans import read_json, read_scan
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
 TAKEN = ("laser", "points", "viewpoint")  # of a scan for vectorize; its frame and stamp make no difference there
+PLACES: Names = {  # options of a search, by their places in a request
+    "/prior": "--near",
+    "/prior/radius": "--radius",
+    "/prior/angle": "--angle",
+    "/prior/map_id": "--near-map",
+    "/map_weights": "--weight",
+    "/options/deadline_ms": "--deadline-ms",
+}
 
 
 @dataclass(frozen=True, slots=True)
-class NearOptions:
-    """A window around a pose that must contain the answer, as options."""
+class SearchOptions:
+    """Where and how to search, as options."""
 
     near: Annotated[tuple[float, float, float] | None, option("Search only near this pose.", "X Y THETA")] = None
     radius: Annotated[float, option("Maximum distance from --near.", "METRES")] = 1.0
     angle: Annotated[float, option("Maximum rotation from --near.", "RADIANS")] = 0.5
+    undirected: Undirected = False
+    deadline_ms: Annotated[Number, option("Time limit of the search.", "MS")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,64 +59,49 @@ class SeveralOptions:
     weight: Annotated[Texts, option("Probability of one of several maps; repeatable.", f"MAP_ID={LIKELY}")] = None
 
 
-@dataclass(frozen=True, slots=True)
-class SearchChoice:
-    """How to search, as options."""
-
-    undirected: Undirected = False
-    deadline_ms: Annotated[Number, option("Time limit of the search.", "MS")] = None
-
-
 @grouped
 def locate(
     on: MapsArgument,
     scan: ScanArgument,
-    window: NearOptions,
+    search: SearchOptions,
     several: SeveralOptions,
-    search: SearchChoice,
     usable: UsableOptions,
-    server: Server = None,
-    as_json: AsJson = False,
+    where: Where,
+    output: Output,
 ) -> None:
     """Find the pose of a scan on a map, or on one of several; the answer is that of /v1/associate."""
-    answer = ask("associate", server, _request(on, scan, window, search, usable, several))
-    if as_json:
-        print_json(answer)
-        return
-    rows = verdict_rows(answer)
+    maps = read_maps(on)
+    body = _request(maps, scan, search, usable)
+    if several.near_map is not None:
+        if search.near is None:
+            raise WrongUseError("--near-map: found no --near, expected the pose on that map; add --near X Y THETA")
+        body["prior"]["map_id"] = several.near_map
+    if several.weight:
+        body["map_weights"] = dict(map(_weight, several.weight))
+    answer = where.ask("associate", body, names={**PLACES, **places_of(maps), "/scan": scan})
+    output.print(answer, _located(answer))
+
+
+def _located(answer: Json) -> Iterator[str]:
+    found = verdict_rows(answer)
     if "maps" in answer and answer.get("map"):
-        rows.insert(1, ("map", answer["map"]["map_id"]))
-    print_rows(rows)
+        found.insert(1, ("map", answer["map"]["map_id"]))
+    yield from rows(found)
     if answer.get("maps"):
         columns = ("map_id", "status", "score", "probability")
         maps = [(*(one[name] for name in columns), one["pose"] and pose_text(one["pose"])) for one in answer["maps"]]
-        print_table(("map", *columns[1:], "pose"), maps)
+        yield from table(("map", *columns[1:], "pose"), maps)
 
 
-def _request(
-    on: Sequence[str],
-    scan: str,
-    window: NearOptions,
-    search: SearchChoice,
-    usable: UsableOptions,
-    several: SeveralOptions | None = None,
-) -> Json:
+def _request(maps: Sequence[NamedMap], scan: str, search: SearchOptions, usable: UsableOptions) -> Json:
     """Return the request of ``/v1/associate`` for the arguments and options of a command."""
-    several = several or SeveralOptions()
-    body: Json = {**read_target(on), "scan": read_scan(scan), "options": asdict(usable)}
-    if window.near is not None:
-        pose = dict(zip(("x", "y", "theta"), window.near, strict=True))
-        body["prior"] = pose | {"radius": window.radius, "angle": window.angle}
-        if several.near_map is not None:
-            body["prior"]["map_id"] = several.near_map
-    elif several.near_map is not None:
-        raise WrongUseError("--near-map: found no --near, expected the pose on that map; add --near X Y THETA")
-    if several.weight:
-        body["map_weights"] = dict(map(_weight, several.weight))
+    body: Json = {**target_of(maps), "scan": read_scan(scan), "options": asdict(usable)}
+    if search.near is not None:
+        pose = dict(zip(("x", "y", "theta"), search.near, strict=True))
+        body["prior"] = pose | {"radius": search.radius, "angle": search.angle}
     if search.undirected:
         body["options"]["oriented"] = False
-    if search.deadline_ms is not None:
-        body["options"]["deadline_ms"] = search.deadline_ms
+    body["options"]["deadline_ms"] = search.deadline_ms
     return body
 
 
@@ -122,96 +115,80 @@ def _weight(told: str) -> tuple[str, float]:
 
 
 @grouped
-def explain(
-    on: MapArgument,
-    scan: ScanArgument,
-    window: NearOptions,
-    search: SearchChoice,
-    usable: UsableOptions,
-    as_json: AsJson = False,
-) -> None:
+def explain(on: MapArgument, scan: ScanArgument, search: SearchOptions, usable: UsableOptions, output: Output) -> None:
     """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
 
     The answer is that of linefix locate. It is usable if its probability reaches --usable-from and no veto applies.
     """
-    body = _request([on], scan, window, search, usable)
-    if "maps" in body:
-        raise WrongUseError(f"{on}: found a folder with {len(body['maps'])} maps, expected one map")
-    found = ask("explain", None, body)
-    if as_json:
-        print_json(found)
-        return
-    print_rows(verdict_rows(found["answer"]))
-    _print_verdict(found["verdict"])
+    maps = read_maps([on])
+    if len(maps) > 1:
+        raise WrongUseError(f"{on}: found a folder with {len(maps)} maps, expected one map")
+    names = {**PLACES, **places_of(maps), "/scan": scan}
+    found = Where().ask("explain", _request(maps, scan, search, usable), names=names)
+    output.print(found, _explained(found))
+
+
+def _explained(found: Json) -> Iterator[str]:
+    yield from rows(verdict_rows(found["answer"]))
+    yield from _verdict(found["verdict"])
     if found["last_view"] is not None:
-        print("\nThe last view of the drive alone:")
-        _print_verdict(found["last_view"])
+        yield from ("", "The last view of the drive alone:")
+        yield from _verdict(found["last_view"])
 
 
-def _print_verdict(one: Json) -> None:
-    """Print a verdict, part by part."""
-    known = one["features"] is not None
-    if known:
-        for against in one["log_odds"]:
-            _print_odds(one, against)
-        print("\nIncrease of the log odds if the features of a reason were usual, nats")
-        print_table(("reason", "nats"), list(one["taken"].items()))
-        _print_alternatives(one["alternatives"])
-        print(f"\nNull score: {_null(one['null'])}")
-    print("\nVetoes")
+def _verdict(one: Json) -> Iterator[str]:
+    """Return a verdict, part by part."""
+    if one["features"] is not None:
+        yield from _features(one)
+    yield from ("", "Vetoes")
     vetoes = [(veto["name"], veto["reason"], "applies" if veto["applies"] else "passed") for veto in one["vetoes"]]
-    print_table(("veto", "reason", "result"), vetoes)
-    if known:
-        _print_probabilities(one)
-    print(f"\nstatus {one['status']}, {'usable' if one['usable'] else 'not usable'}")
+    yield from table(("veto", "reason", "result"), vetoes)
+    if one["features"] is not None:
+        least = one["thresholds"]
+        yield from ("", f"Probabilities, with the prior probability {least['on_map']:.2f} of the map")
+        probabilities = [
+            ("by the model", one["by_model"], None),
+            ("among the alternatives", one["among"], None),
+            ("of the pose, their product", one["by_model"] * one["among"], least["usable_from"]),
+            ("explained", one["explained"], least["explained"]),
+        ]
+        yield from table(("probability", "value", "threshold"), probabilities)
+    yield from ("", f"status {one['status']}, {'usable' if one['usable'] else 'not usable'}")
 
 
-def _print_odds(one: Json, against: str) -> None:
-    """Print the terms of the odds against one way of being not right, next to those of a usual right answer."""
-    print(f"\nContributions to the log odds against {against}, nats")
-    terms = [term for term in one["contributions"] if term["against"] == against]
-    rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in terms]
-    print_table(("feature", "value", "contribution", "usual"), rows)
-    print(f"log odds with the constant: {one['log_odds'][against]:.3f}")
-
-
-def _print_alternatives(others: list[Json]) -> None:
-    """Print the alternatives with their weights."""
-    print(f"\nAlternatives: {len(others)}; the answer has weight 1")
-    first = others[:MOST_ALTERNATIVES]
-    rows = [(pose_text(other["pose"]), round(other["gap"], 3) + 0.0, other["weight"]) for other in first]
-    if rows:
-        print_table(("pose", "gap in nats", "weight"), rows)
-
-
-def _null(null: Json | None) -> str:
+def _features(one: Json) -> Iterator[str]:
+    """Return the terms of the odds against each way of being not right, next to those of a usual right answer."""
+    for against, odds in one["log_odds"].items():
+        yield from ("", f"Contributions to the log odds against {against}, nats")
+        terms = [term for term in one["contributions"] if term["against"] == against]
+        found = [(term["name"], term["value"], term["nats"], term["usual"]) for term in terms]
+        yield from table(("feature", "value", "contribution", "usual"), found)
+        yield f"log odds with the constant: {odds:.3f}"
+    yield from ("", "Increase of the log odds if the features of a reason were usual, nats")
+    yield from table(("reason", "nats"), one["taken"].items())
+    others, null = one["alternatives"], one["null"]
+    yield from ("", f"Alternatives: {len(others)}; the answer has weight 1")
+    if others:
+        first = others[:MOST_ALTERNATIVES]
+        gaps = [(pose_text(other["pose"]), round(other["gap"], 3) + 0.0, other["weight"]) for other in first]
+        yield from table(("pose", "gap in nats", "weight"), gaps)
     if null is None:
-        return "not searched, because the answer is not usable without it"
-    if not null["score"]:
-        return "the mirrored scan fits nowhere"
-    return f"{null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score"
+        told = "not searched, because the answer is not usable without it"
+    elif null["score"]:
+        told = f"{null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score"
+    else:
+        told = "the mirrored scan fits nowhere"
+    yield from ("", f"Null score: {told}")
 
 
-def _print_probabilities(one: Json) -> None:
-    """Print the probabilities and their thresholds."""
-    least = one["thresholds"]
-    print(f"\nProbabilities, with the prior probability {least['on_map']:.2f} of the map")
-    rows = [
-        ("by the model", one["by_model"], None),
-        ("among the alternatives", one["among"], None),
-        ("of the pose, their product", one["by_model"] * one["among"], least["usable_from"]),
-        ("explained", one["explained"], least["explained"]),
-    ]
-    print_table(("probability", "value", "threshold"), rows)
-
-
+@grouped
 def register(
     on: Annotated[str, argument("A map file.", "MAP")],
     scan: ScanArgument,
+    where: Where,
+    output: Output,
     pairs: Annotated[Text, option("JSON file: [[scan index, map index], ...]. Default: i with i.", "FILE")] = None,
     undirected: Undirected = False,
-    server: Server = None,
-    as_json: AsJson = False,
 ) -> None:
     """Find the pose from known correspondences; the answer is that of /v1/register."""
     body: Json = {"map": read_map_file(on), "scan": read_scan(scan)}
@@ -219,22 +196,21 @@ def register(
         body["correspondences"] = read_json(pairs)
     if undirected:
         body["options"] = {"oriented": False}
-    answer = ask("register", server, body)
-    if as_json:
-        print_json(answer)
-        return
+    names = {"/map": on, "/scan": scan} | ({} if pairs is None else {"/correspondences": pairs})
+    answer = where.ask("register", body, names=names)
     found = answer["diagnostics"]
     chi2 = "none" if found["chi2"] is None else f"{found['chi2']:.2f}"
     fit = f"{found['pairs']} pairs, chi2 {chi2} at {found['dof']} degrees of freedom"
-    print_rows([*verdict_rows(answer), ("fit", fit)])
+    output.print(answer, rows([*verdict_rows(answer), ("fit", fit)]))
 
 
+@grouped
 def vectorize(
     scan: ScanArgument,
+    where: Where,
+    output: Output,
     out: Annotated[File, option("Write the segments to this file, as a scan for locate.", "FILE")] = None,
     sigma: Annotated[Number, option("Standard deviation of the ranges. Default: estimated.", "METRES")] = None,
-    server: Server = None,
-    as_json: AsJson = False,
 ) -> None:
     """Cut ranges or points into segments; the answer is that of /v1/vectorize."""
     told = read_scan(scan)
@@ -242,18 +218,19 @@ def vectorize(
     sigma = told.get("sigma") if sigma is None else sigma
     if sigma is not None:
         asked["options"] = {"sigma": sigma}
-    answer = ask("vectorize", server, asked)
+    answer = where.ask("vectorize", asked, names={"": scan})
     if out is not None:
         kept: Json = {name: told[name] for name in ("frame_id", "stamp", "viewpoint") if name in told}
         kept |= {name: answer[name] for name in ("segments", "point_counts", "centroids", "spreads")}
         write_json({**kept, "sigma": answer["sigmas"]}, out)
-    if as_json:
-        print_json(answer)
-        return
-    rows = [
+    output.print(answer, _segments(answer))
+
+
+def _segments(answer: Json) -> Iterator[str]:
+    found = [
         (number, *segment, math.hypot(segment[2] - segment[0], segment[3] - segment[1]), points)
         for number, (segment, points) in enumerate(zip(answer["segments"], answer["point_counts"], strict=True))
     ]
-    print_table(("", "x1", "y1", "x2", "y2", "length", "points"), rows)
+    yield from table(("", "x1", "y1", "x2", "y2", "length", "points"), found)
     warnings = [("warning", f"{one['code']}: {one['message']}") for one in answer["warnings"]]
-    print_rows([("sigma", f"{answer['sigma']:.4f} m"), *warnings])
+    yield from rows([("sigma", f"{answer['sigma']:.4f} m"), *warnings])

@@ -1,4 +1,4 @@
-"""Options of several commands, and options that belong together as one argument of a command."""
+"""Options of several commands, options that belong together as one argument of a command, and help."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperArgument, TyperCommand
 
 
 def option(help: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
@@ -37,8 +38,6 @@ A_MAP = "A map file: json, yaml of map_server, dxf, svg, geojson or csv;"
 WRITE_MAP = "Write the map to this file: json, dxf, svg, geojson or csv."
 LIKELY = "PROBABILITY"
 
-Server = Annotated[Text, option("Use the service at this URL; the key is read from LINEFIX_KEY.", "URL", "--server")]
-AsJson = Annotated[bool, flag("Print the complete answer as JSON.", "--json")]
 MapArgument = Annotated[str, argument(f"{A_MAP} or the id of a stored map.", "MAP")]
 MapsArgument = Annotated[list[str], argument(f"{A_MAP} a folder of these; or the id of a stored map.", "MAP")]
 ScanArgument = Annotated[
@@ -47,8 +46,6 @@ ScanArgument = Annotated[
 Picture = Annotated[File, option("Draw the result to this PNG file.", "FILE")]
 OutMap = Annotated[File, option(WRITE_MAP, "FILE")]
 Undirected = Annotated[bool, flag("The directions of segments have no meaning.", "--undirected")]
-LogTopic = Annotated[Text, option("Topic of the scans; for CARMEN the kind of line. Default: that with most scans.")]
-TfNamespace = Annotated[Text, option("Namespace of transforms, in a bag of several robots: /robot1.", "NAMESPACE")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +56,18 @@ class UsableOptions:
         float, option("Prior probability that a scan was taken on the map.", LIKELY, min=0.5, max=1.0)
     ] = 0.9
     usable_from: Annotated[float, option("Minimum probability of a usable answer.", LIKELY, min=0.5, max=0.9999)] = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class TopicOptions:
+    """What to read of a log, as options."""
+
+    topic: Annotated[
+        Text, option("Topic of the scans; for CARMEN the kind of line. Default: that with most scans.", "TOPIC")
+    ] = None
+    tf_namespace: Annotated[
+        Text, option("Namespace of transforms, in a bag of several robots: /robot1.", "NAMESPACE")
+    ] = None
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
@@ -81,3 +90,17 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
     called.__signature__ = Signature([one.replace(kind=Parameter.KEYWORD_ONLY) for one in flat])  # type: ignore[attr-defined]
     return called
+
+
+class PlainCommand(TyperCommand):
+    """A command whose help has arguments as documents do: ``MAP... SCAN``, without braces and types of Python."""
+
+    def __init__(self, *positional: Any, **more: Any) -> None:
+        super().__init__(*positional, **more)
+        for one in self.params:
+            if isinstance(one, TyperArgument):
+                one.display_type_rich = lambda ctx: None  # type: ignore[method-assign]
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the parts of the usage line."""
+        return [piece.replace("{", "").replace("}", "") for piece in super().collect_usage_pieces(ctx)]

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, TextIO
 
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.text import Text
+from .options import flag
 
 Json = dict[str, Any]
-WIDEST = 10_000  # characters of a row
+Lines = Iterable[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """How an answer is printed, as an option."""
+
+    as_json: Annotated[bool, flag("Print the complete answer as JSON.", "--json")] = False
+
+    @property
+    def notes(self) -> TextIO:
+        """The stream for notes: with ``--json`` only documents are on stdout."""
+        return sys.stderr if self.as_json else sys.stdout
+
+    def print(self, answer: Any, lines: Lines) -> None:
+        """Print an answer: its document, or lines for people."""
+        if self.as_json:
+            print_json(answer)
+        else:
+            print_lines(lines)
 
 
 def print_json(answer: Any) -> None:
@@ -30,48 +49,32 @@ def write_json(document: Any, out: Path) -> None:
     out.write_bytes(encode(document) + b"\n")
 
 
-def console(width: int | None = None) -> Console:
-    """Return where people read, by default as wide as the terminal; nothing printed there is taken for markup."""
-    from rich.console import Console
-
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True, width=width)
-
-
-def plain(text: object) -> Text:
-    """Return text of a file or a server without control characters for a terminal."""
-    from rich.text import Text
-
-    return Text("".join(letter if letter.isprintable() else "?" for letter in str(text)))
+def print_lines(lines: Lines, where: TextIO | None = None) -> None:
+    """Print lines, by default on stdout, without control characters for a terminal."""
+    for line in lines:
+        print("".join(letter if letter.isprintable() else "?" for letter in line), file=where)
 
 
-def print_rows(rows: Sequence[tuple[str, str]]) -> None:
-    """Print names and what they are, one a line."""
-    width = max((len(name) for name, _ in rows), default=0) + 2
-    where = console()
-    for name, value in rows:
-        where.print(plain(name.ljust(width) + value))
+def rows(pairs: Iterable[tuple[str, str]], width: int = 0) -> Lines:
+    """Return names and what they are, one a line."""
+    found = list(pairs)
+    width = width or max((len(name) + 2 for name, _ in found), default=0)
+    return [name.ljust(width) + value for name, value in found]
 
 
-def noted(note: Json) -> str:
-    """Return the text of a note of an import or a log, with its count."""
-    return f"{note['message']} ({note['count']})" if note["count"] else str(note["message"])
-
-
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table; numbers stand on the right."""
-    from rich.measure import Measurement
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for number, name in enumerate(columns):
-        right = all(isinstance(row[number], int | float) for row in rows)
-        table.add_column(name, justify="right" if right else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*(plain(shown(cell)) for cell in row))
-    # As wide as its cells, whatever the terminal: a name or a number that is cut is lost.
-    where = console(WIDEST)
-    where.width = Measurement.get(where, where.options, table).maximum
-    where.print(table)
+def table(columns: Sequence[str], records: Iterable[Sequence[object]]) -> Lines:
+    """Return the lines of a table; numbers stand on the right."""
+    found = list(records)
+    cells = [columns, *([shown(value) for value in record] for record in found)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    right = [all(isinstance(record[number], int | float) for record in found) for number in range(len(columns))]
+    return [
+        "  ".join(
+            cell.rjust(width) if number else cell.ljust(width)
+            for cell, width, number in zip(row, widths, right, strict=True)
+        ).rstrip()
+        for row in cells
+    ]
 
 
 def shown(value: object) -> str:
@@ -81,23 +84,27 @@ def shown(value: object) -> str:
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
+def noted(note: Json) -> str:
+    """Return the text of a note of an import or a log, with its count."""
+    return f"{note['message']} ({note['count']})" if note["count"] else str(note["message"])
+
+
 def verdict_rows(answer: Json) -> list[tuple[str, str]]:
     """Return the rows that show a person whether a pose was found, and which."""
-    usable = "usable" if answer["usable"] else "not usable"
-    told = f"{answer['status']}, {usable}"
+    told = f"{answer['status']}, {'usable' if answer['usable'] else 'not usable'}"
     if answer.get("probability") is not None:
         told += f", probability {answer['probability']:.4f}"
-    rows = [("verdict", told), ("pose", pose_text(answer["pose"]))]
+    found = [("verdict", told), ("pose", pose_text(answer["pose"]))]
     covariance = answer["covariance"]
     if covariance is not None:
         x, y, theta = (math.sqrt(max(0.0, covariance[k][k])) for k in range(3))
-        rows.append(("sigma", f"x {x:.4f} m, y {y:.4f} m, theta {math.degrees(theta):.3f} degrees"))
+        found.append(("sigma", f"x {x:.4f} m, y {y:.4f} m, theta {math.degrees(theta):.3f} degrees"))
     if answer["unobservable"] is not None:
         dx, dy = answer["unobservable"]
-        rows.append(("free along", f"({dx:.3f}, {dy:.3f})"))
+        found.append(("free along", f"({dx:.3f}, {dy:.3f})"))
     for name in ("reasons", "warnings"):
-        rows += [(name.rstrip("s"), f"{one['code']}: {one['message']}") for one in answer.get(name, [])]
-    return rows
+        found += [(name.rstrip("s"), f"{one['code']}: {one['message']}") for one in answer.get(name, [])]
+    return found
 
 
 def pose_text(pose: Json | None) -> str:
@@ -116,9 +123,4 @@ def escaped(document: str) -> str:
     """
     if document.isascii() and "\x7f" not in document:
         return document
-    return "".join(letter if letter.isprintable() else _escape(letter) for letter in document)
-
-
-def _escape(letter: str) -> str:
-    units = letter.encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{int.from_bytes(units[k : k + 2], 'big'):04x}" for k in range(0, len(units), 2))
+    return "".join(one if one.isprintable() else json.dumps(one)[1:-1].replace("\x7f", "\\u007f") for one in document)

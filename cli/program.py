@@ -17,7 +17,7 @@ from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
 from .one_scan import explain, locate, register, vectorize
-from .options import Text, argument, flag, option
+from .options import PlainCommand, Text, argument, flag, option
 from .replay import replay
 from .ros2 import ros2
 
@@ -35,7 +35,7 @@ class Role(StrEnum):
 
 def key(
     name: Annotated[str, argument("Name of the key, for people; not secret.", "NAME")],
-    role: Annotated[list[Role] | None, option("Role of the key; repeat for more roles. Default: all.")] = None,
+    role: Annotated[list[Role] | None, option("Role of the key; repeat for more roles. Default: all.", "ROLE")] = None,
     maps: Annotated[Text, option("Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX")] = None,
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
@@ -59,7 +59,7 @@ def key(
 
 
 for command in (locate, explain, replay, analyze, batch, register, vectorize, key, ros2):
-    app.command()(command)
+    app.command(cls=PlainCommand)(command)
 app.add_typer(maps.app)
 
 

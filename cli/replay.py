@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated, TextIO
 
-from .asking import answering, server_at
-from .errors import CommandError, NoSuchMapError, RefusedError, refusing
-from .inputs import documents_of, draw_picture, read_target
-from .logs import opened, options_of, print_notes, scans_of
-from .options import AsJson, File, LogTopic, Server, TfNamespace, UsableOptions, argument, grouped, option
-from .printing import Json, plain, print_json, print_rows, print_table
+from .asking import Locate, Where
+from .errors import CommandError, NoSuchMapError, RefusedError
+from .inputs import NamedMap, draw_picture, places_of, read_maps, target_of
+from .logs import mount_of, opened, print_notes, scans_of
+from .options import File, TopicOptions, UsableOptions, argument, grouped, option
+from .printing import Json, Lines, Output, print_json, print_lines, rows, table
 from .progress import progress
-from .tracking import Frames, Stays, Tracker, map_of, pose_of
+from .tracking import Frames, Tracker, map_of, pose_of
 
 if TYPE_CHECKING:
-    from formats import Log, LoggedScan, StampedPose
+    from formats import Log, LoggedScan
     from registration import RigidTransform
 
 
 HOPELESS = 20  # scans from the first on
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
 HINT = "linefix map check MAP --log LOG tests the scale, the handedness and the directions of the map"
+FIELDS = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")  # of a line of --json
 
 
 class Mode(StrEnum):
@@ -42,6 +41,17 @@ class Mode(StrEnum):
 TRACK = Mode.TRACK
 
 
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A pose that was found; `round` is that of the clock of the log, `map_id` empty without several maps."""
+
+    stamp_ns: int
+    round: int
+    map_id: str
+    usable: bool
+    pose: RigidTransform
+
+
 @dataclass(slots=True)
 class Tally:
     """Counts and poses of the scans so far."""
@@ -50,20 +60,21 @@ class Tally:
     reasons: Counter[str] = field(default_factory=Counter)
     warnings: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)  # ms
-    rounds: dict[int, list[StampedPose]] = field(default_factory=dict)  # usable poses, by the round of their clock
-    on_map: dict[str, tuple[list[RigidTransform], list[RigidTransform]]] = field(default_factory=dict)  # usable, others
+    poses: list[Located] = field(default_factory=list)
     refused: CommandError | None = None  # the last
-    stays: Stays = field(default_factory=Stays)
 
     @property
     def count(self) -> int:
         """The number of scans so far."""
         return sum(self.verdicts.values())
 
+    @property
+    def usable(self) -> list[Located]:
+        """The usable poses so far."""
+        return [one for one in self.poses if one.usable]
+
     def take(self, one: LoggedScan, found: Json | CommandError) -> None:
         """Count an answer, and keep its pose."""
-        from formats import StampedPose
-
         if isinstance(found, CommandError):
             self.verdicts["refused"] += 1
             self.refused = found
@@ -73,19 +84,14 @@ class Tally:
         self.reasons.update(reason["code"] for reason in found["reasons"][:1])
         self.warnings.update(warning["code"] for warning in found["warnings"])
         self.times.append(found["timing_ms"]["total"])
-        self.stays.take(one.stamp_ns, found)
         if pose is not None:
-            self.on_map.setdefault(map_of(found) or "", ([], []))[0 if usable else 1].append(pose)
-            if usable:
-                self.rounds.setdefault(one.round, []).append(StampedPose(one.stamp_ns, pose))
+            self.poses.append(Located(one.stamp_ns, one.round, map_of(found) or "", usable, pose))
 
 
 @dataclass(frozen=True, slots=True)
-class ScanChoice:
+class ScanOptions:
     """Which scans of a log to localize, and how, as options."""
 
-    topic: LogTopic = None
-    tf_namespace: TfNamespace = None
     mount: Annotated[tuple[float, float, float] | None, option("Pose of the laser on the robot.", "X Y THETA")] = None
     mode: Annotated[Mode, option("track: the prior is by odometry from the last usable pose; global: no prior.")] = (
         TRACK
@@ -97,76 +103,58 @@ class ScanChoice:
 def replay(
     log: Annotated[Path, argument("A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.", "LOG")],
     on: Annotated[list[str], option("A map file, a folder, or the id of a stored map; repeatable.", "MAP", "--map")],
-    scans: ScanChoice,
+    source: TopicOptions,
+    scans: ScanOptions,
     usable: UsableOptions,
+    where: Where,
+    output: Output,
     out: Annotated[File, option("Write the usable poses to this file in the TUM format.", "FILE")] = None,
     picture: Annotated[File, option("Draw map and poses to this PNG file; usable poses are green.", "FILE")] = None,
-    server: Server = None,
-    as_json: AsJson = False,
 ) -> None:
     """Localize the scans of a log one after the other. With --json, print one line per scan.
 
     Poses are those of the robot if --mount or the log has the mount of the laser. Otherwise they are those of the
     laser.
     """
-    options = options_of(scans.topic, scans.tf_namespace, scans.mount)
-    told, opened_log = read_target(on), opened(log, options)
-    tally, frames = Tally(), Frames(options.mount)
+    mount, maps = mount_of(scans.mount), read_maps(on)
+    opened_log, tally, frames = opened(log, source, mount), Tally(), Frames(mount)
     broken: RefusedError | None = None
-    with locating(told, usable, server) as locate:
+    options = {"include": [], "max_alternatives": 0, **asdict(usable)}
+    with where.opened() as service:
+        locate = service.locating(target_of(maps), options, {**places_of(maps), "/scan": log.name})
         taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locate, taken, frames, scans.mode):
+            for one, found in located(locate, taken, frames, Tracker() if scans.mode is TRACK else None):
                 tally.take(one, found)
-                if as_json:
-                    print_json(_line(one, found, frames, several="maps" in told))
+                if output.as_json:
+                    print_json(_line(one, found, frames, several=len(maps) > 1))
         except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
             if not tally.count:
                 raise
             broken = error
     if out is not None:
-        _write_poses(tally, out, sys.stderr if as_json else sys.stdout)
+        _write_poses(tally, out, output.notes)
     if picture is not None:
-        _draw(documents_of(told, server), tally, picture)
-    _tell_log(opened_log, frames, sys.stderr if as_json else sys.stdout)
-    if not as_json:
-        _tell(tally)
+        _draw(maps, where, tally, picture)
+    print_notes(opened_log, output.notes)
+    print_lines(_log_lines(opened_log, frames), output.notes)
+    if not output.as_json:
+        print_lines(_lines(tally))
     if broken is not None:
         raise broken
     if tally.refused is not None and tally.count == tally.verdicts["refused"]:
         raise tally.refused
 
 
-@contextmanager
-def locating(target: Json, usable: UsableOptions, server: str | None) -> Iterator[Callable[[Json], Json]]:
-    """Give the function from scan and prior of a request to its answer: by this process, or by the server at a URL."""
-    options = {"include": [], "max_alternatives": 0, **asdict(usable)}
-    if server is not None:
-        with server_at(server) as remote:
-            yield lambda sought: remote.call("AssociateAnswer", "associate", {**target, **sought, "options": options})
-        return
-    with answering() as within:
-        from linefix.answering import locating as locating_on
-
-        answer = locating_on(target, options, within)
-
-    def here(sought: Json) -> Json:
-        with refusing():
-            return answer(sought)
-
-    yield here
-
-
 def located(
-    locate: Callable[[Json], Json], scans: Iterator[LoggedScan], frames: Frames, mode: Mode
+    locate: Locate, scans: Iterator[LoggedScan], frames: Frames, tracker: Tracker | None
 ) -> Iterator[tuple[LoggedScan, Json | RefusedError]]:
     """Yield each scan with its pose, or the reason why it is refused.
 
-    In mode track the prior comes from the answers before and odometry.
+    With a tracker the prior comes from the answers before and odometry.
     """
     from formats import scan_json
 
-    tracker = Tracker() if mode is Mode.TRACK else None
     refusals: list[str] | None = []  # None: one was taken
     for logged in scans:
         try:
@@ -204,70 +192,66 @@ def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[Logged
 
 
 def _line(one: LoggedScan, found: Json | CommandError, frames: Frames, *, several: bool) -> Json:
-    refused = isinstance(found, CommandError)
     answer: Json = {"usable": False, "reasons": []} if isinstance(found, CommandError) else found
-    fields = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")
-    return {
-        "stamp": one.stamp,
-        **{name: answer.get(name) for name in fields},
-        "child_frame_id": frames.name,
-        "error": str(found) if refused else None,
-        **({"map_id": None if refused else map_of(answer)} if several else {}),
-    }
+    line = {"stamp": one.stamp, **{name: answer.get(name) for name in FIELDS}, "child_frame_id": frames.name}
+    line["error"] = str(found) if isinstance(found, CommandError) else None
+    return {**line, "map_id": map_of(answer)} if several else line
 
 
 def _write_poses(tally: Tally, out: Path, where: TextIO) -> None:
     """Write the usable poses in the order of their stamps; those after a clock was set back to a file of their own."""
-    from formats import write_tum
+    from formats import StampedPose, write_tum
 
-    first, *others = sorted(tally.rounds.items()) or [(0, [])]
-    for number, (_, poses) in enumerate([first, *others], 1):
+    usable = sorted(tally.usable, key=lambda one: (one.round, one.stamp_ns))
+    rounds = [list(poses) for _, poses in groupby(usable, key=lambda one: one.round)] or [[]]
+    for number, poses in enumerate(rounds, 1):
         file = out if number == 1 else out.with_stem(f"{out.stem}-{number}")
-        in_order = {one.stamp_ns: one for one in sorted(poses, key=lambda one: one.stamp_ns)}
-        write_tum(in_order.values(), file)
-        if others:
-            seconds = f"{min(in_order) / 1e9:.3f} to {max(in_order) / 1e9:.3f}"
-            print(f"{'poses':10}part {number} of the log, stamps {seconds}, in {file}", file=where)
+        stamped = {one.stamp_ns: StampedPose(one.stamp_ns, one.pose) for one in poses}
+        write_tum(stamped.values(), file)
+        if len(rounds) > 1:
+            seconds = f"{poses[0].stamp_ns / 1e9:.3f} to {poses[-1].stamp_ns / 1e9:.3f}"
+            print_lines(rows([("poses", f"part {number} of the log, stamps {seconds}, in {file}")], 10), where)
 
 
-def _draw(documents: dict[str, Json], tally: Tally, picture: Path) -> None:
+def _draw(maps: Sequence[NamedMap], where: Where, tally: Tally, picture: Path) -> None:
     """Draw the map and the poses on it; of several maps those with a usable pose, each to a file with its name."""
-    several = len(documents) > 1
-    visited = {stay.map_id for stay in tally.stays.found}
-    for name, document in documents.items():
-        if not several or name in visited:
-            usable, others = tally.on_map.get(name if several else "", ([], []))
-            draw_picture(document, picture.with_stem(f"{picture.stem}-{name}") if several else picture, usable, others)
+    several = len(maps) > 1
+    for one in maps:
+        mine = [pose for pose in tally.poses if pose.map_id == (one.name if several else "")]
+        usable, others = ([pose.pose for pose in mine if pose.usable is kind] for kind in (True, False))
+        if usable or not several:
+            out = picture.with_stem(f"{picture.stem}-{one.name}") if several else picture
+            draw_picture(where.whole_map(one.document), out, usable, others)
 
 
-def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
-    """Print what was read of the log, and whose poses are printed."""
+def _log_lines(log: Log, frames: Frames) -> Lines:
+    """Return what was read of the log, and whose poses are printed."""
     from linefix.ranges import SPEED, TURN
 
-    print_notes(log, where)
-    codes = {note.code for note in log.report.assumed}
+    codes, found = {note.code for note in log.report.assumed}, []
     if "no_odometry" in codes:
-        print(f"{'prior':10}none without odometry: each scan is searched on the whole map", file=where)
+        found.append(("prior", "none without odometry: each scan is searched on the whole map"))
     if "motion" in codes:
         wider = f"{SPEED:.1f} m/s and {TURN:.1f} rad/s"
-        print(f"{'poses':10}covariances include an unknown motion of {wider} for scans without odometry", file=where)
-    print(f"{'poses':10}{plain(frames.told)}", file=where)
+        found.append(("poses", f"covariances include an unknown motion of {wider} for scans without odometry"))
+    return rows([*found, ("poses", frames.told)], 10)
 
 
-def _tell(tally: Tally) -> None:
-    count = max(1, tally.count)
-    table = [(verdict, number, f"{100.0 * number / count:.1f} %") for verdict, number in tally.verdicts.most_common()]
-    print_table(("verdict", "scans", "fraction"), table)
-    if tally.stays.found:
-        columns = ("map", "from", "to", "usable scans")
-        print_table(columns, [(one.map_id, one.first, one.last, one.scans) for one in tally.stays.found])
-    if tally.reasons:
-        print_table(("why not usable", "scans"), tally.reasons.most_common())
-    if tally.warnings:
-        print_table(("warning", "scans"), tally.warnings.most_common())
-    if sum(map(len, tally.rounds.values())) < FEW * tally.count or "map_scale" in tally.warnings:
-        print_rows([("hint", HINT)])
+def _lines(tally: Tally) -> Iterator[str]:
+    count, usable = max(1, tally.count), tally.usable
+    verdicts = [(name, number, f"{100.0 * number / count:.1f} %") for name, number in tally.verdicts.most_common()]
+    yield from table(("verdict", "scans", "fraction"), verdicts)
+    stays = [(name, list(poses)) for name, poses in groupby(usable, key=lambda one: one.map_id) if name]
+    if stays:
+        parts = [(name, 1e-9 * poses[0].stamp_ns, 1e-9 * poses[-1].stamp_ns, len(poses)) for name, poses in stays]
+        yield from table(("map", "from", "to", "usable scans"), parts)
+    for name, counts in (("why not usable", tally.reasons), ("warning", tally.warnings)):
+        if counts:
+            yield from table((name, "scans"), counts.most_common())
+    if len(usable) < FEW * tally.count or "map_scale" in tally.warnings:
+        yield from rows([("hint", HINT)])
     if tally.refused is not None:
-        print_rows([("refused", str(tally.refused))])
+        yield from rows([("refused", str(tally.refused))])
     if tally.times:
-        print_rows([("time", f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most")])
+        told = f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most"
+        yield from rows([("time", told)])

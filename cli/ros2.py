@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from .asking import Where
 from .errors import RefusedError, WrongUseError
 from .inputs import read_maps
 from .options import File, Text, Texts, UsableOptions, flag, grouped, option
@@ -84,7 +85,7 @@ class RobotOptions:
         Text, chosen("Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE")
     ] = None
     frame_prefix: Annotated[str, option("Prefix of all frames of the robot, such as robot1/.", "PREFIX")] = ""
-    agree: Annotated[int, option("Number of scans that have to agree on a published pose.", min=1, max=100)] = 3
+    agree: Annotated[int, option("Number of scans that have to agree on a published pose.", "N", min=1, max=100)] = 3
     when: Annotated[Literal["start", "lost", "always"], option(WHEN)] = "start"
     min_sigma: Annotated[float, option(f"{LEAST} of the position in initialpose.", "METRES", min=0.0, max=10.0)] = 0.05
     min_sigma_theta: Annotated[
@@ -120,7 +121,16 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
     """
     try:
-        from ros2 import ConnectionRefusedError, Node, NodeOptions, OptionError, domain_of
+        from ros2 import (
+            ConnectionRefusedError,
+            Node,
+            NodeOptions,
+            OptionError,
+            checked_namespace,
+            domain_of,
+            namespace_of,
+            remapping_of,
+        )
     except ModuleNotFoundError:
         raise RefusedError(
             'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
@@ -136,7 +146,10 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     names, topics = given.pop("on"), tuple(given.pop("scan") or ("scan",))
     given["map_topic"] = None if names else robot.map_topic
     try:
-        given["namespace"], remappings = _names(topics, robot.namespace, rules)
+        remappings = dict(map(remapping_of, rules))
+        remappings.pop("__node", None)
+        chosen = remappings.pop("__ns", robot.namespace)
+        given["namespace"] = checked_namespace(namespace_of(topics) if chosen is None else chosen)
         options = NodeOptions(scans=topics, remappings=remappings, domain=domain_of(os.environ), **given)
         maps = _maps_at(names) if names else None
         node = Node(options, maps)
@@ -176,34 +189,23 @@ def _started(options: NodeOptions, maps: Maps | None) -> str:
     )
 
 
-def _names(scans: tuple[str, ...], namespace: str | None, rules: list[str]) -> tuple[str, dict[str, str]]:
-    """Return the namespace and the remappings of topics; ``__ns`` and ``__node`` are remapped as in ROS."""
-    from ros2 import checked_namespace, namespace_of, remapping_of
-
-    remappings = dict(remapping_of(rule) for rule in rules)
-    remappings.pop("__node", None)
-    remapped = remappings.pop("__ns", None)
-    chosen = remapped if remapped is not None else namespace
-    return checked_namespace(namespace_of(scans) if chosen is None else chosen), remappings
-
-
 def _maps_at(names: Sequence[str]) -> Maps:
     import linefix
     from ros2 import Maps
 
-    documents = read_maps(names)
-    frames = {name: _frame_of(document, name) for name, document in documents.items()}
-    several = len(documents) > 1
+    documents: dict[str, Json] = {}
+    for one in read_maps(names):
+        if one.name in documents:
+            raise WrongUseError(f"found the map {one.name} twice, expected each map once; omit one of them")
+        documents[one.name] = Where().whole_map(one.document)
+    frames = {name: document.get("frame_id") or "map" for name, document in documents.items()}
+    for name, frame in frames.items():
+        if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
+            raise RefusedError(
+                f"{name}: found a frame_id that is not a name, expected at most "
+                f"{MAX_FRAME} printable characters; correct it in the map file"
+            )
     with needing_formats("a map"):
+        several = len(documents) > 1
         index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
     return Maps(index, frames)
-
-
-def _frame_of(document: Json, name: str) -> str:
-    frame = document.get("frame_id") or "map"
-    if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
-        raise RefusedError(
-            f"{name}: found a frame_id that is not a name, expected at most "
-            f"{MAX_FRAME} printable characters; correct it in the map file"
-        )
-    return frame

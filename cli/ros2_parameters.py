@@ -46,39 +46,44 @@ def parameters_of(file: Path, namespace: str | None = None, known: Container[str
         section = _with_maps(sections.get((above, node), {}), file)
         # Parameters of all nodes may be meant for others.
         values.update({name: value for name, value in section.items() if node == NODE or name in known})
-    return {key: value for key, value in values.items() if value is not None}
+    return values
 
 
 def given_parameter(rule: str) -> dict[str, Any]:
     """Return a parameter of the command line, ``name:=value``, by the name of its option; raises `WrongUseError`."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    name, found, text = rule.partition(":=")
-    try:
-        value = YAML(typ="safe").load(text) if len(text) <= MAX_PARAMETERS else None
-    except (YAMLError, ValueError, RecursionError):
-        value = None
+    name, _, text = rule.partition(":=")
     node, _, name = name.rpartition(":")
-    if not found or not name or value is None or node.strip("/").rpartition("/")[2] not in ("", NODE):
+    value = _yaml(text)
+    if not name or value is None or node.strip("/").rpartition("/")[2] not in ("", NODE):
         raise WrongUseError(f"-p: found {rule[:80]!r}, expected NAME:=VALUE, such as agree:=5")
     return _with_maps({name: value}, Path("-p"))
 
 
+def _yaml(text: str) -> Any:
+    """Return the value of a text in YAML without merge keys; None where it is none, or too long."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        return YAML(typ="safe").load(text) if len(text) <= MAX_PARAMETERS and "<<" not in text else None
+    except (YAMLError, ValueError, RecursionError):
+        return None
+
+
 def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:
     """Return a section with `map`, a text, or `maps`, a list, as the option that takes both; raises `WrongUseError`."""
-    given = {name: value for name in ("map", "maps") if (value := section.get(name)) is not None}
-    others = {name: value for name, value in section.items() if name not in ("map", "maps")}
-    if not given:
+    others = {name: value for name, value in section.items() if value is not None}
+    one, several = others.pop("map", None), others.pop("maps", None)
+    if one is None and several is None:
         return others
-    if len(given) == 2:
+    if one is not None and several is not None:
         raise WrongUseError(f"{file}: found map and maps in one section, expected one of them")
-    (name, value), *_ = given.items()
-    maps = [value] if name == "map" else value
-    if not (isinstance(maps, list) and all(isinstance(one, str) for one in maps)):
-        expected = "the name of a map" if name == "map" else "a list of names of maps, such as [hq-1.yaml, hq-2.yaml]"
-        raise WrongUseError(f"{file}: {name}: found {str(value)[:80]!r}, expected {expected}")
-    return {**others, "on": maps}
+    maps = several if one is None else [one]
+    if isinstance(maps, list) and all(isinstance(name, str) for name in maps):
+        return {**others, "on": maps}
+    expected = "maps: found {}, expected a list of names of maps, such as [hq-1.yaml, hq-2.yaml]"
+    expected = expected if one is None else "map: found {}, expected the name of a map"
+    raise WrongUseError(f"{file}: " + expected.format(repr(str(several if one is None else one)[:80])))
 
 
 def robots_of(file: Path) -> list[str]:
@@ -88,28 +93,18 @@ def robots_of(file: Path) -> list[str]:
 
 def _sections_of(file: Path) -> Sections:
     """Return the sections of the node by namespace and name of the node."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     expected = f"expected {NODE}: ros__parameters: name: value"
     try:
-        with file.open(encoding="utf-8") as stream:
-            text = stream.read(MAX_PARAMETERS + 1)
-        if len(text) > MAX_PARAMETERS or "<<" in text:
-            raise WrongUseError(f"{file}: {expected}, in at most {MAX_PARAMETERS} characters without merge keys")
-        document = YAML(typ="safe").load(text)
+        with file.open(encoding="utf-8", errors="replace") as stream:
+            document = _yaml(stream.read(MAX_PARAMETERS + 1))
     except OSError as error:
         raise WrongUseError(f"{file}: {error.strerror}") from None
-    except (YAMLError, ValueError, RecursionError):
-        raise WrongUseError(f"{file}: not YAML; {expected}") from None
-    if not isinstance(document, dict):
-        raise WrongUseError(f"{file}: {expected}")
     sections: Sections = {}
-    for name, inner in document.items():
+    for name, inner in document.items() if isinstance(document, dict) else ():
         above, _, node = str(name).strip("/").rpartition("/")
         parameters = inner.get("ros__parameters") if isinstance(inner, dict) else None
         if node in (NODE, ANY) and isinstance(parameters, dict):
             sections[above, node] = {str(key): value for key, value in parameters.items()}
     if not sections:
-        raise WrongUseError(f"{file}: {expected}")
+        raise WrongUseError(f"{file}: {expected}, in YAML of at most {MAX_PARAMETERS} characters without merge keys")
     return sections

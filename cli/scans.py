@@ -22,7 +22,6 @@ FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
 LOST = re.compile(r"A message was lost!!!.*?---\s*\n", re.DOTALL)  # of `ros2 topic echo`
 WORDS = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf, "nan": math.nan, "-nan": math.nan}  # of `rostopic echo`
-OF_POSE = [("position", key) for key in "xyz"] + [("orientation", key) for key in "xyz"]
 NEXT = "\n---"  # between the messages of `ros2 topic echo`
 
 
@@ -45,11 +44,13 @@ def bytes_of(name: str) -> bytes:
     return data.removeprefix(BYTE_ORDER_MARK)
 
 
-def json_of(data: bytes, name: str, *, infinite: bool = False) -> Any:
-    """Parse the JSON of a file, which may contain NaN and Infinity where so stated.
+def read_json(name: str, data: bytes | None = None) -> Any:
+    """Return the content of a file of JSON; `data` is its content where it is read already, with NaN and Infinity.
 
     Raises
     ------
+    WrongUseError
+        As `bytes_of`.
     RefusedError
         When it is not JSON, or has more values than any request may have.
     """
@@ -58,16 +59,11 @@ def json_of(data: bytes, name: str, *, infinite: bool = False) -> Any:
     from linefix.documents.reading import parse
 
     try:
-        return parse(data, Limits(values=MAX_VALUES))
+        return parse(bytes_of(name) if data is None else data, Limits(values=MAX_VALUES))
     except (NotJsonError, TooManyError) as error:
-        if infinite and "NaN and Infinity" in str(error):
+        if data is not None and "NaN and Infinity" in str(error):
             return json.loads(data)
         raise RefusedError(f"{name}: not JSON: {error}") from None
-
-
-def read_json(name: str) -> Any:
-    """Return the content of a file of JSON, as by `bytes_of` and `json_of`."""
-    return json_of(bytes_of(name), name)
 
 
 @contextmanager
@@ -85,8 +81,7 @@ def needing_formats(what: str) -> Iterator[None]:
     except ModuleNotFoundError:
         raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
     except InputError as error:
-        told = f"--point: {error.message}" if error.argument == "inside" else str(error)
-        raise RefusedError(told) from None
+        raise RefusedError(f"--point: {error.message}" if error.argument == "inside" else str(error)) from None
 
 
 def read_scan(name: str) -> Json:
@@ -102,22 +97,22 @@ def read_scan(name: str) -> Json:
     RefusedError
         When the content is neither JSON nor YAML, or no scan.
     """
-    message = _parsed(bytes_of(name), name)
+    data = bytes_of(name)
+    message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
     scan: Json = _unwrapped(message, name)
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
-    for part in (scan, *_views(scan)):
-        if isinstance(part.get("laser"), dict):
+    views = scan.get("views")
+    for part in (scan, *(views if isinstance(views, list) else [])):
+        if isinstance(part, dict) and isinstance(part.get("laser"), dict):
             part["laser"] = _finite(part["laser"], name)
     return scan
 
 
-def _parsed(data: bytes, name: str) -> Any:
-    """Return the content of JSON or YAML; text that begins with a bracket is JSON."""
-    if data.lstrip()[:1] in (b"{", b"["):
-        return json_of(data, name, infinite=True)
+def _yaml(data: bytes, name: str) -> Any:
+    """Return the first message of YAML."""
     with needing_formats(f"reading {name} as YAML"):
         from formats.yaml import yaml_of
 
@@ -138,18 +133,13 @@ def _unwrapped(message: Json, name: str) -> Json:
     ranges = scan.get("ranges")
     if not (isinstance(ranges, list) and {"start_angle", "end_angle"} <= scan.keys()):
         return scan
-    if any(scan.get("pose", {}).get(part, {}).get(key) for part, key in OF_POSE):
+    if any(scan.get("pose", {}).get(part, {}).get(key) for part in ("position", "orientation") for key in "xyz"):
         raise RefusedError(
             f"{name}: is a foxglove.LaserScan with a pose in another frame; expected one in the frame of its sensor. "
             "Send the pose as a view"
         )
     step = (scan["end_angle"] - scan["start_angle"]) / max(1, len(ranges) - 1)
     return {"laser": {"angle_min": scan["start_angle"], "angle_increment": step, "ranges": ranges}}
-
-
-def _views(scan: Json) -> list[Json]:
-    views = scan.get("views")
-    return [view for view in views if isinstance(view, dict)] if isinstance(views, list) else []
 
 
 def _finite(laser: Json, name: str) -> Json:
@@ -163,7 +153,7 @@ def _finite(laser: Json, name: str) -> Json:
         When an array was cut.
     """
     laser = {field: value for field, value in laser.items() if field != "intensities"}
-    ranges, most = laser.get("ranges"), laser.get("range_max")
+    ranges = laser.get("ranges")
     if isinstance(ranges, str):
         raise RefusedError(
             f"{name}: has no ranges, but '{ranges[:60]}'; expected numbers: record the scan without --noarr or --no-arr"
@@ -175,16 +165,15 @@ def _finite(laser: Json, name: str) -> Json:
             f"{name}: the ranges end in '...' after {len(ranges) - 1} values; expected all of them: "
             "record the scan with ros2 topic echo --full-length"
         )
-    most = WORDS.get(most.lower(), most) if isinstance(most, str) else most
+    most = _number(laser.get("range_max"))
     if isinstance(most, float) and not math.isfinite(most):
         most = laser["range_max"] = None
-    beyond = None if most is None else 2.0 * most
-    laser["ranges"] = [_range(value, beyond) for value in ranges]
+    known = {math.inf: None if most is None else 2.0 * most}
+    read = map(_number, ranges)
+    laser["ranges"] = [known.get(r) if isinstance(r, float) and not math.isfinite(r) else r for r in read]
     return laser
 
 
-def _range(value: Any, beyond: float | None) -> Any:
-    value = WORDS.get(value.lower(), value) if isinstance(value, str) else value
-    if not isinstance(value, float) or math.isfinite(value):
-        return value
-    return beyond if value == math.inf else None
+def _number(value: Any) -> Any:
+    """Return the number that a word of `rostopic echo` stands for, anything else as it is."""
+    return WORDS.get(value.lower(), value) if isinstance(value, str) else value

@@ -1,9 +1,9 @@
-"""A robot along a log: whose poses are located, the prior of the next scan by odometry, and the maps that it was on."""
+"""A robot along a log: whose poses are located, and the prior of the next scan by odometry."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from .errors import RefusedError
@@ -63,15 +63,16 @@ class Frames:
 
     def _decide(self, one: LoggedScan) -> None:
         mount = one.mount
+        self.of_laser = mount is None
         if mount is None:
-            self.name, self.of_laser = one.frame_id or "laser", True
+            self.name = one.frame_id or "laser"
             self.told = f"of the laser (frame {self.name}); set --mount X Y THETA for those of the robot"
             return
         self.name = one.base_frame
-        by = "from --mount" if self.given is not None else "from the log"
         way = "upside down " if one.flipped else ""
         where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        self.told = f"of the robot (frame {self.name}), with {one.frame_id} mounted {way}at {where}, {by}"
+        by = "the log" if self.given is None else "--mount"
+        self.told = f"of the robot (frame {self.name}), with {one.frame_id} mounted {way}at {where}, from {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:
@@ -145,31 +146,3 @@ def pose_of(answer: Json) -> RigidTransform | None:
 def map_of(answer: Json) -> str | None:
     """Return of several maps the one that the pose is on."""
     return answer["map"]["map_id"] if "maps" in answer and answer["map"] else None
-
-
-@dataclass(slots=True)
-class Stay:
-    """A part of a log with usable poses on one map; `first` and `last` are stamps of scans, seconds."""
-
-    map_id: str
-    first: float
-    last: float
-    scans: int = 1
-
-
-@dataclass(slots=True)
-class Stays:
-    """The stays so far, in the order of the log; none where a single map is searched."""
-
-    found: list[Stay] = field(default_factory=list)
-
-    def take(self, stamp_ns: int, answer: Json) -> None:
-        """Add an answer; one that is not usable begins no stay and ends none."""
-        map_id = map_of(answer)
-        if not answer["usable"] or map_id is None:
-            return
-        stamp, last = 1e-9 * stamp_ns, self.found[-1] if self.found else None
-        if last is None or last.map_id != map_id:
-            self.found.append(Stay(map_id, stamp, stamp))
-        else:
-            last.last, last.scans = stamp, last.scans + 1

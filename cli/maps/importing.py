@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
-from ..asking import answering, server_at
-from ..errors import Asked, WrongUseError
+from ..asking import Where, answering
+from ..errors import WrongUseError
 from ..inputs import draw_picture, existing, write_document
-from ..options import AsJson, File, Number, OutMap, Picture, Server, Text, Texts, argument, flag, grouped, option
-from ..printing import Json, noted, print_json, print_rows
+from ..logs import some_scans
+from ..options import File, Number, OutMap, Picture, Text, Texts, TopicOptions, argument, flag, grouped, option
+from ..printing import Json, Output, noted, rows
 from ..scans import needing_formats
-from .checking import check_rows, checked, samples_of
+from .checking import SAMPLES, check_rows, of_sensor
 from .updating import draw_changes, update_by_drive, update_rows
-
-if TYPE_CHECKING:
-    from formats import ImportOptions
 
 IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
 UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit."
@@ -25,7 +23,7 @@ UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per u
 
 @dataclass(frozen=True, slots=True)
 class SaidOfFile:
-    """Facts that a file does not state itself, as options; by default detected."""
+    """Facts that a file does not state itself, as options; each is a field of the form of ``/v1/maps:import``."""
 
     units: Annotated[Text, option(UNIT, "UNIT")] = None
     layers: Annotated[Texts, option("Layers of a drawing to read, such as *WALL*; repeatable.", "PATTERN")] = None
@@ -37,31 +35,14 @@ class SaidOfFile:
     thickness: Annotated[Number, option("Thickness of walls drawn by centre lines.", "METRES")] = None
     directions: Annotated[Text, option("drawn: free space is left of each line; none: unknown.", "WHAT")] = None
     local_metres: Annotated[bool, flag("The coordinates of a GeoJSON are metres.", "--local-metres")] = False
-    topic: Annotated[Text, option("Topic of the grid in a bag.")] = None
+    topic: Annotated[Text, option("Topic of the grid in a bag.", "TOPIC")] = None
     unknown: Annotated[Text, option("Grey value of unknown cells in a picture, 0 to 255, or none.", "GREY")] = None
 
     @property
-    def options(self) -> ImportOptions:
-        """The same for `formats`; raises `InputError` where a value is out of its range."""
-        from formats import ImportOptions
-
-        said: dict[str, Any] = {name: value for name, value in asdict(self).items() if value is not None}
-        said["layers"] = tuple(name.strip() for one in self.layers or () for name in one.split(",") if name.strip())
-        said["where"] = tuple(self.where or ())
-        said["units"] = _units(self.units)
-        if self.unknown and self.unknown.isdecimal():
-            said["unknown"] = int(self.unknown)
-        if "point" in said:
-            said["inside"] = (said.pop("point"),)
-        return ImportOptions(**said)
-
-    @property
     def fields(self) -> Json:
-        """The same as fields of a form, which are lists of text."""
-        said = {name: value for name, value in asdict(self).items() if value is not None}
-        said["local_metres"] = ["true"] if self.local_metres else []
-        if self.point:
-            said["point"] = f"{self.point[0]} {self.point[1]}"
+        """The form: each field is a list of text."""
+        said = {name: value for name, value in asdict(self).items() if value is not None and value is not False}
+        said |= {} if self.point is None else {"point": f"{self.point[0]} {self.point[1]}"}
         return {name: value if isinstance(value, list) else [str(value)] for name, value in said.items()}
 
 
@@ -69,27 +50,27 @@ class SaidOfFile:
 def import_map(
     file: Annotated[Path, argument("Map file: yaml of map_server, dxf, svg, geojson, csv, json, or a bag.", "FILE")],
     said: SaidOfFile,
+    where: Where,
+    output: Output,
     out: OutMap = None,
     picture: Picture = None,
     log: Annotated[File, option("A log of the building: find where the walls' surfaces are.", "FILE")] = None,
     update: Annotated[bool, flag("Improve the map with the scans of --log; see map update.", "--update")] = False,
-    server: Server = None,
-    as_json: AsJson = False,
 ) -> None:
     """Read a map of another tool, report what was read and what is doubtful, and write it as a map file."""
-    if log is not None and server is not None:
+    if log is not None and where.server is not None:
         raise WrongUseError(
             "--log: not possible with --server; omit --server, and store the map with linefix map put afterwards"
         )
     if update and log is None:
         raise WrongUseError("--update: found no log, expected one; add --log FILE with scans of the building")
-    answer = imported(file, said, server)
+    answer = imported(file, said, where)
     if log is not None:
         answer = beside_log(answer, file, said, log)
-    rows = [*report_rows(answer), *check_rows(answer["check"])]
+    found = [*report_rows(answer), *check_rows(answer["check"])]
     if update and log is not None:
         updated = update_by_drive(answer["map"], log)
-        rows += update_rows(updated, answer["map"])
+        found += update_rows(updated, answer["map"])
         if picture is not None:
             draw_changes(answer["map"], updated, picture)
         answer = {**answer, "map": updated.pop("map"), "update": updated}
@@ -97,32 +78,25 @@ def import_map(
         draw_picture(answer["map"], picture)
     if out is not None:
         write_document(answer["map"], out)
-    if as_json:
-        print_json(answer)
-    else:
-        print_rows(rows)
+    output.print(answer, rows(found))
 
 
-def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
-    """Return what ``/v1/maps:import`` answers to a file.
-
-    Raises
-    ------
-    WrongUseError
-        When there is no such file.
-    """
-    existing(file)
-    if server is not None:
-        with server_at(server) as remote:
-            return remote.import_map(_with_what_it_names(file), said.fields)
-    with needing_formats(f"reading {file.name}"), answering(Asked(files=(file.name,))) as within:
+def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
+    """Return what ``/v1/maps:import`` answers to a file; raises `WrongUseError` when there is no such file."""
+    files = [existing(file)] if where.server is None else _with_what_it_names(existing(file))
+    names = {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(said)} | {"/inside": "--point"}
+    names |= {"": file.name, "/files": file.name} | {f"/files/{number}": one.name for number, one in enumerate(files)}
+    if where.server is not None:
+        sent = [(one.name, one.read_bytes()) for one in files]
+        return where.ask("import_map", sent, said.fields, names=names)
+    with answering(names) as within, needing_formats(f"reading {file.name}"):
         from formats import read_map
         from linefix.answering import check_import
         from linefix.operations import Stopwatch
+        from service.importing.fields import options_of
 
-        options, watch = said.options, Stopwatch()
-        with needing_formats(f"reading {file.name}"):
-            return check_import(read_map(file, options), watch, within)
+        watch = Stopwatch()
+        return check_import(read_map(file, options_of(said.fields)), watch, within)
 
 
 def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
@@ -133,8 +107,8 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
     dict
         As of `imported`; ``check`` has the scans too.
     """
-    scans = samples_of(log)
-    found = checked(answer["map"], scans)
+    scans = {"scans": [of_sensor(one) for one in some_scans(log, SAMPLES, TopicOptions())]}
+    found = Where().ask("check_map", answer["map"], scans)
     thicker, line_map = found["samples"]["wall_thickness"], answer["map"]
     meta = line_map["meta"]
     made_of_centres = "thickness" in meta or not line_map["oriented"]
@@ -148,11 +122,11 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
         message = f"walls are {thickness:.2f} m thick"
     else:
         return {**answer, "check": found}
-    again = imported(file, changed, None)
+    again = imported(file, changed, Where())
     kept = [note for note in again["report"]["assumed"] if note["code"] != replaced]
     told = {"code": f"{replaced.partition('_')[0]}_found", "count": 0}
     again["report"]["assumed"] = [*kept, {**told, "message": f"{message}, estimated from scans of {log.name}"}]
-    return {**again, "check": checked(again["map"], scans)}
+    return {**again, "check": Where().ask("check_map", again["map"], scans)}
 
 
 def _with_what_it_names(file: Path) -> list[Path]:
@@ -166,23 +140,15 @@ def _with_what_it_names(file: Path) -> list[Path]:
     return [file, picture] if named and picture.is_file() else [file]
 
 
-def _units(text: str | None) -> str | float | None:
-    """Return metres per unit where the text is a number, else the name of a unit."""
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return text
-
-
 def report_rows(answer: Json) -> list[tuple[str, str]]:
     """Return the report of an import as text for people."""
     report, line_map = answer["report"], answer["map"]
     directed = "free space on the left" if line_map["oriented"] else "directions mean nothing"
     points = f", {len(line_map['points'])} points" if line_map.get("points") else ""
-    rows = [
+    found = [
         ("from", f"{', '.join(report['files'])} ({report['format']})"),
         ("map", f"{len(line_map['segments'])} segments, {directed}{points}"),
     ]
     for kind in ("read", "merged", "dropped", "assumed"):
-        rows += [(kind, noted(note)) for note in report[kind]]
-    return rows
+        found += [(kind, noted(note)) for note in report[kind]]
+    return found

@@ -5,63 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..asking import keeping
-from ..errors import WrongUseError
-from ..inputs import MAP_ID, document_at, draw_picture, read_map_file, write_document
-from ..options import WRITE_MAP, AsJson, File, MapArgument, Server, argument, option
-from ..printing import print_json, print_rows, print_table
+from ..asking import Where
+from ..errors import NoServerError, WrongUseError
+from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id, write_document
+from ..options import WRITE_MAP, File, MapArgument, argument, grouped, option
+from ..printing import Json, Output, print_json, rows, table
 
-MapId = Annotated[str, argument("Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -", "ID")]
-
-
-def put(
-    map_id: MapId,
-    file: Annotated[str, argument("A map file: json, or another file that map import reads.", "FILE")],
-    server: Server = None,
-    as_json: AsJson = False,
-) -> None:
-    """Store a map under an id."""
-    document = read_map_file(file)
-    with keeping(server) as maps:
-        told = maps.put(_checked(map_id), document)
-    if as_json:
-        print_json(told)
-    else:
-        print_rows([("stored", f"{told['map_id']}, revision {told['revision']}, {told['segment_count']} segments")])
-
-
-def list_maps(server: Server = None, as_json: AsJson = False) -> None:
-    """List the stored maps, by id; with --json one a line."""
-    with keeping(server) as maps:
-        found = list(maps.maps())
-    if as_json:
-        for one in found:
-            print_json(one)
-        return
-    columns = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
-    names = ("map_id", "revision", "segment_count")
-    rows = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in found]
-    print_table(columns, rows)
-
-
-def get(
-    map_id: MapId,
-    out: Annotated[File, option(f"{WRITE_MAP} Default: print it.", "FILE")] = None,
-    server: Server = None,
-) -> None:
-    """Print a stored map as JSON, or write it to a file."""
-    with keeping(server) as maps:
-        document = maps.get(_checked(map_id))
-    if out is None:
-        print_json(document)
-    else:
-        write_document(document, out)
-
-
-def remove(map_id: MapId, server: Server = None) -> None:
-    """Forget a stored map."""
-    with keeping(server) as maps:
-        maps.remove(_checked(map_id))
+MAX_PAGES = 100_000  # of a list of maps
+COLUMNS = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
 
 
 def _checked(map_id: str) -> str:
@@ -70,11 +21,65 @@ def _checked(map_id: str) -> str:
     return map_id
 
 
+MapId = Annotated[str, argument("Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -", "ID")]
+MapFile = Annotated[str, argument("A map file: json, or another file that map import reads.", "FILE")]
+
+
+@grouped
+def put(map_id: MapId, file: MapFile, where: Where, output: Output) -> None:
+    """Store a map under an id."""
+    told = where.ask("put_map", _checked(map_id), read_map_file(file), names={"": file})
+    line = f"{told['map_id']}, revision {told['revision']}, {told['segment_count']} segments"
+    output.print(told, rows([("stored", line)]))
+
+
+@grouped
+def list_maps(where: Where, output: Output) -> None:
+    """List the stored maps, by id; with --json one a line."""
+    found, cursor = list[Json](), None
+    with where.opened() as service:
+        for _ in range(MAX_PAGES):
+            page = service.ask("list_maps", cursor=cursor)
+            found, cursor = [*found, *page["maps"]], page["next"]
+            if cursor is None:
+                break
+        else:
+            raise NoServerError(f"{where.server}: found more than {MAX_PAGES} pages of maps; check the URL")
+    if output.as_json:
+        for one in found:
+            print_json(one)
+        return
+    names = ("map_id", "revision", "segment_count")
+    records = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in found]
+    output.print(found, table(COLUMNS, records))
+
+
+@grouped
+def get(
+    map_id: MapId,
+    where: Where,
+    out: Annotated[File, option(f"{WRITE_MAP} Default: print it.", "FILE")] = None,
+) -> None:
+    """Print a stored map as JSON, or write it to a file."""
+    document = where.ask("get_map", _checked(map_id))
+    if out is None:
+        print_json(document)
+    else:
+        write_document(document, out)
+
+
+@grouped
+def remove(map_id: MapId, where: Where) -> None:
+    """Forget a stored map."""
+    where.ask("delete_map", _checked(map_id))
+
+
+@grouped
 def draw(
     on: MapArgument,
     out: Annotated[Path, option("File to write: png, svg, dxf, geojson, csv or json.", "FILE")],
-    server: Server = None,
+    where: Where,
 ) -> None:
     """Draw a map: walls in grey, a blue tick on the free side of each."""
     write = draw_picture if out.suffix.lower() == ".png" else write_document
-    write(document_at(on, server), out)
+    write(where.whole_map(read_map_or_id(on)), out)

@@ -10,24 +10,12 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING, Annotated
 
-from ..asking import ask, whole_map
+from ..asking import Where
 from ..errors import WrongUseError
 from ..inputs import draw_picture, line_map_of, read_map_or_id, write_document
 from ..logs import some_scans
-from ..options import (
-    AsJson,
-    LogTopic,
-    MapArgument,
-    Number,
-    OutMap,
-    Picture,
-    Server,
-    TfNamespace,
-    argument,
-    grouped,
-    option,
-)
-from ..printing import Json, print_json, print_rows
+from ..options import MapArgument, Number, OutMap, Picture, TopicOptions, argument, grouped, option
+from ..printing import Json, Output, rows
 from ..scans import needing_formats
 from .checking import of_sensor
 
@@ -45,39 +33,33 @@ class ChangeOptions:
     refuse: Annotated[list[int] | None, option("Leave this change out; repeat for more changes.", "INDEX")] = None
 
 
-@dataclass(frozen=True, slots=True)
-class LogOptions:
-    """Which scans to read of each log."""
-
-    scans: Annotated[int, option("Use so many scans of each log at most.", "N", min=3)] = SCANS
-    topic: LogTopic = None
-    tf_namespace: TfNamespace = None
-
-
 @grouped
 def update(
     on: MapArgument,
     logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")],
-    *,
+    changes: ChangeOptions,
+    source: TopicOptions,
+    where: Where,
+    output: Output,
     out: OutMap = None,
     picture: Picture = None,
-    changes: ChangeOptions,
-    source: LogOptions,
-    server: Server = None,
-    as_json: AsJson = False,
+    scans: Annotated[int, option("Use so many scans of each log at most.", "N", min=3)] = SCANS,
 ) -> None:
     """Propose changes of a map that the scans of several visits show, and write the new map."""
     target = read_map_or_id(on)
-    visits = dict(zip(visit_names(logs), (_scans(log, source) for log in logs), strict=True))
-    answer = ask("update", server, target, _request_of(visits, changes))
+    visits = dict(zip(visit_names(logs), (_scans(log, scans, source) for log in logs), strict=True))
+    names = {f"/visits/{number}": name for number, name in enumerate(visits)} | {"": on, "/map": on}
+    names |= {"/refuse": "--refuse", "/accept": "--accept"}
+    answer = where.ask("update_map", target, _request_of(visits, changes), names=names)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
-        draw_changes(whole_map(target, server), answer, picture)
-    if as_json:
-        print_json(answer)
-    else:
-        print_rows(list(update_rows(answer, whole_map(target, server), len(visits))))
+        draw_changes(where.whole_map(target), answer, picture)
+    output.print(answer, _lines(answer, target, len(visits), where))
+
+
+def _lines(answer: Json, target: Json, visits: int, where: Where) -> Iterator[str]:
+    yield from rows(update_rows(answer, where.whole_map(target), visits))
 
 
 def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
@@ -110,12 +92,12 @@ def visit_names(logs: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(log) for log in logs]
 
 
-def _scans(log: Path, source: LogOptions) -> list[LoggedScan]:
+def _scans(log: Path, most: int, source: TopicOptions) -> list[LoggedScan]:
     """Return some scans of a log; those that odometry does not connect with the others are without it."""
-    taken = some_scans(log, source.scans, source.topic, source.tf_namespace)
+    taken = some_scans(log, most, source)
     # Odometry connects the scans of one part only: that with most of them.
-    most = Counter(one.part for one in taken).most_common(1)
-    return [one if one.part == most[0][0] else replace(one, pose=None) for one in taken]
+    parts = Counter(one.part for one in taken).most_common(1)
+    return [one if one.part == parts[0][0] else replace(one, pose=None) for one in taken]
 
 
 def update_by_drive(document: Json, log: Path) -> Json:
@@ -126,10 +108,10 @@ def update_by_drive(document: Json, log: Path) -> Json:
     RefusedError
         When the log, or a scan, is not taken.
     """
-    scans = _scans(log, LogOptions(scans=2 * SCANS))
+    scans = _scans(log, 2 * SCANS, TopicOptions())
     half = len(scans) // 2
     halves = {"first half": scans[:half], "second half": scans[half:]}
-    return ask("update", None, document, _request_of(halves, ChangeOptions()))
+    return Where().ask("update_map", document, _request_of(halves, ChangeOptions()))
 
 
 def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str, str]]:

@@ -89,7 +89,7 @@ def test_vectorize_says_that_points_are_in_no_order(linefix: Linefix, folder: Pa
         (("locate", "nowhere.json", "scan.json"), 2, "nowhere.json"),
         (("locate", "hall", "scan.json"), 3, "hall: no such file, and no map is stored"),
         (("locate", "room.json", "broken.json"), 3, "broken.json: not JSON"),
-        (("locate", "room.json", "short.json"), 3, "/scan/segments/0"),
+        (("locate", "room.json", "short.json"), 3, "short.json: /segments/0: expected"),
         (("locate", "room.json", "scan.json", "--server", "localhost"), 2, "--server"),
         (("locate", "room.json", "scan.json", "--server", f"http://127.0.0.1:{free_port()}"), 4, "linefix serve"),
     ],

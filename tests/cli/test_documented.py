@@ -106,3 +106,19 @@ def test_every_option_that_is_named_is_there(document: str) -> None:
     ours = re.sub(r"^ros2 .*$", "", text, flags=re.MULTILINE)
     named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", ours))
     assert named - options_of(get_command(app)) == set()
+
+
+def every_help(command: Any, path: str = "") -> dict[str, str]:
+    """Return the help of each command by its path."""
+    found = {path: command.get_help(command.context_class(command, info_name=path))}
+    for name, below in getattr(command, "commands", {}).items():
+        found |= every_help(below, f"{path} {name}".strip())
+    return found
+
+
+def test_help_has_words_of_documents_in_place_of_types_of_python() -> None:
+    found = every_help(get_command(app))
+    assert "Usage: locate [OPTIONS] MAP... SCAN\n" in found["locate"]
+    assert "Usage: map update [OPTIONS] MAP LOG...\n" in found["map update"]
+    for path, text in found.items():
+        assert not re.search(r"<(str|int|float|path|Path|list)|[{}]", text), path

@@ -12,7 +12,7 @@ import pytest
 
 import cli
 from cli.logs import thinned
-from cli.printing import console
+from cli.printing import print_lines, table
 from tests.map_quality.check.drawn import faces
 
 from .drives import write_log
@@ -28,9 +28,14 @@ def test_it_starts_and_ends_as_a_program() -> None:
     assert (wrong.returncode, wrong.stdout, wrong.stderr.count("\n")) == (2, "", 1)
 
 
-def test_what_is_printed_is_taken_for_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
-    console().print("[bold]map[/bold] :robot: 1.5")
-    assert capsys.readouterr().out == "[bold]map[/bold] :robot: 1.5\n"
+def test_lines_are_printed_as_they_are_without_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+    print_lines(["[bold]map[/bold] :robot: 1.5\x1b[31m"])
+    assert capsys.readouterr().out == "[bold]map[/bold] :robot: 1.5?[31m\n"
+
+
+def test_numbers_stand_on_the_right_of_their_column() -> None:
+    lines = table(("name", "scans", "of"), [("a", 5, None), ("hall", 1.25, "x")])
+    assert list(lines) == ["name  scans  of", "a         5  -", "hall  1.250  x"]
 
 
 def test_some_of_many_are_spread_evenly_and_of_none_none() -> None:

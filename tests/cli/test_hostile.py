@@ -14,6 +14,7 @@ from linefix_client import Client, ProblemError, UnreachableError
 from linefix_client import asking as requests
 
 from cli import asking
+from cli.maps import storing
 from tests.batch.logs import ROOM, SEEN
 from tests.formats.bags import BEGUN, Recording
 
@@ -137,7 +138,7 @@ def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
 
 
 def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asking, "MAX_PAGES", 5)
+    monkeypatch.setattr(storing, "MAX_PAGES", 5)
     body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
     with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
         assert "found more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
@@ -180,5 +181,31 @@ def test_a_description_that_stands_for_too_much_is_refused(linefix: Linefix, fol
 def test_all_misspelt_names_are_listed_with_the_names_that_are_meant(linefix: Linefix, folder: Path) -> None:
     (folder / "wrong.json").write_text(json.dumps({"segmnts": ROOM, "sgima": 0.1}))
     line = refused(linefix("locate", "wrong.json", "scan.json"), 3)
-    for named in ("/map/segments: expected this field", "a similar name is segments", "a similar name is sigma"):
+    for named in (
+        "wrong.json: /segments: expected this field",
+        "a similar name is segments",
+        "a similar name is sigma",
+    ):
         assert named in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("locate", "room.json", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
+        (("locate", "room.json", "bad.json", "scan.json"), "bad.json: /segments/0: expected 4 numbers"),
+        (("register", "room.json", "scan.json", "--pairs", "pairs.json"), "pairs.json: /0"),
+        (("map", "check", "room.json", "--scan", "scan.json", "--scan", "bad.json"), "bad.json: /segments/0"),
+        (("map", "check", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
+        (("map", "put", "bad", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
+        (("vectorize", "points.json"), "points.json: /points/0: expected"),
+        (("locate", "room.json", "scan.json", "--deadline-ms", "-5"), "--deadline-ms: expected"),
+    ],
+)
+def test_what_is_wrong_is_named_by_its_file_or_option(
+    linefix: Linefix, folder: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    (folder / "bad.json").write_text('{"segments": [[1, 2, 3]]}')
+    (folder / "pairs.json").write_text("[[0, -1]]")
+    (folder / "points.json").write_text('{"points": [[1, 2, 3]]}')
+    assert f"linefix: {said}" in refused(linefix(*arguments), 3)

@@ -117,7 +117,7 @@ def test_where_a_server_refuses_every_scan_so_is_the_log(
 def test_a_map_that_is_refused_ends_it_at_once(linefix: Linefix, folder: Path) -> None:
     assert "at most 10 map segments" in refused(linefix(*ASKED, "--json", LINEFIX_MAX_MAP_SEGMENTS="10"), 3)
     (folder / "broken.json").write_text('{"segments": [[0, 0, 0, 0]]}')
-    assert "/map/segments/0: is shorter" in refused(linefix("replay", "drive.log", "--map", "broken.json"), 3)
+    assert "broken.json: /segments/0: is shorter" in refused(linefix("replay", "drive.log", "--map", "broken.json"), 3)
 
 
 def test_what_comes_before_the_place_where_a_log_is_broken_counts(linefix: Linefix, folder: Path) -> None:
