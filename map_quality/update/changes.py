@@ -194,9 +194,10 @@ def _moves(
 
 
 def _fits(new: Floats, old: Floats) -> bool:
-    """Return whether each new side has an old one of its own that is as long; some may be hidden."""
+    """Return whether each new side but stubs has an old one of its own that is as long; some may be hidden."""
     free = sorted(old.tolist())
-    for length in sorted(new.tolist(), reverse=True):
+    sides = new[new >= min(tuning.LONGEST_STUB, new.max())]
+    for length in sorted(sides.tolist(), reverse=True):
         best = min(free, key=lambda one: abs(one - length), default=None)
         if best is None or abs(best - length) > max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length):
             return False
