@@ -1,116 +1,25 @@
-"""Slots for searches: the queue and its shares, deadlines, callers that leave, searches that take long."""
+"""Slots for searches: the queue and its shares, deadlines, callers that leave."""
 
 from __future__ import annotations
 
 import asyncio
 import gc
-import os
 import sys
 import threading
 import time
 import weakref
-from collections.abc import AsyncIterator, Callable, Coroutine
-from contextlib import asynccontextmanager, suppress
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from contextlib import suppress
 
 import pytest
 
 from association import CancelledError, Deadline
 from linefix.documents.errors import DeadlinePassedError
-from service.admission.gate import HEARING_SECONDS, LONG_NICE, LONG_SECONDS, Gate, Ticket
+from service.admission.gate import HEARING_SECONDS, LONG_SECONDS, Gate, Ticket
 from service.errors import QueueFullError, ShareUsedError
 
-T = TypeVar("T")
-P = ParamSpec("P")
-PATIENCE = 30.0  # s for what has to come about
-A, B = b"a", b"b"
+from .gates import PATIENCE, A, B, gate_of, in_loop, until, within
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="threads have no priority of their own elsewhere")
-
-
-def within(seconds: float = 30.0) -> Deadline:
-    return Deadline(at=time.monotonic() + seconds)
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    give_up = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < give_up, "did not come about"
-        await asyncio.sleep(0.001)
-
-
-def nice() -> int:
-    return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
-
-
-class BlockedGate(Gate):
-    """A gate, and a search that runs until it is released."""
-
-    def __init__(self, slots: int, places: int | None = None, long_per_slot: int = 0) -> None:
-        super().__init__(slots, places, long_per_slot=long_per_slot)
-        self.release = threading.Event()
-        self.asked: list[asyncio.Future[Any]] = []
-
-    def ask(
-        self,
-        function: Callable[[], T],
-        holder: bytes | None = None,
-        deadline: Deadline | None = None,
-        heeds: Callable[[], bool] = lambda: True,
-        ticket: Ticket | None = None,
-    ) -> asyncio.Future[T]:
-        """Ask for a slot, as a request does whose body has arrived."""
-
-        async def request() -> T:
-            admitted = ticket or Ticket(holder)
-            self.enter(admitted)
-            try:
-                return await self.run(function, deadline or within(), admitted, heeds)
-            finally:
-                if ticket is None:
-                    self.leave(admitted)
-
-        asked = asyncio.ensure_future(request())
-        self.asked.append(asked)
-        return asked
-
-    async def block(self, holder: bytes | None = None, deadline: Deadline | None = None) -> asyncio.Future[bool]:
-        """Have a slot taken until `release` is set."""
-        before = self.running
-        blocking = self.ask(self.release.wait, holder, deadline)
-        await until(lambda: self.running > before)
-        return blocking
-
-
-@asynccontextmanager
-async def gate_of(slots: int, places: int | None = None, long_per_slot: int = 0) -> AsyncIterator[BlockedGate]:
-    gate = BlockedGate(slots, places, long_per_slot)
-    try:
-        yield gate
-    finally:
-        gate.release.set()
-        for asked in gate.asked:
-            asked.cancel()
-        await asyncio.gather(*gate.asked, return_exceptions=True)
-        await until(lambda: (gate.running, gate.waiting) == (0, 0))
-        gate.close()
-
-
-def in_loop(scenario: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
-    """Return a test that runs a scenario in an event loop of its own; nothing in it may be reported as a defect."""
-
-    @wraps(scenario)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        reported: list[object] = []
-
-        async def watched() -> None:
-            asyncio.get_running_loop().set_exception_handler(lambda _, context: reported.append(context))
-            await asyncio.wait_for(scenario(*args, **kwargs), 60.0)
-
-        asyncio.run(watched())
-        assert not reported
-
-    return run
 
 
 @in_loop
@@ -389,65 +298,3 @@ def test_an_error_keeps_nothing_that_the_function_worked_with(long_per_slot: int
         in_loop(scenario)()
     finally:
         gc.enable()
-
-
-@in_loop
-async def test_threads_may_go_behind_others() -> None:
-    behind, usual = Gate(1, nice=3), Gate(1)
-    before = nice()
-    assert [await gate.run(nice, within(), Ticket()) for gate in (behind, usual)] == [before + 3, before]
-    assert nice() == before
-    for gate in (behind, usual):
-        gate.close()
-
-
-@in_loop
-async def test_a_long_search_gives_its_slot_to_a_short_one_and_goes_on_with_a_lower_priority() -> None:
-    """Its thread runs nothing else."""
-    async with gate_of(1, 3, 4) as gate:
-        for _ in range(2):
-            release = threading.Event()
-            found: list[int] = []
-
-            def search(release: threading.Event = release, found: list[int] = found) -> None:
-                release.wait()
-                found.append(nice())
-
-            long = gate.ask(search, A)
-            assert await gate.ask(nice, B) == nice()
-            assert not long.done()
-            assert gate.running == 1
-            release.set()
-            await long
-            assert found == [min(nice() + LONG_NICE, 19)]
-            assert [await gate.ask(nice, A) for _ in range(3)] == [nice()] * 3
-
-
-@in_loop
-async def test_one_holder_has_half_of_the_long_ones_and_others_go_on() -> None:
-    async with gate_of(1, None, 4) as gate:
-        long = [gate.ask(gate.release.wait, A) for _ in range(4)]
-        await until(lambda: gate.running == 2)
-        assert await gate.ask(lambda: "short", B) == "short"
-        # Further searches of A wait until one of its own ends.
-        assert (gate.running, gate.waiting) == (2, 2)
-        long[0].cancel()  # who leaves keeps them running until they end
-        await until(long[0].done)
-        assert (gate.running, gate.waiting) == (2, 2)
-        gate.release.set()
-        await asyncio.gather(*long[1:])
-
-
-@in_loop
-async def test_beyond_all_that_may_be_long_a_search_keeps_its_slot_until_one_ends() -> None:
-    async with gate_of(1, None, 2) as gate:
-        first = threading.Event()
-        long = [gate.ask(first.wait, A), gate.ask(gate.release.wait, B), gate.ask(gate.release.wait, b"c")]
-        await until(lambda: gate.running == 3)
-        waiting = gate.ask(lambda: "short", b"d")
-        await asyncio.sleep(2 * LONG_SECONDS)
-        assert gate.waiting == 1
-        first.set()
-        assert await waiting == "short"
-        gate.release.set()
-        await asyncio.gather(*long)
