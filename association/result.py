@@ -309,3 +309,10 @@ class AssociationResult:
     warnings: tuple[AssociationWarning, ...]
     map_id: str | None = None
     maps: tuple[MapVerdict, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """The verdict in one or two sentences, for people."""
+        from .messages import message_of
+
+        return message_of(self)

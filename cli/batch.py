@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from .errors import RefusedError, WrongUseError
-from .options import Undirected, UsableOptions, argument, flag, grouped, option
+from .options import Oriented, UsableOptions, argument, flag, grouped, option
 from .printing import Output, noted, rows
 from .progress import progress
 
@@ -23,7 +23,7 @@ class RunOptions:
     workers: Annotated[int | None, option("Number of processes. Default: the number of cores.", "N", min=1)] = None
     ray: Annotated[bool, flag("Run on a Ray cluster: that of RAY_ADDRESS, or a new one.", "--ray")] = False
     block: Annotated[int, option("Number of scans in the block of a worker.", "N", min=1, max=65_536)] = 512
-    undirected: Undirected = False
+    oriented: Oriented = True
     deadline_ms: Annotated[float, option("Time limit of each search.", "MS", min=1.0)] = 10_000.0
 
 
@@ -77,7 +77,7 @@ def _options(chosen: RunOptions, usable: UsableOptions) -> FleetOptions:
     from batch import FleetOptions
     from linefix.compiling import compile_kernels
 
-    search = AssociationOptions(max_alternatives=0, include=(), oriented=not chosen.undirected, **asdict(usable))
+    search = AssociationOptions(max_alternatives=0, include=(), oriented=chosen.oriented, **asdict(usable))
     return FleetOptions(search, chosen.deadline_ms, chosen.block, compile_kernels)
 
 

@@ -16,10 +16,10 @@ from .options import (
     MapArgument,
     MapsArgument,
     Number,
+    Oriented,
     ScanArgument,
     Text,
     Texts,
-    Undirected,
     UsableOptions,
     argument,
     grouped,
@@ -47,7 +47,7 @@ class SearchOptions:
     near: Annotated[tuple[float, float, float] | None, option("Search only near this pose.", "X Y THETA")] = None
     radius: Annotated[float, option("Maximum distance from --near.", "METRES")] = 1.0
     angle: Annotated[float, option("Maximum rotation from --near.", "RADIANS")] = 0.5
-    undirected: Undirected = False
+    oriented: Oriented = True
     deadline_ms: Annotated[Number, option("Time limit of the search.", "MS")] = None
 
 
@@ -99,7 +99,7 @@ def _request(maps: Sequence[NamedMap], scan: str, search: SearchOptions, usable:
     if search.near is not None:
         pose = dict(zip(("x", "y", "theta"), search.near, strict=True))
         body["prior"] = pose | {"radius": search.radius, "angle": search.angle}
-    if search.undirected:
+    if not search.oriented:
         body["options"]["oriented"] = False
     body["options"]["deadline_ms"] = search.deadline_ms
     return body
@@ -187,16 +187,18 @@ def register(
     scan: ScanArgument,
     where: Where,
     output: Output,
-    pairs: Annotated[Text, option("JSON file: [[scan index, map index], ...]. Default: i with i.", "FILE")] = None,
-    undirected: Undirected = False,
+    correspondences: Annotated[
+        Text, option("JSON file: [[scan index, map index], ...]. Default: i with i.", "FILE")
+    ] = None,
+    oriented: Oriented = True,
 ) -> None:
     """Find the pose from known correspondences; the answer is that of /v1/register."""
     body: Json = {"map": read_map_file(on), "scan": read_scan(scan)}
-    if pairs is not None:
-        body["correspondences"] = read_json(pairs)
-    if undirected:
+    if correspondences is not None:
+        body["correspondences"] = read_json(correspondences)
+    if not oriented:
         body["options"] = {"oriented": False}
-    names = {"/map": on, "/scan": scan} | ({} if pairs is None else {"/correspondences": pairs})
+    names = {"/map": on, "/scan": scan} | ({} if correspondences is None else {"/correspondences": correspondences})
     answer = where.ask("register", body, names=names)
     found = answer["diagnostics"]
     chi2 = "none" if found["chi2"] is None else f"{found['chi2']:.2f}"

@@ -45,7 +45,9 @@ ScanArgument = Annotated[
 ]
 Picture = Annotated[File, option("Draw the result to this PNG file.", "FILE")]
 OutMap = Annotated[File, option(WRITE_MAP, "FILE")]
-Undirected = Annotated[bool, flag("The directions of segments have no meaning.", "--undirected")]
+Oriented = Annotated[
+    bool, flag("Free space lies on the left of segments, or directions have no meaning.", "--oriented/--no-oriented")
+]
 
 
 @dataclass(frozen=True, slots=True)

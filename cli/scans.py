@@ -81,7 +81,7 @@ def needing_formats(what: str) -> Iterator[None]:
     except ModuleNotFoundError:
         raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
     except InputError as error:
-        raise RefusedError(f"--point: {error.message}" if error.argument == "inside" else str(error)) from None
+        raise RefusedError(f"--point: {error.message}" if error.argument == "point" else str(error)) from None
 
 
 def read_scan(name: str) -> Json:

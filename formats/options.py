@@ -42,11 +42,11 @@ class ImportOptions:
         True if the lines of a drawing are the faces of walls, or run in their middle; None: detected.
     thickness : float or None
         Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.2.
-    inside : tuple of (x, y)
+    point : tuple of (x, y)
         Free places, metres in the map frame: directions are found from there.
     directions : "drawn", "none" or None
         Meaning of the directions of lines: free space lies on the left of each, or none. None: found from
-        `inside` where given, else as the file says.
+        `point` where given, else as the file says.
     local_metres : bool
         True if the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
     topic : str or None
@@ -72,7 +72,7 @@ class ImportOptions:
     layers: tuple[str, ...] = ()
     drawn: Drawn | None = None
     thickness: float | None = None
-    inside: tuple[tuple[float, float], ...] = ()
+    point: tuple[tuple[float, float], ...] = ()
     directions: Directions | None = None
     local_metres: bool = False
     topic: str | None = None
@@ -101,11 +101,11 @@ class ImportOptions:
         for one in self.where:
             if not one.partition("=")[0].strip() or "=" not in one:
                 raise InvalidOptionError("expected property=value, found none", argument="where")
-        for place in self.inside:
+        for place in self.point:
             if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
                 found = "one that is too large or not finite" if len(place) == 2 else f"{len(place)} numbers"
                 raise InvalidOptionError(
-                    f"expected two numbers up to {MAX_COORDINATE:g} m, found {found}", argument="inside"
+                    f"expected two numbers up to {MAX_COORDINATE:g} m, found {found}", argument="point"
                 )
 
     @property

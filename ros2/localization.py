@@ -233,5 +233,5 @@ class Localization:
         if latest is not None and latest.pose is not None:
             values["pose"] = f"{latest.pose.x:.3f} {latest.pose.y:.3f} {latest.pose.theta:.4f}"
             values["stamp"] = f"{latest.stamp / 1e9:.3f}"
-            values["map"] = self._map_name
+            values["map_id"] = self._map_name
         return values

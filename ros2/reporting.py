@@ -94,7 +94,7 @@ def _marker(
 def values_of(answer: linefix.AssociationResult, milliseconds: float) -> dict[str, str]:
     """Return the verdict of a scan as keys and values."""
     return {
-        **({} if answer.map_id is None else {"map": answer.map_id}),
+        **({} if answer.map_id is None else {"map_id": answer.map_id}),
         "status": answer.status.value,
         "usable": str(answer.usable).lower(),
         "probability": "" if answer.probability is None else f"{answer.probability:.4f}",

@@ -84,7 +84,7 @@ def import_map(
 def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
     """Return what ``/v1/maps:import`` answers to a file; raises `WrongUseError` when there is no such file."""
     files = [existing(file)] if where.server is None else _with_what_it_names(existing(file))
-    names = {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(said)} | {"/inside": "--point"}
+    names = {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(said)}
     names |= {"": file.name, "/files": file.name} | {f"/files/{number}": one.name for number, one in enumerate(files)}
     if where.server is not None:
         sent = [(one.name, one.read_bytes()) for one in files]

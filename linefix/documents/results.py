@@ -20,7 +20,6 @@ from association import (
     AssociationWarning,
     Status,
     VerdictExplanation,
-    message_of,
 )
 from map_quality import Analysis, MapCheck, MapUpdate, PlaceVerdict
 from registration import RegistrationResult
@@ -110,8 +109,8 @@ class Included:
 
     Attributes
     ----------
-    parts : frozenset of str
-        Names of the requested parts, as in ``include``.
+    include : frozenset of str
+        Names of the requested parts.
     frame_id, child_frame_id : str
         Of the map and of the scan.
     stamp : JSON
@@ -123,7 +122,7 @@ class Included:
         Index of the first segment of each view; segments are then named by view and index. None: a single view.
     """
 
-    parts: frozenset[str]
+    include: frozenset[str]
     frame_id: str
     child_frame_id: str
     stamp: Any = None
@@ -163,8 +162,8 @@ def association_json(
             answer_of(replies.MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
         ]
         given["map"] = None if result.map_id is None else references[result.map_id]
-    answer = answer_of(replies.FoundAnswer, result, message=message_of(result), **given)
-    for name in {"correspondences", "alternatives", "missing_map", "segments"} - included.parts:
+    answer = answer_of(replies.FoundAnswer, result, **given)
+    for name in {"correspondences", "alternatives", "missing_map", "segments"} - included.include:
         del answer[name]
     return answer
 

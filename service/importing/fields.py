@@ -17,7 +17,6 @@ Fields = Mapping[str, Sequence[str]]
 Known = dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]]
 """The reader and the schema of each field; everything in a form is text."""
 
-POINT = "point"
 MAX_SCANS = 1000
 _TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
@@ -34,9 +33,9 @@ def options_of(fields: Fields) -> ImportOptions:
 
     said = read_fields(fields, FIELDS)
     try:
-        return ImportOptions(**{"inside" if name == POINT else name: value for name, value in said.items()})
+        return ImportOptions(**said)
     except InvalidOptionError as error:
-        raise InvalidRequestError([Fault(pointer_of(error.argument), error.message)]) from None
+        raise InvalidRequestError([Fault(f"/{error.argument}", error.message)]) from None
 
 
 def read_fields(fields: Fields, known: Known) -> dict[str, Any]:
@@ -58,11 +57,6 @@ def read_fields(fields: Fields, known: Known) -> dict[str, Any]:
         except ValueError as error:
             raise InvalidRequestError([Fault(f"/{name}", str(error))]) from None
     return said
-
-
-def pointer_of(option: str) -> str:
-    """Return the pointer to an option of `formats`."""
-    return f"/{POINT}" if option == "inside" else f"/{option}"
 
 
 def _text(values: Sequence[str]) -> str:
@@ -129,7 +123,7 @@ def _said(what: str, *choices: str) -> dict[str, Any]:
 FIELDS: Known = {
     "units": (_units, _said("of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit")),
     "layers": (_patterns, _said("patterns such as *WALL*, comma separated")),
-    POINT: (_places, _said("a free place, `x y` in metres; may be repeated")),
+    "point": (_places, _said("a free place, `x y` in metres; may be repeated")),
     "drawn": (_text, _said("whether lines of a drawing are faces or centre lines of walls", "faces", "centres")),
     "thickness": (_number, _said("of walls drawn as centre lines, metres")),
     "directions": (_text, _said("whether free space lies on the left of the lines", "drawn", "none")),

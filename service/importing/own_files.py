@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from linefix.documents.errors import Fault, InvalidRequestError
 
-from .fields import FIELDS, pointer_of
+from .fields import FIELDS
 
 if TYPE_CHECKING:
     from formats import FormatError
@@ -127,7 +127,7 @@ def fault_of(error: FormatError, files: OwnFiles) -> Fault:
     """Return the fault with its place in the form: a file by its number, since sent names are not repeated."""
     from formats import IncompleteFileError
 
-    pointer, number = pointer_of(error.argument), files.number_of(error.argument)
+    pointer, number = f"/{error.argument}", files.number_of(error.argument)
     if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in FIELDS:
         return Fault("/files", "the map names a file that was not sent, such as its picture; send it, too")
     if pointer[1:] not in FIELDS:

@@ -58,13 +58,13 @@ def test_a_verdict_that_is_no_answer_is_done_all_the_same(linefix: Linefix, fold
 
 
 def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
-    ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
+    ended = linefix("register", "room.json", "scan.json", "--correspondences", "pairs.json", "--json")
     answer = ended.answer
     assert (answer["status"], answer["diagnostics"]["pairs"]) == ("ok", 4)
 
 
 def test_register_prints_the_fit(linefix: Linefix, folder: Path) -> None:
-    assert "4 pairs, chi2 " in linefix.done("register", "room.json", "scan.json", "--pairs", "pairs.json").out
+    assert "4 pairs, chi2 " in linefix.done("register", "room.json", "scan.json", "--correspondences", "pairs.json").out
 
 
 def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:

@@ -203,14 +203,14 @@ def test_directions_are_found_from_a_place_inside(tmp_path: Path) -> None:
     inner = "0,0,4,0\n4,3,4,0\n4,3,0,3\n0,0,0,3\n"
     outer = "-0.3,-0.3,4.3,-0.3\n4.3,-0.3,4.3,3.3\n4.3,3.3,-0.3,3.3\n-0.3,3.3,-0.3,-0.3\n"
     path = text(tmp_path, "a.csv", inner + outer + "2,0,2,2\n")
-    imported = read_map(path, ImportOptions(inside=((1.0, 1.0),)))
+    imported = read_map(path, ImportOptions(point=((1.0, 1.0),)))
     assert imported.map.oriented
     found = {tuple(row) for row in rows(imported)}
     assert {(0, 0, 4, 0), (4, 0, 4, 3), (4, 3, 0, 3), (0, 3, 0, 0), (2, 0, 2, 2), (2, 2, 2, 0)} <= found
     assert len(found) == 6 + 2 * 4  # the outline cannot be reached: both directions
     assert notes(imported)["not_reached"] == 4
-    with pytest.raises(InvalidOptionError, match=r"inside\[1\]: lies on a line or outside"):
-        read_map(path, ImportOptions(inside=((1.0, 1.0), (50.0, 1.0))))
+    with pytest.raises(InvalidOptionError, match=r"point\[1\]: lies on a line or outside"):
+        read_map(path, ImportOptions(point=((1.0, 1.0), (50.0, 1.0))))
 
 
 def test_directions_mean_what_the_caller_says(tmp_path: Path) -> None:
@@ -225,7 +225,7 @@ def test_directions_mean_what_the_caller_says(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"units": "furlong"}, {"units": 0.0}, {"thickness": -1.0}, {"inside": ((math.nan, 0.0),)}, {"drawn": "both"}],
+    [{"units": "furlong"}, {"units": 0.0}, {"thickness": -1.0}, {"point": ((math.nan, 0.0),)}, {"drawn": "both"}],
 )
 def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InvalidOptionError):
@@ -305,9 +305,9 @@ def test_faces_are_not_taken_for_centre_lines(tmp_path: Path, lines: Lines) -> N
         ImportOptions(drawn="faces"),
         ImportOptions(directions="none"),
         ImportOptions(directions="drawn"),
-        ImportOptions(inside=((1.0, 1.0),)),
+        ImportOptions(point=((1.0, 1.0),)),
     ],
-    ids=["faces", "none", "drawn", "inside"],
+    ids=["faces", "none", "drawn", "point"],
 )
 def test_what_the_caller_says_goes_first(tmp_path: Path, said: ImportOptions) -> None:
     assert "centres" not in assumed(read_map(csv(tmp_path, HOUSE), said))

@@ -25,3 +25,10 @@ def test_corrections_and_the_turn_rate_are_in_the_diagnostics() -> None:
         assert document["corrections"] == (None if corrections is None else told)
         assert document["turn_rate"] == turn_rate
         AssociationDiagnosticsAnswer.model_validate(document)
+
+
+def test_the_message_is_that_of_http() -> None:
+    answer = linefix.locate(ROOM, SEEN)
+    document = association_json(answer, Included(frozenset(), "map", "laser"))
+    assert answer.message == document["message"]
+    assert answer.message.startswith("The robot is at this pose with a probability of ")

@@ -59,7 +59,7 @@ def test_a_robot_that_leaves_a_lift(domain: int) -> None:
         robot = Rider(domain, "/lift")
         robot.until_on("hq-1")
         robot.until(robot.initial, robot.play)
-        robot.until(robot.status, robot.play, lambda one: values(one).get("map") == "hq-1")
+        robot.until(robot.status, robot.play, lambda one: values(one).get("map_id") == "hq-1")
         walls = robot.until(robot.walls, robot.play)
         assert len(walls.markers[0].points) == 2 * len(FLOORS["hq-1"])
         robot.initial.take()
@@ -67,13 +67,13 @@ def test_a_robot_that_leaves_a_lift(domain: int) -> None:
         initial = robot.until(robot.initial, robot.play)
         assert math.hypot(*offset(initial, robot)) < 0.6  # metres that it has driven meanwhile
         status = robot.until(robot.status, robot.play, lambda one: one.level == 0)
-        assert (values(status)["state"], values(status)["map"]) == ("agreed", "hq-2")
+        assert (values(status)["state"], values(status)["map_id"]) == ("agreed", "hq-2")
         scans = robot.until(
             robot.diagnostics,
             robot.play,
             lambda one: one.status[0].name == "lift/linefix: scan" and one.status[0].level == 0,
         )
-        assert values(scans.status[0])["map"] == "hq-2"
+        assert values(scans.status[0])["map_id"] == "hq-2"
         assert robot.map_id_reader().readers[0].take(10)[0].data == "hq-2"
         assert "the map changed from hq-1 to hq-2" in logged
         assert robot.until(robot.transforms, robot.play).transforms[0].header.frame_id == "map"
@@ -136,7 +136,7 @@ def test_two_robots_on_two_floors_have_maps_of_their_own(domain: int) -> None:
             other.until(other.agreed, other.play)
         assert other.map_ids.take() == []
         status = other.until(other.status, other.play, lambda one: one.level == 0)
-        assert (status.name, values(status)["map"]) == ("robot2/linefix: localization", "hq-2")
+        assert (status.name, values(status)["map_id"]) == ("robot2/linefix: localization", "hq-2")
 
 
 @pytest.mark.long
@@ -148,7 +148,7 @@ def test_a_request_is_answered_with_the_map(domain: int) -> None:
         robot.until_on("hq-2")
         requests.publish(messages.String("job 7"))
         found: Any = robot.until(results, robot.play)
-    assert (found.name, values(found)["map"]) == ("job 7", "hq-2")
+    assert (found.name, values(found)["map_id"]) == ("job 7", "hq-2")
 
 
 def test_a_file_of_parameters_names_the_maps(domain: int, tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def _filled(
         inside = 0 <= row < shape[1] and 0 <= column < shape[0]
         if not inside or labels[row, column] == 0:
             raise InvalidOptionError(
-                "lies on a line or outside of the drawing; expected a free place", argument="inside", index=k
+                "lies on a line or outside of the drawing; expected a free place", argument="point", index=k
             )
         wanted.append(labels[row, column])
     return np.isin(labels, wanted)

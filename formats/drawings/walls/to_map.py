@@ -72,7 +72,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
     if are_centres(endpoints, drawing, options):
         endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True
-    elif options.inside:
+    elif options.point:
         endpoints, oriented = _directed(endpoints, drawing, options), True
     if not oriented:
         drawing.notes.add_assumed(
@@ -91,7 +91,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
 def _means_directions(drawing: Drawing, options: ImportOptions) -> bool:
     if options.directions is not None:
         return options.directions == "drawn"
-    return drawing.oriented and not options.inside
+    return drawing.oriented and not options.point
 
 
 def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing: Drawing) -> tuple[Floats, Floats]:
@@ -123,7 +123,7 @@ def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: Im
 
 def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
     """Return lines with free space on the left; in both directions if it is on both sides or unknown."""
-    seen = sides_seen(endpoints, options.inside)
+    seen = sides_seen(endpoints, options.point)
     backward = endpoints[:, [2, 3, 0, 1]]
     counts = {side: int((seen == side).sum()) for side in Sides}
     drawing.notes.add_assumed(

@@ -66,7 +66,7 @@ def test_fields_are_options() -> None:
         "surface": ["0.5"],
     }
     options = options_of(fields)
-    assert (options.units, options.layers, options.inside) == (
+    assert (options.units, options.layers, options.point) == (
         0.0254,
         ("*WALL*", "A-*", "B"),
         ((1.0, 2.5), (-3.0, 4.0)),
