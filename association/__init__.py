@@ -8,9 +8,9 @@ from .errors import AssociationError, IndexingEndedError, InvalidMapError, Inval
 from .index.joint import MapPart
 from .index.map_index import MapIndex
 from .index.map_points import NO_POINTS, MapPoints
-from .messages import AS_WELL, message_of
 from .options import INCLUDED, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
+    AS_WELL,
     Alternative,
     AssociationDiagnostics,
     AssociationResult,
@@ -89,7 +89,6 @@ __all__ = [
     "associate_on_maps",
     "explain_verdict",
     "map_set",
-    "message_of",
     "mirrored",
     "scaled",
     "turned_round",

@@ -142,7 +142,7 @@ class AssociationOptions:
         Share of a scan segment's length that must lie on the map, 0 to 1.
     include : tuple of str
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
-        them a usable answer has no alternatives; any other has, because `message_of` returns their number.
+        them a usable answer has no alternatives; any other has, because `AssociationResult.message` has their number.
     on_map : float
         Prior probability that the scan was taken on this map, or on one of these: 0.5 to 1. A robot that cannot leave
         the building has 1.

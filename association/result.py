@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
@@ -9,9 +11,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import Ambiguity, RegistrationDiagnostics, RigidTransform
+from registration import Ambiguity, RegistrationDiagnostics, RigidTransform, wrap_angle
 
 Floats = NDArray[np.float64]
+AS_WELL = 5.0  # nats below the best score, within which another pose explains a scan about as well
+MOST = 99.99  # %; nothing is certain
+OTHER_WAY_ROUND = 0.5 * math.pi  # rad
 ReasonCode = Literal[
     "prior_contradicted",
     "search_incomplete",
@@ -313,6 +318,30 @@ class AssociationResult:
     @property
     def message(self) -> str:
         """The verdict in one or two sentences, for people."""
-        from .messages import message_of
+        if self.status is Status.NO_MATCH or self.pose is None or self.diagnostics is None:
+            return f"No pose on {'these maps' if self.maps else 'this map'} explains the scan."
+        least = self.diagnostics.score - AS_WELL
+        others = [other for other in self.alternatives if other.score >= least]
+        if self.status is Status.DEGENERATE:
+            theta = self.pose.theta
+            turned = any(abs(wrap_angle(one.pose.theta - theta)) > OTHER_WAY_ROUND for one in others)
+            which = ", and the heading may be reversed" if turned else ""
+            if self.unobservable is None:
+                return f"The observed walls do not fix the robot's position{which}."
+            dx, dy = (round(part, 2) + 0.0 for part in self.unobservable)  # no negative zeros
+            return f"The position along the direction ({dx:.2f}, {dy:.2f}) is unknown{which}."
+        chance = f"{min(100.0 * (self.probability or 0.0), MOST):.2f} %"
+        if self.usable:
+            on_map = f" on the map {self.map_id}" if self.maps else ""
+            return f"The robot is at this pose{on_map} with a probability of {chance}."
+        if any(reason.code == "similar_place" for reason in self.reasons) and others:
+            many = "1 other pose fits" if len(others) == 1 else f"{len(others)} other poses fit"
+            return f"{many} the scan about as well{self._where(others)}. The scan alone does not decide between them."
+        return f"The most likely pose has a probability of {chance}, which is not enough: see `reasons`."
 
-        return message_of(self)
+    def _where(self, others: Sequence[Alternative]) -> str:
+        """Name the other map of other poses, or the number of maps; nothing if all are on that of the answer."""
+        maps = sorted({other.map_id for other in others if other.map_id is not None} - {self.map_id})
+        if not maps:
+            return ""
+        return f", on the map {maps[0]}" if len(maps) == 1 else f", on {len(maps)} other maps"

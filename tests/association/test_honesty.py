@@ -13,7 +13,6 @@ from association import (
     Scan,
     SoftPrior,
     Status,
-    message_of,
     mirrored,
     scaled,
     turned_round,
@@ -90,7 +89,7 @@ def test_equal_rooms_are_not_usable(rooms: int) -> None:
         assert (result.status, result.usable) == (Status.AMBIGUOUS, False)
         assert "similar_place" in reason_codes(result)
         assert probability_in(result) <= 1.05 / min(rooms, 3)
-        assert "about as well" in message_of(result)
+        assert "about as well" in result.message
         assert not answer_of(index, scan, on_map=1.0).usable, "which does not decide between rooms of the map"
 
 
@@ -177,7 +176,7 @@ def test_a_square_room_has_four_answers() -> None:
     assert probability_in(result) == pytest.approx(0.25, abs=0.05)
     assert diagnostics_in(result).margin == pytest.approx(0.0, abs=1e-6)
     assert diagnostics_in(result).runner_up == pytest.approx(1.0)
-    assert message_of(result).startswith("3 other poses fit the scan about as well.")
+    assert result.message.startswith("3 other poses fit the scan about as well.")
 
 
 @pytest.mark.parametrize("sent", ["ranges", "segments"])
@@ -227,7 +226,7 @@ def test_a_long_corridor_is_degenerate_along_itself(heading: float) -> None:
             along = np.array([math.cos(heading), math.sin(heading)])
             assert abs(along @ result.unobservable) == pytest.approx(1.0, abs=1e-3)
             assert reason_codes(result)[0] == "unobservable_direction"
-            assert message_of(result).startswith("The position along the direction")
+            assert result.message.startswith("The position along the direction")
             across = by.inverse().compose(pose_in(result)).y
             assert min(abs(across - 0.9), abs(across - 1.3)) < 0.03
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import HardPrior, InvalidSearchError, SoftPrior, Status, message_of
+from association import HardPrior, InvalidSearchError, SoftPrior, Status
 
 from .scenes import (
     CORRIDOR,
@@ -198,7 +198,7 @@ def test_of_a_family_of_poses_the_one_nearest_the_prior_is_returned() -> None:
     result = answer_of(index_of(CORRIDOR), scan, SoftPrior(pose(11.0, 1.0, 0.0), np.eye(3)))
     assert result.status is Status.DEGENERATE
     assert (pose_in(result).x, pose_in(result).y) == pytest.approx((11.0, 0.8), abs=1e-6)
-    assert message_of(result).startswith("The position along the direction")
+    assert result.message.startswith("The position along the direction")
     assert pose_in(answer_of(index_of(CORRIDOR), scan)).x == pytest.approx(15.0, abs=1e-6)
 
 

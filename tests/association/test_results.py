@@ -30,7 +30,6 @@ from association import (
     assemble,
     associate,
     explain_verdict,
-    message_of,
 )
 from simulation import rectangle_room, square_room
 
@@ -129,7 +128,7 @@ def assert_consistent(result: AssociationResult, scan: Scan, index: MapIndex, pr
         assert set(wall.scan) <= set(matched)
         assert np.hypot(*wall.direction) == pytest.approx(1.0)
         assert wall.displacement > 0.0
-    assert message_of(result)
+    assert result.message
     assert json.dumps(asdict(result), default=lambda array: array.tolist(), allow_nan=False), "all numbers are finite"
 
 
@@ -160,7 +159,7 @@ def whole_of(world: Any) -> AssociationResult:
 )
 def test_the_message_counts_poses_that_fit_about_as_well(world: Any, count: str) -> None:
     result = whole_of(world)
-    assert message_of(result) == f"{count} the scan about as well. The scan alone does not decide between them."
+    assert result.message == f"{count} the scan about as well. The scan alone does not decide between them."
     near = [one for one in result.alternatives if one.score >= diagnostics_in(result).score - AS_WELL]
     assert len(near) == int(count[0])
 

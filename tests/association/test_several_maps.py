@@ -30,7 +30,6 @@ from association import (
     associate,
     associate_on_maps,
     map_set,
-    message_of,
 )
 from registration import MeasuredSegments, RigidTransform, Segments
 
@@ -97,7 +96,7 @@ def test_the_floor_is_found_among_floors_that_share_their_outer_walls() -> None:
             assert probabilities(found) <= 1.0 + 1e-9
             right = found.map_id == name and same_pose(pose_in(found), TRUTH, 0.05)
             assert right or not found.usable
-            assert not found.usable or f"on the map {name}" in message_of(found)
+            assert not found.usable or f"on the map {name}" in found.message
             usable += found.usable
     assert usable >= 8
 
@@ -128,7 +127,7 @@ def test_equal_floors_are_ambiguous_and_both_are_listed() -> None:
     assert found.alternatives[0].map_id == other
     (reason,) = [one for one in found.reasons if one.code == "similar_place"]
     assert f"the map {other}" in reason.message
-    assert f"on the map {other}" in message_of(found)
+    assert f"on the map {other}" in found.message
     assert probability_in(found) <= 0.5
 
 
