@@ -174,13 +174,6 @@ def test_a_pair_of_weight_0_does_not_say_that_the_others_fix_the_pose() -> None:
     assert (result.degenerate, result.diagnostics.pairs, result.diagnostics.dof) == (True, 2, 2)
 
 
-def test_one_step_gives_the_papers_answer_as_long_as_it_has_one() -> None:
-    map_segments, scan = nearly_parallel(0.45)
-    result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions("one_step"))
-    assert result.degenerate
-    np.testing.assert_allclose(place_of(result), [POSE.x, POSE.y], atol=1e-9)
-
-
 def test_one_step_loses_no_digits_to_walls_that_are_hardly_not_parallel() -> None:
     # In one pass the determinant, 3e-10 of the sums that it is the difference of, would cost half a micrometre.
     map_segments = moved(RigidTransform(0.0, 0.0, 0.7), nearly_parallel(0.001)[0])

@@ -199,14 +199,6 @@ def test_a_reference_may_be_moved_across_the_wrap() -> None:
     assert sums.rotation_cost(there, "mitsuta") == pytest.approx(fresh.rotation_cost(there, "mitsuta"))
 
 
-def test_pairs_are_chosen_by_index() -> None:
-    map_segments, scan = noisy_pairs(np.random.default_rng(1), 5)
-    chosen = Correspondences.of(map_segments, scan, [[3, 3], [1, 1]])
-    both = correspondences(map_segments, scan)
-    expected = OneStepSums.of_pair(both, 1, 1.0) + OneStepSums.of_pair(both, 3, 1.0)
-    np.testing.assert_allclose(OneStepSums.of_set(chosen, np.ones(2)).values, expected.values, rtol=1e-15)
-
-
 def test_sums_of_nothing() -> None:
     pairs = Correspondences.of(directed([0]), MeasuredSegments.from_segments(directed([0])), [])
     sums = OneStepSums.of_set(pairs, [])

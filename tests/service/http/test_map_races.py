@@ -73,7 +73,7 @@ def test_one_writer_wins(pair: Pair, url: str) -> None:
         return [put(pair.clients[i % 2], url, i, **headers) for i in range(WRITERS)]
 
     revision = 0
-    for _ in range(5):
+    for _ in range(2):
         answers = at_once(writers(if_none_match="*"))
         assert sorted(answer.status_code for answer in answers) == [201] + [412] * (WRITERS - 1)
         for _ in range(3):
@@ -94,14 +94,6 @@ def test_one_writer_wins(pair: Pair, url: str) -> None:
         if codes[0] == 200:
             revision += 1
             assert pair.clients[0].delete(url).status_code == 204
-
-
-def test_every_unconditional_write_is_a_revision(pair: Pair, url: str) -> None:
-    answers = at_once([put(pair.clients[i % 2], url, i) for i in range(WRITERS)])
-    assert sorted(answer.json()["revision"] for answer in answers) == list(range(1, WRITERS + 1))
-    assert [answer.status_code for answer in answers].count(201) == 1
-    last = max(range(WRITERS), key=lambda i: answers[i].json()["revision"])
-    assert pair.clients[0].get(url).json() == a_map(last)
 
 
 def test_a_change_by_another_process_is_noticed_at_once(pair: Pair, url: str) -> None:

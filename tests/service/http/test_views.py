@@ -116,30 +116,6 @@ def test_views_in_a_batch(client: httpx.Client) -> None:
     assert bad["problem"]["errors"][0]["pointer"] == "/scans/1/views/1/relative_to"
 
 
-def test_the_last_view_answers_for_a_drive_that_saw_much_that_is_on_no_map(client: httpx.Client) -> None:
-    """Its segments are named by its place among the views, here the last one."""
-    rng, views = np.random.default_rng(4), []
-    for k in (3, 2, 1):
-        at = HERE.compose(RigidTransform(-0.3 * k, 0.1 * k, 0.1 * k))
-        begins = rng.uniform(-4.0, 4.0, (14, 2))
-        things = np.hstack([begins, begins + rng.uniform(-1.5, 1.5, (14, 2))]).tolist()
-        step = {"covariance": np.diag([4e-4, 4e-4, 4e-4]).tolist(), "relative_to": 4 - k}
-        views.append({"segments": [*seen_from(at), *things], "pose": pose_json(HERE.inverse().compose(at)), **step})
-    views.append({"segments": seen_from(HERE), "pose": EXACT})
-    last, drive = {"segments": seen_from(HERE)}, {"views": views}
-    # The drive is less likely than its last view; only the latter is usable from between both.
-    likely = [asked(client, scan)["probability"] for scan in (last, drive)]
-    options = {"usable_from": min(0.5 * sum(likely), 0.9999)}
-    alone, answer = (asked(client, scan, options=options) for scan in (last, drive))
-    assert alone["usable"]
-    assert (answer["status"], answer["usable"], answer["reasons"]) == ("ok", True, [])
-    assert "last_view_only" in [one["code"] for one in answer["warnings"]]
-    assert {pair["view"] for pair in answer["correspondences"]} == {3}
-    assert {one["view"] for one in answer["unmatched_scan"]} == {0, 1, 2}
-    assert answer["probability"] == pytest.approx(alone["probability"], abs=1e-6)
-    assert answer["pose"] == pytest.approx(alone["pose"], abs=1e-6)
-
-
 def test_a_position_that_is_open_has_no_probability(client: httpx.Client) -> None:
     """Of one wall, and of the two of a corridor; as segments, in a batch too."""
     corridor = {"segments": [[-20.0, 0.0, 20.0, 0.0], [20.0, 2.0, -20.0, 2.0]]}

@@ -89,17 +89,3 @@ def test_controls_are_large_enough_for_a_finger(phone: Page) -> None:
         if min(box["width"], box["height"]) < LEAST - 0.5:
             small.append((one.evaluate("it => it.outerHTML.slice(0, 60)"), box["width"], box["height"]))
     assert small == []
-
-
-def test_the_result_is_next_to_its_button(phone: Page) -> None:
-    """Both are seen at a time, without scrolling between them."""
-    for button, result in (("#run", "#message"), ("#files", "#reading"), ("#analyze", "#analyzed")):
-        if button == "#analyze":
-            phone.locator("#analysis summary").click()
-            phone.locator("#analyze").click()
-            expect(phone.locator(result)).not_to_be_empty()
-        if button == "#files":
-            phone.set_input_files("#files", [{"name": "a.json", "mimeType": "", "buffer": b"{}"}])
-            expect(phone.locator(result)).not_to_be_empty()
-        top, below = box_of(phone, button), box_of(phone, result)
-        assert abs(top["y"] - below["y"]) < 300, button

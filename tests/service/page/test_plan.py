@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -16,38 +15,6 @@ from tests.service.importing.forms import room_grid
 from .plan import ROOMS, Plan, box_of, shown, verdict
 
 WEB = Path(__file__).parents[3] / "web" / "src"
-THINGS = {
-    "wall", "off", "added", "robot", "scan", "matched", "unmatched", "missing", "critical", "estimate", "other",
-    "usable", "ambiguous", "degenerate", "no_match",
-}  # fmt: skip
-LEAST_DISTANCE = 12.0  # of two colours, in CIELAB: far more than the 2.3 that an eye just notices
-
-
-def colours(page: Page) -> dict[str, str]:
-    style = "name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()"
-    return {name: page.evaluate(style, name) for name in sorted(THINGS)}
-
-
-def lab(colour: str) -> np.ndarray:
-    """Return a colour of the style sheet in CIELAB."""
-    colour = colour if len(colour) == 7 else "#" + "".join(2 * c for c in colour[1:])
-    rgb = np.array([int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)])
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-    xyz = to_xyz @ linear / [0.9505, 1.0, 1.089]
-    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_each_thing_has_a_colour_of_its_own(page: Page, scheme: str) -> None:
-    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-    page.goto("/")
-    found = colours(page)
-    assert all(re.fullmatch("#([0-9a-f]{3}){1,2}", colour) for colour in found.values()), found
-    near = [(a, b) for a, b in combinations(sorted(found), 2)
-            if np.linalg.norm(lab(found[a]) - lab(found[b])) < LEAST_DISTANCE]  # fmt: skip
-    assert near == []
 
 
 def test_verdicts_have_the_colours_of_the_pictures_in_documents() -> None:
@@ -104,15 +71,6 @@ def test_the_bar_is_as_long_as_it_says(page: Page) -> None:
         expect(bar).not_to_have_css("width", fitted)
         page.get_by_role("button", name="Fit").click()
         expect(bar).to_have_css("width", fitted)  # drawn in the next frame
-
-
-def test_a_line_at_each_metre(page: Page) -> None:
-    """In the right room, where nothing else is."""
-    shown(page, "rooms", "ambiguous")
-    plan = Plan(page, ROOMS)
-    row = [plan.colour(x, 4.5)[3] for x in np.arange(9.0 - 3 / plan.scale(), 9.0 + 4 / plan.scale(), 1 / plan.scale())]
-    assert max(row) > 0
-    assert [plan.colour(x, 4.5)[3] for x in (9.3, 9.5, 9.7)] == [0, 0, 0]
 
 
 def test_layers_are_switched(page: Page) -> None:
