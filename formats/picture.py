@@ -54,6 +54,16 @@ class DrawnLines:
     dashed: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnText:
+    """A text above the lines: its middle, metres in the map frame, and its colour."""
+
+    x: float
+    y: float
+    text: str
+    colour: tuple[int, int, int]
+
+
 def draw_map(
     map: LineMap,
     path: str | os.PathLike[str],
@@ -61,6 +71,7 @@ def draw_map(
     doubtful: Iterable[RigidTransform] = (),
     marks: Iterable[PlaceMark] = (),
     lines: Iterable[DrawnLines] = (),
+    texts: Iterable[DrawnText] = (),
 ) -> None:
     """Draw a map as PNG: walls and points in grey, a blue tick on the free side of each wall.
 
@@ -78,6 +89,7 @@ def draw_map(
     marks : iterable of PlaceMark
         A later one covers those before.
     lines : iterable of DrawnLines
+    texts : iterable of DrawnText
 
     Raises
     ------
@@ -102,6 +114,8 @@ def draw_map(
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
         sheet.draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
         sheet.draw.line([(x, y), tip], fill=colour, width=1)
+    for text in texts:
+        _write(sheet, text)
     entries = [("wall", rgb(WALL))] + [("free side", rgb(MATCHED))] * map.oriented
     entries += [("usable pose", rgb(USABLE))] * bool(poses) + [("pose that is not usable", rgb(POINT))] * bool(doubtful)
     painted = {mark.colour for mark in marks}
@@ -160,6 +174,14 @@ def _draw_line(
         a, b = k / count, min(1.0, (k + 1) / count)
         ends = [(begin[0] + t * (end[0] - begin[0]), begin[1] + t * (end[1] - begin[1])) for t in (a, b)]
         draw.line(ends, fill=how.colour, width=5)
+
+
+def _write(sheet: _Sheet, told: DrawnText) -> None:
+    """Write a text on paper of its own."""
+    font, at = ImageFont.load_default(LETTERS), sheet.place(told.x, told.y)
+    left, top, right, bottom = sheet.draw.textbbox(at, told.text, font=font, anchor="mm")
+    sheet.draw.rectangle([left - 3, top - 3, right + 3, bottom + 3], fill=PAPER, outline=told.colour)
+    sheet.draw.text(at, told.text, fill=told.colour, font=font, anchor="mm")
 
 
 def _annotate(

@@ -122,7 +122,7 @@ def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str,
         told = one["evidence"]
         kept = "" if one["accepted"] else ", not accepted"
         before, after = [old["segments"][k] for k in one["segments"]], [new["segment"] for new in one["new"]]
-        x, y = (fmean(row[k] for row in (*before, *after) for k in (axis, axis + 2)) for axis in (0, 1))
+        x, y = _middle((*before, *after))
         which = f" (segments {', '.join(map(str, one['segments'][:8]))}{', ...' * (len(before) > 8)})" * bool(before)
         yield (
             f"change {number}",
@@ -141,18 +141,24 @@ def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str,
         yield "note", "the time limit ended the update; changes that were not verified are not proposed"
 
 
+def _middle(rows: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Return the mean of the ends of segments, where the number of their change stands on the picture."""
+    x, y = (fmean(row[k] for row in rows for k in (axis, axis + 2)) for axis in (0, 1))
+    return x, y
+
+
 def _metres(rows: Sequence[Sequence[float]]) -> str:
     """Return the length of segments."""
     return f"{sum(math.dist(row[:2], row[2:]) for row in rows):.2f} m"
 
 
 def draw_changes(old: Json, answer: Json, picture: Path) -> None:
-    """Draw the old map, and the changes in colours: old walls that go dashed, new walls solid."""
+    """Draw the old map, and the changes in colours with their numbers: old walls that go dashed, new walls solid."""
     with needing_formats("drawing a picture"):
         import numpy as np
 
         from formats.colours import CHANGES, rgb
-        from formats.picture import DrawnLines
+        from formats.picture import DrawnLines, DrawnText
 
         ends = line_map_of(old).segments.endpoints
     lines = []
@@ -163,4 +169,8 @@ def draw_changes(old: Json, answer: Json, picture: Path) -> None:
         lines.append(DrawnLines(np.array(new).reshape(-1, 4), rgb(colour), code))
         name = code if code == "removed" else f"{code}, before"
         lines.append(DrawnLines(np.array(gone).reshape(-1, 4), rgb(colour), name, dashed=True))
-    draw_picture(old, picture, lines=lines)
+    texts = []
+    for number, one in enumerate(answer["changes"]):
+        x, y = _middle([*(old["segments"][k] for k in one["segments"]), *(new["segment"] for new in one["new"])])
+        texts.append(DrawnText(x, y, str(number), rgb(CHANGES[one["code"]])))
+    draw_picture(old, picture, lines=lines, texts=texts)

@@ -58,6 +58,8 @@ def conclude(
     if not mistakes and not deadline.passed:
         thicker = _thickness(index, some, oriented=directed)
     advice, usable, would_be = fits.advice(directed, mistakes)
+    if thicker is not None and directed:  # a bias, of which a standard deviation is no measure
+        advice, would_be = replace(advice, sigma=None), fits.usable(replace(fits.present, oriented=True))
     findings = [*mistakes, *_moved(fits.samples)]
     if directed is not oriented and not mistakes:
         findings.insert(0, _undirected(len(tried), usable, would_be))
@@ -164,12 +166,16 @@ def _thickness_finding(thicker: float, *, oriented: bool) -> Finding:
             f"The scans fit better if each line is the centre line of a wall {thicker:.2f} m thick. Import the drawing "
             f"with drawn `centres` and thickness {thicker:.2f}.",
         )
-    more, sign = ("thicker", "plus") if thicker > 0.0 else ("thinner", "minus")
+    more, sign, depth, side = (
+        ("thicker", "plus", "smaller", "left") if thicker > 0.0 else ("thinner", "minus", "greater", "right")
+    )
+    half = 50.0 * abs(thicker)
     return Finding(
         "thickness",
         f"The scans fit better if walls are {100.0 * abs(thicker):.0f} cm {more} than drawn. For a drawing that was "
-        f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For any other map, "
-        "for example a grid, state this uncertainty as `sigma`.",
+        f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For a grid, "
+        f"import it again with its `surface` {half:.1f} cm {depth}, or with the log, which estimates it. In any other "
+        f"map, move each segment by {half:.1f} cm to its {side}.",
     )
 
 

@@ -66,6 +66,9 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
     assert new["segments"] == TODAY.endpoints.tolist()
     assert (new["sigma"], new["meta"]) == (0.005, "A 3")
     assert REMOVED in colours_of(folder / "changes.png")
+    with Image.open(folder / "changes.png") as picture:  # its number, in the middle of the rack
+        middle = picture.convert("RGB").crop((360, 730, 376, 750))
+        assert REMOVED in {colour for _, colour in middle.getcolors(1 << 24)}
 
 
 def test_one_visit_shows_no_change_and_says_so(linefix: Linefix) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -234,4 +235,13 @@ def test_the_sentence_on_thickness_says_what_to_do() -> None:
     assert "cm thinner than drawn" in thin.message
     assert "thickness plus 0.1" in thick.message
     assert "thickness minus 0.1" in thin.message
-    assert all("any other map, for example a grid" in one.message for one in (thin, thick))  # which has no thickness
+    assert re.search("`surface` [45].. cm smaller", thick.message)  # of a grid, which has no thickness
+    assert re.search("`surface` [78].. cm greater", thin.message)
+    assert "to its left" in thick.message
+    assert not any("sigma" in one.message for one in (thin, thick))
+
+
+def test_a_bias_of_all_walls_is_no_sigma() -> None:
+    report = told(two_faces(0.1))
+    assert codes(report) == ["thickness"]
+    assert report.advice.sigma is None
