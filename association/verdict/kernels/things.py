@@ -50,11 +50,15 @@ def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
                 j = order[later]
                 if x[j] - x[i] > THINGS_APART:
                     break
-                if math.hypot(x[j] - x[i], y[j] - y[i]) <= THINGS_APART:
+                # Most places of a band are too far along y, which costs less to find than a distance.
+                if abs(y[j] - y[i]) <= THINGS_APART and math.hypot(x[j] - x[i], y[j] - y[i]) <= THINGS_APART:
+                    # Each step halves the way to the first place of a thing: the chains of large things stay short.
                     one, another = i, j
                     while thing[one] != one:
+                        thing[one] = thing[thing[one]]
                         one = thing[one]
                     while thing[another] != another:
+                        thing[another] = thing[thing[another]]
                         another = thing[another]
                     thing[max(one, another)] = min(one, another)
         low, high, total = np.full((count, 2), math.inf), np.full((count, 2), -math.inf), np.zeros(count)
