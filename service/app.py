@@ -7,7 +7,7 @@ import gc
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from functools import partial
+from functools import cache, partial
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -15,11 +15,12 @@ from starlette.middleware.cors import CORSMiddleware
 
 from compiled import compiled_fraction, is_complete
 from linefix.compiling import start_compiler
+from linefix.documents.encoding import encode
 from linefix.warmup import warm_up
 
 from .errors import StoreError
 from .http.middleware import RequestMiddleware
-from .http.openapi import Contract, describe
+from .http.openapi import describe
 from .http.problems import handle_errors
 from .http.routes import batch, importing, maps, operations, pages, quality, scans
 from .http.services import Services
@@ -56,7 +57,8 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
         lifespan=partial(_lifespan, services=services, started=started),
     )
     app.state.services = services
-    app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
+    # Made on the first request for it: that takes some tenths of a second.
+    app.state.contract = cache(lambda: encode(describe(app, guarded=settings.guarded)))
     # In the order in which they are tried: robots come most often, and the paths of what is done with a map are also
     # those of a map. An included router would be one more layer for each of them.
     for module in (scans, batch, quality, importing, maps, operations, pages):

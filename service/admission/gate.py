@@ -80,6 +80,9 @@ class Gate:
         By how much these go behind other threads.
     long_per_slot : int
         Long functions that may run next to those that have slots; 0: each keeps its slot until it returns.
+    waits : bool
+        False where functions do not look at the deadline, as while they index a map: a caller waits for its function
+        until the deadline and no longer. The function then goes on and keeps its slot, for the next caller.
     """
 
     def __init__(
@@ -89,12 +92,13 @@ class Gate:
         name: str = "search",
         nice: int = 0,
         long_per_slot: int = LONG_PER_SLOT,
+        waits: bool = True,
     ) -> None:
         self.slots = slots
         self._most = sys.maxsize if places is None else places
         self._most_long = long_per_slot * slots
         self._most_long_of_one = max(1, self._most_long // 2)
-        self._name, self._nice = name, nice
+        self._name, self._nice, self._waits = name, nice, waits
         self._idle: list[_Worker] = []
         self._closed = False
         self._runs: set[_Run] = set()
@@ -161,27 +165,18 @@ class Gate:
             self._shares[ticket.holder].places -= 1
             self._forget(ticket.holder)
 
-    async def run(
-        self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool] = lambda: True
-    ) -> T:
+    async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket) -> T:
         """Run a function as soon as it has a slot; a request that had one is not refused later.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns or is long, so
         that there are never more running than slots. Cancel the deadline to make it return soon.
-
-        Parameters
-        ----------
-        heeds : callable
-            Returns whether the function looks at the deadline by now, and returns soon after it. As long as it does
-            not, as while it indexes a map, the caller waits for it until the deadline and no longer. The function then
-            goes on and keeps its slot, for the next caller.
 
         Raises
         ------
         ShareUsedError
             When the place went to a holder that has fewer.
         DeadlinePassedError
-            When the deadline passes before there is a slot, or before the function heeds it.
+            When the deadline passes before there is a slot, or, in a gate that does not wait, before the result.
         CancelledError
             When every search is cancelled.
         """
@@ -193,7 +188,7 @@ class Gate:
         else:
             await self._wait(share, deadline, ticket)
         ticket.had_slot = True
-        answer = self._start(function, deadline, ticket.holder, heeds)
+        answer = self._start(function, deadline, ticket.holder)
         try:
             return await answer
         finally:
@@ -230,9 +225,7 @@ class Gate:
             if timer is not None:
                 timer.cancel()
 
-    def _start(
-        self, function: Callable[[], T], deadline: Deadline, holder: Holder, heeds: Callable[[], bool]
-    ) -> asyncio.Future[T]:
+    def _start(self, function: Callable[[], T], deadline: Deadline, holder: Holder) -> asyncio.Future[T]:
         """Start a function in a thread, in the slot that its holder has."""
         loop = asyncio.get_running_loop()
         try:
@@ -244,13 +237,10 @@ class Gate:
             raise
         run = _Run(holder, deadline, loop.create_future(), time.monotonic(), worker)
         self._runs.add(run)
-
-        def expire() -> None:
-            if not heeds():
-                _fail(run.answer, DeadlinePassedError())
-
-        timers = [_at(deadline, expire), loop.call_later(LONG_SECONDS, self._lower, run) if self._most_long else None]
-        run.timers = [timer for timer in timers if timer is not None]
+        if self._most_long:
+            run.timers.append(loop.call_later(LONG_SECONDS, self._lower, run))
+        if not self._waits and (timer := _at(deadline, _fail, run.answer, DeadlinePassedError())) is not None:
+            run.timers.append(timer)
         worker.todo.put((function, lambda *outcome: loop.call_soon_threadsafe(self._finish, run, *outcome)))
         return run.answer
 

@@ -1,6 +1,6 @@
 """One request while it is served, from its head to its line in the log; routes get it by `Depends`.
 
-Its stages are functions of `body_stage`, `map_stage` and `search_stage`, each of which takes an exchange.
+Its stages are functions of `bodies`, `map_stage` and `search_stage`, each of which takes an exchange.
 """
 
 from __future__ import annotations

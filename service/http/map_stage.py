@@ -97,7 +97,7 @@ async def index_map(
     index = partial(services.lookup.indexed, source, oriented=oriented, deadline=deadline)
     with services.documents.account(exchange.ticket.holder) as account:
         account.take(source.unread_bytes)
-        return await services.indexing.run(index, deadline, exchange.ticket, lambda: False)
+        return await services.indexing.run(index, deadline, exchange.ticket)
 
 
 async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:

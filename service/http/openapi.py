@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
 from typing import Any
 
 from fastapi import FastAPI
@@ -11,11 +9,9 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from linefix.documents.encoding import encode
 from linefix.documents.errors import Fault
 
 from ..admission.entrance import GUARDED
-from ..thread_pool import Threads
 from . import answers
 from .bodies import JSON
 from .problems import KINDS, MEDIA_TYPE, Kind, Problem
@@ -108,27 +104,3 @@ def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
             for operation in item.values() if path.startswith(GUARDED) else ():
                 operation["security"] = [{"key": []}]
     return document
-
-
-class Contract:
-    """The document as it is sent, one copy for all readers; belongs to one event loop.
-
-    It takes some tenths of a second to make: in a thread, on the first request for it, and never again.
-
-    Parameters
-    ----------
-    describe : callable
-        Returns the document.
-    threads : Threads
-    """
-
-    def __init__(self, describe: Callable[[], dict[str, Any]], threads: Threads) -> None:
-        self._describe = describe
-        self._threads = threads
-        self._making: asyncio.Future[bytes] | None = None
-
-    async def body(self) -> bytes:
-        """Return it as JSON; requests that arrive while it is made wait for the same."""
-        if self._making is None:
-            self._making = asyncio.ensure_future(self._threads.run(lambda: encode(self._describe())))
-        return await asyncio.shield(self._making)

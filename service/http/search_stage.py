@@ -22,14 +22,9 @@ class HangUpError(Exception):
     """The client hung up; no answer can be sent."""
 
 
-async def in_search_slot(
-    exchange: Exchange, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True
-) -> T:
-    """Run a part of this request in a slot of the gate; an admitted request is not refused later.
-
-    A call that does not heed the deadline is waited for until then and no longer: see `Gate.run`.
-    """
-    return await exchange.services.gate.run(queued(call), deadline, exchange.ticket, heeds)
+async def in_search_slot(exchange: Exchange, call: Callable[[], T], deadline: Deadline) -> T:
+    """Run a part of this request in a slot of the gate; an admitted request is not refused later."""
+    return await exchange.services.gate.run(queued(call), deadline, exchange.ticket)
 
 
 async def in_search_slots(

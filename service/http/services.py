@@ -51,7 +51,7 @@ class Services:
         self.gate = Gate(searches, searches + settings.share(settings.queue))
         # The number that waits there is bounded by their bytes.
         self.parsing = Gate(1, None, "parsing", long_per_slot=0)
-        self.indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0)
+        self.indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0, waits=False)
         # A second one when the first takes long, and not for the same key: each takes memory.
         self.importing = Gate(1, None, "importing", long_per_slot=1)
         self.import_bounds = Bounds(

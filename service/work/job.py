@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from threading import Event
 from typing import Any
 
 from association import CancelledError, Deadline, MapIndex
@@ -46,27 +45,11 @@ class Job:
     watch : Stopwatch
         Since the body had arrived.
     deadline : Deadline
-    searching : Event
-        Set once what goes on looks at the deadline.
     """
 
     request_id: str
     watch: Stopwatch
     deadline: Deadline
-    searching: Event = field(default_factory=Event)
-
-    def begin_search(self) -> None:
-        """Note that the request is decoded, and that what follows looks at the deadline.
-
-        Raises
-        ------
-        DeadlinePassedError
-            When the deadline has passed before.
-        """
-        self.watch.lap("decode")
-        if self.deadline.passed and not self.deadline.cancelled:
-            raise DeadlinePassedError
-        self.searching.set()
 
     def done(self, answer: dict[str, Any], **noted: object) -> Done:
         """Return an answer as JSON, with the request's id and its times.
@@ -119,5 +102,7 @@ def begin(operation: Operation, lookup: MapLookup, source: FoundMaps, job: Job, 
     assert isinstance(index, MapIndex)
     steps = operation(index, source)
     next(steps)
-    job.begin_search()
+    job.watch.lap("decode")
+    if job.deadline.passed and not job.deadline.cancelled:
+        raise DeadlinePassedError
     return Work(steps, job.deadline)

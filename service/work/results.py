@@ -59,7 +59,6 @@ class Associator:
     def answer(self, asked: AssociateRequest, source: FoundMaps, job: Job, ready: CachedMap | None = None) -> Done:
         """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
         target = self.target(asked, source, job.deadline, ready)
-        job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline, job.watch)
         noted = {"map": found["map"], "verdict": found["status"], "usable": found["usable"]}
         return job.done({**found, "client_ref": asked.client_ref}, **noted)

@@ -16,7 +16,7 @@ from ...errors import ShareHeldError, TooMuchHeldError
 from ...work.job import Done, Job
 from ...work.results import BatchResult, batch_done
 from ..answers import BatchAnswer
-from ..body_stage import read
+from ..bodies import read
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps
 from ..openapi import searches
@@ -46,7 +46,7 @@ async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchIt
     async with looking_up_maps(exchange, asked, job.deadline) as source:
         ready = await index_map(exchange, source, job.deadline, oriented=oriented)
         index = partial(associator.target, asked, source, job.deadline, ready)
-        target = await in_search_slot(exchange, index, job.deadline, heeds=lambda: False)
+        target = await in_search_slot(exchange, index, job.deadline)
     job.watch.lap("decode")
     with exchange.services.answers.account(exchange.ticket.holder) as account:
 

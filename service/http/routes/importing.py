@@ -18,8 +18,7 @@ from ...importing.fields import MAP_FORM, SCANS_FORM
 from ...work.job import Done, Job
 from ...work.results import answer_import, answer_scans, index_import
 from ..answers import ImportAnswer, ScansAnswer
-from ..bodies import FORM
-from ..body_stage import parse, receive
+from ..bodies import FORM, parse, receive
 from ..exchange import Exchange, Searching
 from ..openapi import EVERYWHERE, READS_BODY, SEARCHES, problems
 from ..search_stage import in_search_slot

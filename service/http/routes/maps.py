@@ -14,7 +14,7 @@ from linefix.documents.reading import read_map
 
 from ...maps.lookup import outline_of
 from ..answers import MapList, MapSummaryAnswer
-from ..body_stage import read
+from ..bodies import read
 from ..etags import demands_of, etag, is_unchanged
 from ..exchange import Admitted
 from ..map_stage import ask_store

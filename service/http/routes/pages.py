@@ -14,6 +14,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from ...errors import NotFoundError
 from ..bodies import JSON
+from ..exchange import Admitted
 from ..sending import PiecewiseResponse
 
 router = APIRouter(include_in_schema=False)
@@ -74,9 +75,10 @@ async def example(name: str) -> Response:
 
 
 @router.get("/openapi.json")
-async def contract(request: Request) -> Response:
+async def contract(request: Request, exchange: Admitted) -> Response:
     """Give the contract; from bytes that all who read it share, however slowly."""
-    return PiecewiseResponse(await request.app.state.contract.body(), media_type=JSON)
+    document = await exchange.services.parse_threads.run(request.app.state.contract)
+    return PiecewiseResponse(document, media_type=JSON)
 
 
 @router.get("/docs", response_class=HTMLResponse)

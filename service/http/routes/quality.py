@@ -22,7 +22,7 @@ from linefix.operations import Json, Steps, analysis_steps, check_steps, update_
 from ...maps.lookup import FoundMaps
 from ...work.job import Done, Job, Operation, begin
 from ...work.results import answer_apply
-from ..body_stage import read_request
+from ..bodies import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_map
 from ..openapi import EVERYWHERE, SEARCHES, problems, searches
@@ -165,7 +165,7 @@ async def _in_turns(
             await index_map(exchange, source, job.deadline, oriented=oriented)
             reference = source.references[None]
             beginning = partial(begin, operation, lookup, source, job, oriented=oriented)
-            begun = await in_search_slot(exchange, beginning, job.deadline, job.searching.is_set)
+            begun = await in_search_slot(exchange, beginning, job.deadline)
         if not await in_short_slots(exchange, begun.take_turn, job.deadline):  # the rest then searches nothing
             while await run(begun.take_turn):
                 await asyncio.sleep(0)

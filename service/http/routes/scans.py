@@ -12,7 +12,7 @@ from linefix.documents.requests import AssociateRequest, RegisterRequest, Vector
 
 from ...work.job import Done, Job
 from ...work.results import answer_registration, answer_vectorization
-from ..body_stage import read_request
+from ..bodies import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps
 from ..openapi import searches
@@ -47,7 +47,7 @@ async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
     async with looking_up_maps(exchange, asked, job.deadline) as source:
         ready = await index_map(exchange, source, job.deadline, oriented=oriented)
         work = partial(exchange.services.associator.answer, asked, source, job, ready)
-        return await in_search_slot(exchange, work, job.deadline, job.searching.is_set)
+        return await in_search_slot(exchange, work, job.deadline)
 
 
 @router.post(

@@ -38,8 +38,8 @@ def nice() -> int:
 class BlockedGate(Gate):
     """A gate, and a search that runs until it is released."""
 
-    def __init__(self, slots: int, places: int | None = None, long_per_slot: int = 0) -> None:
-        super().__init__(slots, places, long_per_slot=long_per_slot)
+    def __init__(self, slots: int, places: int | None = None, long_per_slot: int = 0, waits: bool = True) -> None:
+        super().__init__(slots, places, long_per_slot=long_per_slot, waits=waits)
         self.release = threading.Event()
         self.asked: list[asyncio.Future[Any]] = []
 
@@ -48,7 +48,6 @@ class BlockedGate(Gate):
         function: Callable[[], T],
         holder: bytes | None = None,
         deadline: Deadline | None = None,
-        heeds: Callable[[], bool] = lambda: True,
         ticket: Ticket | None = None,
     ) -> asyncio.Future[T]:
         """Ask for a slot, as a request does whose body has arrived."""
@@ -57,7 +56,7 @@ class BlockedGate(Gate):
             admitted = ticket or Ticket(holder)
             self.enter(admitted)
             try:
-                return await self.run(function, deadline or within(), admitted, heeds)
+                return await self.run(function, deadline or within(), admitted)
             finally:
                 if ticket is None:
                     self.leave(admitted)
@@ -75,8 +74,10 @@ class BlockedGate(Gate):
 
 
 @asynccontextmanager
-async def gate_of(slots: int, places: int | None = None, long_per_slot: int = 0) -> AsyncIterator[BlockedGate]:
-    gate = BlockedGate(slots, places, long_per_slot)
+async def gate_of(
+    slots: int, places: int | None = None, long_per_slot: int = 0, waits: bool = True
+) -> AsyncIterator[BlockedGate]:
+    gate = BlockedGate(slots, places, long_per_slot, waits)
     try:
         yield gate
     finally:

@@ -159,18 +159,19 @@ async def test_a_deadline_passes_in_the_queue() -> None:
 
 
 @in_loop
-async def test_what_does_not_heed_the_deadline_is_waited_for_until_then() -> None:
-    """It goes on and keeps its slot; what heeds the deadline by then has its answer waited for."""
-    async with gate_of(2) as gate:
+async def test_a_gate_may_wait_for_a_function_until_the_deadline_and_no_longer() -> None:
+    """The function goes on and keeps its slot; other gates wait for the answer."""
+    async with gate_of(1, waits=False) as impatient, gate_of(1) as patient:
         deadline = within(0.1)
-        deaf = gate.ask(gate.release.wait, deadline=deadline, heeds=lambda: False)
-        hearing = gate.ask(gate.release.wait, deadline=deadline, heeds=lambda: deadline.passed)
+        left = impatient.ask(impatient.release.wait, deadline=deadline)
+        awaited = patient.ask(patient.release.wait, deadline=deadline)
         with pytest.raises(DeadlinePassedError):
-            await deaf
-        assert (gate.running, hearing.done()) == (2, False)
-        gate.release.set()
-        assert await hearing
-        await until(lambda: gate.running == 0)
+            await left
+        assert (impatient.running, awaited.done()) == (1, False)
+        impatient.release.set()
+        patient.release.set()
+        assert await awaited
+        await until(lambda: impatient.running == 0)
 
 
 @in_loop
