@@ -95,7 +95,7 @@ def text_of(content: bytes, name: str) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise MalformedFileError("expected text in UTF-8", argument=name) from error
+        raise MalformedFileError("expected text in UTF-8; save it as UTF-8", argument=name) from error
 
 
 def load_json(content: bytes, name: str) -> Any:

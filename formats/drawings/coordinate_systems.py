@@ -51,8 +51,10 @@ def require_lengths(told: Any, drawing: Drawing) -> None:
     name, code = _named(told)
     x, y = (float(c) for c in np.median(corners, axis=0))
     why = None
-    if units is None or (isinstance(units, str) and code in MERCATOR):
-        why = _why_not(name, code, (x, y), float(np.ptp(corners, axis=0).max()), drawing.options.local_metres)
+    extent = float(np.ptp(corners, axis=0).max())
+    small = extent < LESS_THAN_A_BUILDING and extent * (drawing.options.metres or 1.0) < LESS_THAN_A_BUILDING
+    if units is None or small or (isinstance(units, str) and code in MERCATOR):
+        why = _why_not(name, code, (x, y), extent, drawing.options.local_metres)
     if why is not None:
         raise IncompleteFileError(why, argument=drawing.name)
     if name and not (units is None and _within(code, METRIC)):
@@ -84,13 +86,18 @@ def _why_not(name: str, code: int | None, place: tuple[float, float], extent: fl
 
 def _named(told: Any) -> tuple[str, int | None]:
     """Return the name of a coordinate system, and its code of EPSG where it has one."""
-    properties = told.get("properties") if isinstance(told, dict) else None
-    name = properties.get("name") if isinstance(properties, dict) else None
+    properties = told.get("properties") if isinstance(told, dict) else {"name": told}
+    name = properties.get("name", properties.get("code")) if isinstance(properties, dict) else None
+    if type(name) is int:
+        name = f"EPSG:{name}"
     if not isinstance(name, str):
         return "", None
+    zone = re.search(r"UTM zone (\d{1,2}) ?([NS])", name, re.IGNORECASE)
+    if zone:
+        return shown(name), (32600 if zone[2].upper() == "N" else 32700) + int(zone[1])
     if re.search(r"CRS:?84|WGS ?84$", name):
         return shown(name), 4326
-    found = re.search(r"EPSG\D{0,20}?(?:[\d.]+:)?:?(\d{4,6})$", name.strip())
+    found = re.search(r"(?:EPSG|ESRI)\b.{0,20}?\b(\d{4,6})\b", name, re.IGNORECASE)
     return shown(name), int(found[1]) if found else None
 
 

@@ -22,10 +22,13 @@ SYNONYMS = {
     for end in ends
     for axis in "xy"
 }
-DELIMITERS = (";", "\t", ",", " ")
+DELIMITERS = (";", "\t", "|", ",", " ")
+COMMENTS = ("#", "%", "//")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
-UNIT = re.compile(r"(.*?)[\s_]*[\[(]\s*([\w-]+)\s*[\])]")  # x1 [mm]
+UNIT = re.compile(r"(.*?)[\s_]*[\[(]\s*([\w-]+)\s*[\])]")  # x1 [mm], and x1_mm:
+SUFFIX = re.compile(rf"(.*?)[\s_]({'|'.join(UNITS)})", re.IGNORECASE)
+POINT = re.compile(r"(?:p|pt|pnt|point|pos|v|vertex)(?:([12])([xy])|([xy])([12]))")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,7 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     commas, loose = 0, []
     for row, line in zip(table.rows, table.lines, strict=True):
         numbers = [number for k in table.wanted if k < len(row) and (number := _number(row[k])) is not None]
+        texts = [cell for cell in row if cell and _number(cell) is None]
         if len(numbers) < len(COLUMNS):
             wrong = next(k for k in table.wanted if k >= len(row) or _number(row[k]) is None)
             found = f"'{shown(row[wrong])}' in column {wrong + 1}" if wrong < len(row) else f"{len(row)} cells"
@@ -91,12 +95,14 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
             raise _unclear(row, line, name)
         commas += any("," in row[k] for k in table.wanted)
         properties = {table.names[k]: row[k] for k in others if k < len(row)}
-        layer = properties.get("layer")
-        if not others:
+        layer = properties.get("layer", texts[0] if texts and not table.names else None)
+        if not others and layer is None:
             loose.append(numbers)
         elif drawing.takes((layer,) if layer else (), properties):
             x1, y1, x2, y2 = numbers
-            drawing.add([(x1, y1), (x2, y2)], layers=(layer,) if layer else (), properties=properties)
+            z1, z2 = (_number(properties.get(key, "")) or 0.0 for key in ("z1", "z2"))
+            layers = (layer,) if layer else ()
+            drawing.add([(x1, y1, z1), (x2, y2, z2)], layers=layers, properties=properties, groups=layers)
     drawing.add_segments(loose)
     if commas:
         notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
@@ -105,11 +111,11 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 def _table(lines: list[str], name: str) -> Table:
     """Return the table by the delimiter that gives four numbers, or a header; else by the most frequent one."""
-    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip(" \t\r\n,;|") and not line.startswith(COMMENTS)]
     told = re.fullmatch(r"\"?sep=(.)\"?\s*", kept[0][1]) if kept else None
     kept = kept[1:] if told else kept
     first = kept[0][1] if kept else ""
-    likely = max(DELIMITERS, key=first.count)
+    likely = next((one for one in DELIMITERS if one in first), ",")
     for delimiter in (told[1],) if told else (*DELIMITERS, likely):
         header = _cells(first, delimiter)
         columns, metres, names = _columns(header)
@@ -140,9 +146,10 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _columns(first: list[str]) -> tuple[tuple[int, ...], float, tuple[str, ...]]:
     """Return the columns of the coordinates, metres per unit, and the names of all; no names where it has none."""
-    units = [found[2] if (found := UNIT.fullmatch(cell)) else None for cell in first]
-    names = [(found[1] if (found := UNIT.fullmatch(cell)) else cell).casefold().strip() for cell in first]
-    short = [re.sub(r"[\s_.-]", "", name) for name in names]
+    parts = [UNIT.fullmatch(cell) or SUFFIX.fullmatch(cell) for cell in first]
+    units = [found[2].casefold() if found else None for found in parts]
+    names = [(found[1] if found else cell).casefold().strip() for found, cell in zip(parts, first, strict=True)]
+    short = [POINT.sub(r"\2\3\1\4", re.sub(r"[\s_.-]", "", name)) for name in names]
     if {"x0", "y0", "x1", "y1"} <= set(short) and not set(COLUMNS) <= set(short):
         short = [{"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}.get(name, name) for name in short]
     short = [SYNONYMS.get(name, SYNONYMS.get(name[1:] + name[:1], name)) for name in short]
@@ -156,6 +163,7 @@ def _columns(first: list[str]) -> tuple[tuple[int, ...], float, tuple[str, ...]]
 
 
 def _number(cell: str) -> float | None:
+    cell = cell.replace("\u2212", "-")  # a minus sign
     if COMMA.fullmatch(cell):
         return float(cell.replace(",", "."))
     return float(cell) if NUMBER.fullmatch(cell) else None

@@ -14,13 +14,13 @@ from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_SEGMENTS, MAX_UNITS
 from ..options import DEFAULT_OPTIONS, ImportOptions
 from ..report import Notes, listed_counts, shown
-from .selection import excluded_by, levels_of, matches
+from .selection import excluded_by, kinds_of, levels_of, lower_keys, matches, walls_among, walls_first
 
 Floats = NDArray[np.float64]
 
 FLAT, STEEP = 1e-3, 0.05  # of the greater extent in the plane: how narrow and how high a section is
 LEFT_OUT = {
-    "other_layer": "entities on layers that the option layers excludes",
+    "other_layer": "entities on layers that are not read",
     "other_value": "entities that the option where excludes",
     "not_seen": "entities that no laser sees; set the option where to read them",
 }
@@ -42,6 +42,8 @@ class Polyline:
         Floors that it is on, as the file names them.
     heights : (float, float)
         Least and greatest z, units of the drawing.
+    group : str
+        The layer by which it counts as a wall or not; empty where it has none, or this is decided.
     """
 
     ends: Floats
@@ -49,6 +51,7 @@ class Polyline:
     layer: str = ""
     levels: tuple[str, ...] = ()
     heights: tuple[float, float] = (0.0, 0.0)
+    group: str = ""
 
 
 @dataclass(slots=True)
@@ -74,6 +77,8 @@ class Drawing:
     points_sigma : float or None
         As in `LineMap`.
     polylines : list of Polyline
+    walls : set of str or None
+        Layers of walls by their names; None: not known, or all.
     """
 
     name: str
@@ -88,7 +93,9 @@ class Drawing:
     points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     points_sigma: float | None = None
     polylines: list[Polyline] = field(default_factory=list)
+    walls: set[str] | None = None
     _left_out: dict[str, Counter[str]] = field(default_factory=dict)
+    _kinds: Counter[str] = field(default_factory=Counter)  # of the entities that are taken, by their properties
     _count: int = 0
 
     def takes(self, layers: tuple[str, ...], properties: Mapping[str, Any] | None = None) -> bool:
@@ -96,13 +103,30 @@ class Drawing:
         why = None
         if self.options.layers and not matches(layers, self.options.layers):
             why = "other_layer", layers[-1] if layers else "no layer"
-        why = why or excluded_by(properties or {}, self.options.where)
+        elif self.walls is not None and layers[-1] not in self.walls:
+            why = "other_layer", layers[-1]
+        told = lower_keys(properties or {})
+        why = why or excluded_by(told, self.options.where)
         if why is not None:
             self._left_out.setdefault(why[0], Counter())[why[1]] += 1
+        elif kind := kinds_of(told):
+            self._kinds[kind] += 1
         return why is None
 
-    def note_left_out(self) -> None:
-        """Note the entities that `takes` excluded, with counts."""
+    def leave_out_others(self) -> None:
+        """Leave out lines that are on no layer of walls; note all that was left out, and the kinds that were not."""
+        groups = {one.group for one in self.polylines} - {""}
+        if groups and not self.options.layers and not self.options.where:
+            walls = walls_among(groups, self.notes) or groups
+            others = [one.group for one in self.polylines if one.group and one.group not in walls]
+            if others:
+                self._left_out.setdefault("other_layer", Counter()).update(others)
+                self.polylines = [one for one in self.polylines if not one.group or one.group in walls]
+        if len(self._kinds) > 1 and not self.options.where:
+            told = (
+                f"entities of all kinds are walls: {listed_counts(self._kinds)}; set the option where if some are not"
+            )
+            self.notes.add_assumed("kinds", told)
         for code, counts in self._left_out.items():
             self.notes.add_dropped(code, f"{LEFT_OUT[code]}: {listed_counts(counts)}", counts.total())
 
@@ -114,6 +138,7 @@ class Drawing:
         width: float = 0.0,
         layers: tuple[str, ...] = (),
         properties: Mapping[str, Any] | None = None,
+        groups: tuple[str, ...] = (),
     ) -> None:
         """Add a polyline.
 
@@ -129,6 +154,8 @@ class Drawing:
             That it is on, outermost first.
         properties : mapping, optional
             May name its floor.
+        groups : tuple of str
+            The layers that may be named after walls, outermost first.
 
         Raises
         ------
@@ -142,8 +169,8 @@ class Drawing:
             p = np.vstack([p, p[:1]])
         if len(p) >= 2:
             heights = (float(p[:, 2].min()), float(p[:, 2].max())) if p.shape[1] == 3 else (0.0, 0.0)
-            levels, ends = levels_of(layers, properties or {}), np.hstack([p[:-1, :2], p[1:, :2]])
-            self._keep(Polyline(ends, width, layers[-1] if layers else "", levels, heights))
+            levels, ends = levels_of(layers, lower_keys(properties or {})), np.hstack([p[:-1, :2], p[1:, :2]])
+            self._keep(Polyline(ends, width, layers[-1] if layers else "", levels, heights, walls_first(groups)))
 
     def add_segments(self, endpoints: ArrayLike) -> None:
         """Add lines of their own, ``(n, 4)`` units of the drawing; raises as `add` does."""

@@ -7,7 +7,6 @@ import logging
 import re
 import struct
 from collections import Counter
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,10 +23,10 @@ from ..errors import FormatError, MalformedFileError, TooLargeError, Unsupported
 from ..files import name_of, read_bounded
 from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
 from ..options import US_FOOT, ImportOptions
-from ..report import Notes, listed, shown
+from ..report import Notes, shown
 from .drawing import Drawing
 from .dxf_blocks import Expansion, Placed, shown_parts
-from .selection import matches
+from .selection import walls_among
 
 if TYPE_CHECKING:
     from ezdxf.audit import Auditor
@@ -38,9 +37,6 @@ logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
 # The layer of lines that have free space on their left; the only way to declare this in a DXF.
 FREE_LEFT = "FREE_LEFT"
-
-# Of layers, in some languages of drawings.
-NAMES_OF_WALLS = ("*wall*", "*wand*", "*mauer*", "*muro*", "*pared*", "*mur", "*murs*")
 
 # Metres per unit, by the number in $INSUNITS: inch, foot, mile, mm, cm, m, km, microinch, mil, yard, angstrom, nm, um,
 # dm, dam, hm, and those of the US survey: foot, inch, yard, mile.
@@ -77,7 +73,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     directed = 0
     try:
         if not options.layers and not options.where:
-            drawing.options = replace(options, layers=_layers_of_walls(document, expansion, notes))
+            drawing.walls = walls_among(expansion.layers(document.modelspace()), notes)
         for placed in expansion.visible(document.modelspace()):
             if not drawing.takes(placed.layers, _properties(placed)):
                 continue
@@ -122,26 +118,6 @@ def _parsed(path: Path, content: bytes) -> tuple[Document, Auditor]:
     return recover.read(io.BytesIO(content))
 
 
-def _layers_of_walls(document: Document, expansion: Expansion, notes: Notes) -> tuple[str, ...]:
-    """Return patterns of the layers that hold walls by their names, where there are others; else none."""
-    chains = expansion.layers(document.modelspace())
-    shown_names = sorted({chain[-1] for chain in chains})
-    walls = sorted({chain[-1] for chain in chains if matches(chain, NAMES_OF_WALLS)})
-    others = [name for name in shown_names if name not in walls]
-    if len(shown_names) < 2 or not others:
-        return ()
-    if not walls:
-        notes.add_assumed(
-            "layers", f"lines of all layers are walls: {listed(others)}; set the option layers if some are not"
-        )
-        return ()
-    what = (
-        f"walls are on {listed(walls)}, by their names, and not on {listed(others)}; set the option layers for others"
-    )
-    notes.add_assumed("layers", what)
-    return NAMES_OF_WALLS
-
-
 def _metres(document: Document, notes: Notes) -> float | None:
     """Return metres per unit; None where the file has no unit, or one that is none of a building."""
     unit = document.header.get("$INSUNITS", 0)
@@ -164,6 +140,7 @@ def _properties(placed: Placed) -> dict[str, str]:
     dxf = placed.entity.dxf
     return {
         "layer": placed.layers[-1],
+        "block": "/".join(placed.blocks),
         "entity": placed.entity.dxftype(),
         "color": str(dxf.get("color", 256)),
         "linetype": str(dxf.get("linetype", "BYLAYER")),
@@ -200,7 +177,7 @@ def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
     if placed.clips and (len(parts) != 1 or len(parts[0]) < len(points)):
         drawing.notes.add_dropped("clipped", "lines that the clipping of a block (XCLIP) hides, or divides", 1)
     for part in parts:
-        drawing.add(part, width=width, layers=placed.layers)
+        drawing.add(part, width=width, layers=placed.layers, properties={"block": "/".join(placed.blocks)})
     if parts:
         drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
 
@@ -236,7 +213,7 @@ def _note_paper_space(document: Document, drawing: Drawing) -> None:
         sheet = Drawing(drawing.name, "dxf", Notes())
         for entity in islice(layout, MAX_CURVE_POINTS):
             try:
-                _add(Placed(entity, ("",), ()), sheet, SAGITTA)
+                _add(Placed(entity, ("",)), sheet, SAGITTA)
             except FormatError:
                 continue
         drawing.notes.add_dropped(

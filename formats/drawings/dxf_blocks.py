@@ -51,11 +51,12 @@ Clips = tuple[Clip, ...]
 
 
 class Placed(NamedTuple):
-    """An entity with its layers, those of the references that it is in first, and what these clip."""
+    """An entity with its layers, those of the references that it is in first, what these clip, and their blocks."""
 
-    entity: DXFEntity
+    entity: Any
     layers: tuple[str, ...]
-    clips: Clips
+    clips: Clips = ()
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -93,12 +94,12 @@ class Expansion:
         TooLargeError
             When blocks lie too deep in one another, or expand to too much.
         """
-        yield from self._visible(entities, (), (), 0)
+        yield from self._visible(entities, Placed(None, ()), 0)
         self._note(self.drawing.notes)
 
-    def layers(self, entities: Iterable[Any]) -> set[tuple[str, ...]]:
-        """Return the layers of the visible entities, with those of the references that they are in."""
-        found: set[tuple[str, ...]] = set()
+    def layers(self, entities: Iterable[Any]) -> set[str]:
+        """Return the layers of the visible entities; those of the references that they are in do not count."""
+        found: set[str] = set()
         waiting: list[tuple[Iterable[Any], tuple[str, ...]]] = [(entities, ())]
         known: set[tuple[str, tuple[str, ...]]] = set()
         while waiting and len(known) < MAX_ENTITIES:
@@ -108,7 +109,7 @@ class Expansion:
                 if self.hides(layers[-1], reference=isinstance(entity, Insert)):
                     continue
                 if not isinstance(entity, Insert):
-                    found.add(layers)
+                    found.add(layers[-1])
                 elif (block := entity.block()) is not None and (block.name, layers) not in known:
                     known.add((block.name, layers))
                     if len(layers) <= MAX_BLOCK_DEPTH:
@@ -120,26 +121,26 @@ class Expansion:
         name = layer.casefold()
         return name in self.frozen or (name in self.off and not reference)
 
-    def _visible(self, entities: Iterable[Any], outer: tuple[str, ...], clips: Clips, depth: int) -> Iterator[Placed]:
+    def _visible(self, entities: Iterable[Any], outer: Placed, depth: int) -> Iterator[Placed]:
         for entity in entities:
             self._count += 1
             if self._count > MAX_ENTITIES:
                 self._refuse(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
-            layers = _layers_of(entity, outer)
+            placed = outer._replace(entity=entity, layers=_layers_of(entity, outer.layers))
             if entity.dxf.get("invisible", 0):
                 self.drawing.notes.add_dropped("invisible", "entities and blocks with the attribute invisible", 1)
-            elif self.hides(layers[-1], reference=isinstance(entity, Insert)):
-                self._hidden[layers[-1]] += 1
+            elif self.hides(placed.layers[-1], reference=isinstance(entity, Insert)):
+                self._hidden[placed.layers[-1]] += 1
             elif isinstance(entity, Insert):
-                yield from self._expanded(entity, layers, clips, depth)
+                yield from self._expanded(entity, placed, depth)
             elif isinstance(entity, MLine):
                 self.drawing.notes.add_read("entity_mline", "MLINE entities", 1)
                 lines = (part for part in entity.virtual_entities() if part.dxftype() != "HATCH")
-                yield from (Placed(part, layers, clips) for part in lines)
+                yield from (placed._replace(entity=part) for part in lines)
             else:
-                yield Placed(entity, layers, clips)
+                yield placed
 
-    def _expanded(self, reference: Insert, layers: tuple[str, ...], clips: Clips, depth: int) -> Iterator[Placed]:
+    def _expanded(self, reference: Insert, placed: Placed, depth: int) -> Iterator[Placed]:
         if depth >= MAX_BLOCK_DEPTH:
             self._refuse(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another")
         if reference.mcount > MAX_ENTITIES:
@@ -157,7 +158,8 @@ class Expansion:
             self._count += 1  # so that empty blocks cannot be repeated without end
             inner = one.virtual_entities(skipped_entity_callback=self._skipped)
             clip = clip_of(reference, one)
-            yield from self._visible(inner, layers, clips if clip is None else (*clips, clip), depth + 1)
+            clips = placed.clips if clip is None else (*placed.clips, clip)
+            yield from self._visible(inner, placed._replace(clips=clips, blocks=(*placed.blocks, name)), depth + 1)
 
     def _skipped(self, entity: DXFEntity, _reason: str) -> None:
         self.drawing.drop(entity.dxftype())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,12 @@ from ..options import ImportOptions
 from ..report import Notes
 from .coordinate_systems import require_lengths
 from .drawing import Drawing
+from .selection import lower_keys
 
 MAX_COLLECTIONS = 4
 OWN = "linefix"  # the member that identifies our own files
+HEIGHTS = ("z", "elevation", "elev")  # properties of a feature whose positions have no z
+PACKED = re.compile(r'"([^"]+)"=>"([^"]*)"')  # tags as ogr2ogr writes them into one property
 HIDDEN = ("feature_type", "id")  # members of an IMDF feature outside its properties
 
 Lines = Iterator[tuple[Any, bool]]
@@ -58,7 +62,7 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
             )
         _read_feature(feature, drawing, k)
     if told.get("metres") is not True:
-        require_lengths(root.get("crs"), drawing)
+        require_lengths(root.get("crs", root.get("coordRefSys")), drawing)
     return drawing
 
 
@@ -72,10 +76,7 @@ def _loaded(content: bytes, name: str) -> Any:
 
 def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> None:
     geometry = feature.get("geometry") if feature.get("type") == "Feature" else feature
-    properties = feature.get("properties")
-    named = {key: feature[key] for key in HIDDEN if key in feature} | (
-        properties if isinstance(properties, dict) else {}
-    )
+    named = _properties(feature)
     layers = tuple(value for key in ("layer", "name") if isinstance(value := named.get(key), str))
     if not drawing.takes(layers, named):
         return
@@ -84,9 +85,10 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> Non
         return
     widths = (named.get(key) for key in ("thickness", "width"))
     width = next((told for told in map(_width, widths) if told is not None), 0.0)
+    height = next((float(named[key]) for key in HEIGHTS if type(named.get(key)) in (int, float)), 0.0)
     for points, closed in _lines(geometry, drawing):
         try:
-            places = [(p[0], p[1], p[2] if len(p) > 2 else 0.0) for p in points]
+            places = [(p[0], p[1], p[2] if len(p) > 2 else height) for p in points]
         except (TypeError, LookupError) as error:
             raise MalformedFileError(
                 f"has a position that is not [x, y] in feature {number}: check the nesting of lists",
@@ -98,7 +100,22 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> Non
                 f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)} in feature {number}",
                 argument=drawing.name,
             )
-        drawing.add(places, closed=closed, width=width, layers=layers[:1], properties=named)
+        drawing.add(
+            places, closed=closed, width=width, layers=layers[:1], properties=named, groups=layers[: "layer" in named]
+        )
+
+
+def _properties(feature: dict[str, Any]) -> dict[str, Any]:
+    """Return the properties of a feature, names in lower case, with the tags of OpenStreetMap that tools pack."""
+    properties = feature.get("properties")
+    told = {key: feature[key] for key in HIDDEN if key in feature} | (
+        properties if isinstance(properties, dict) else {}
+    )
+    named = lower_keys(told)
+    tags, packed = named.pop("tags", None), named.pop("other_tags", None)
+    if isinstance(tags, dict):
+        named = lower_keys(tags) | named
+    return dict(PACKED.findall(packed)) | named if isinstance(packed, str) else named
 
 
 def _width(value: Any) -> float | None:
@@ -128,7 +145,7 @@ def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
         for polygon in _listed(coordinates, drawing):
             yield from ((_listed(ring, drawing), True) for ring in _listed(polygon, drawing))
     else:
-        drawing.drop(str(kind))
+        drawing.drop(str(kind), hint="needs to become GeoJSON (mapshaper, or ogr2ogr)" if kind == "Topology" else "")
         return
     drawing.notes.add_read(f"geometry_{str(kind).lower()}", f"{kind} geometries", 1)
 

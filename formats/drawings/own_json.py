@@ -30,6 +30,8 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     told = {"segments": root} if isinstance(root, list) else root
     if not isinstance(told, dict) or not isinstance(told.get("segments"), list):
         found = f"segments that are {kind_of(told.get('segments'))}" if isinstance(told, dict) else kind_of(told)
+        if isinstance(told, dict) and "features" in told:
+            found += ", as in GeoJSON: rename the file to .geojson" if "type" in told else "; convert it to GeoJSON"
         raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}', argument=name)
     rows = told["segments"]
     wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, 4, f"segment {k}"))), None)

@@ -21,7 +21,7 @@ from . import tuning
 from .cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
 
 KINDS = {"free": FREE, "occupied": OCCUPIED, "unknown": UNKNOWN}
-DECIDED = ("thresholds", "unknown_grey")  # notes on how cells were told apart
+DECIDED = ("mode", "thresholds", "unknown_grey", "inverted")  # notes on how cells were told apart
 
 WHY_DRAWN = "because walls have a constant thickness, as in a drawn grid; set the option surface for another value"
 WHY_MAPPED = "by the thickness of walls that are seen from one side, as in a mapped grid"
@@ -77,6 +77,12 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     """
     cells = classify(grid, notes)
     counts = {word: int((cells == kind).sum()) for word, kind in KINDS.items()}
+    if counts["occupied"] > tuning.INVERTED * counts["free"]:
+        notes.add_assumed(
+            "inverted",
+            f"{counts['occupied']} cells are occupied and {counts['free']} free; if free cells are the dark ones, set "
+            "negate to 1 in the YAML file",
+        )
     for word, count in counts.items():
         notes.add_read(f"{word}_cells", f"{word} cells" if count else f"no {word} cell", count)
     depth, drawn = surface_depth(cells) if surface is None else (surface, False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,8 +35,10 @@ from .tuning import UNKNOWN_GREYS
 
 PICTURES = ("PPM", "PNG", "BMP", "JPEG")  # what Pillow may take a picture for
 OTHERS = {b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF"}
-NAN = ("nan", "-nan", "+nan")
+NAN = re.compile(r"[-+]?\.?nan(\(ind\)|\(snan\))?", re.IGNORECASE)
 WORDS = {"no": 0, "false": 0, "off": 0, "yes": 1, "true": 1, "on": 1}  # of YAML 1.1, as ROS reads it
+MAX_YAW = 1.01 * math.tau  # rad; a turn that was rounded
+COARSE = 0.5  # m; a resolution above is likely in centimetres
 MODES = ("trinary", "scale", "raw")
 RAW_UNKNOWN = 100  # in mode raw: the greatest value that is an occupancy in percent
 
@@ -95,7 +98,7 @@ def read_grid(
         )
     if not picture.exists():
         raise IncompleteFileError(
-            f"names the picture {shown(told.image)}, but there is no such file beside it; add it",
+            f"names the picture {shown(told.image)}, but there is no such file beside it; copy it there",
             argument=name_of(path),
         )
     pixels, alpha = read_picture(picture)
@@ -127,12 +130,14 @@ def read_description(path: Path, notes: Notes) -> Description:
     values = yaml_of(text, name)
     if not isinstance(values, dict):
         raise MalformedFileError(
-            f"expected a YAML mapping with image, resolution and origin, found {kind_of(values)}", argument=name
+            f"expected a YAML mapping with image, resolution and origin, a space after each colon, found "
+            f"{kind_of(values)}",
+            argument=name,
         )
     missing = [key for key in ("image", "resolution", "origin") if key not in values]
     if missing:
-        raise IncompleteFileError(f"has no {' and '.join(missing)}; add it", argument=name)
-    mode = values.get("mode", "trinary")
+        raise IncompleteFileError(f"has no {' and no '.join(missing)}; add it", argument=name)
+    mode = str(values.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise UnsupportedFormatError(
             f"has an unknown mode; expected one of {', '.join(MODES)}, found {shown(str(mode))}", argument=name
@@ -140,13 +145,25 @@ def read_description(path: Path, notes: Notes) -> Description:
     for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
         if key not in values:
             notes.add_assumed(key, f"{key} is {assumed}, because the file has none")
+    if mode == "raw":
+        notes.add_assumed("mode", "in mode raw grey values up to 100 are an occupancy in percent, others are unknown")
+    free, occupied = (
+        _number(values, f"{key}_thresh", name, 0.0, 1.0, usual) for key, usual in (("free", 0.196), ("occupied", 0.65))
+    )
+    if free > occupied:
+        raise MalformedFileError(
+            f"expected free_thresh below occupied_thresh, found {free:g} and {occupied:g}; exchange them", argument=name
+        )
+    resolution = _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION)
+    if resolution > COARSE:
+        notes.add_assumed("resolution", f"a cell is {resolution:g} m wide; if these are centimetres, divide by 100")
     return Description(
         _image(values["image"], name),
-        _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION),
+        resolution,
         _origin(values["origin"], name, notes),
         bool(_number(values, "negate", name, 0, 1, 0.0)),
-        _number(values, "occupied_thresh", name, 0.0, 1.0, 0.65),
-        _number(values, "free_thresh", name, 0.0, 1.0, 0.196),
+        occupied,
+        free,
         mode,
     )
 
@@ -163,28 +180,38 @@ def _number(
     values: dict[Any, Any], key: str, name: str, low: float, high: float, default: float | None = None
 ) -> float:
     value = values.get(key, default)
-    value = WORDS.get(value.lower(), value) if isinstance(value, str) else value
+    value = _numeric(WORDS.get(value.lower(), value) if isinstance(value, str) else value)
     if not isinstance(value, int | float) or not low <= value <= high:
         raise MalformedFileError(
-            f"expected {key} to be a number from {low:g} to {high:g}, found {kind_of(value)}", argument=name
+            f"expected {key} to be a number from {low:g} to {high:g}, found {_found(value)}", argument=name
         )
     return float(value)
 
 
+def _numeric(value: Any) -> Any:
+    """Return the number that a text is, as quotes make one of it; other values as they are."""
+    try:
+        return math.nan if isinstance(value, str) and NAN.fullmatch(value) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return value
+
+
+def _found(value: Any) -> str:
+    return f"'{shown(value)}'" if isinstance(value, str) else kind_of(value)
+
+
 def _origin(value: Any, name: str, notes: Notes) -> RigidTransform:
-    told = (
-        [math.nan if isinstance(v, str) and v.lower() in NAN else v for v in value] if isinstance(value, list) else []
-    )
-    numbers = len(told) == 3 and all(type(v) in (int, float) for v in told)
+    told = [v if isinstance(v, bool) else _numeric(v) for v in value] if isinstance(value, list) else []
+    numbers = len(told) == 3 and all(type(v) is float for v in told)
     if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in told[:2]) or math.isinf(told[2]):
-        found = ", ".join(map(kind_of, value[:4])) if isinstance(value, list) else kind_of(value)
+        found = ", ".join(map(_found, told[:4])) if told else _found(value)
         raise MalformedFileError(
             f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}, found {found}", argument=name
         )
     if math.isnan(told[2]):
         notes.add_assumed("orientation", "the yaw of the origin is not a number, as map_saver writes it; 0 is assumed")
         told[2] = 0.0
-    if abs(told[2]) > math.tau:
+    if abs(told[2]) > MAX_YAW:
         raise MalformedFileError(
             f"expected the yaw of the origin in radians, at most {math.tau:.4g}, found {told[2]:g}; if these are "
             f"degrees, write {math.radians(told[2]):.6g}",

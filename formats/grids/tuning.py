@@ -28,6 +28,10 @@ SPIKE_WINDOW = 8
 NOISE_REACH = 3
 NOISE_RATIO = 3
 
+# Occupied cells for each free one, from which on a picture may be inverted. Most plans have a tenth; those whose
+# unknown cells are black have one or two.
+INVERTED = 3.0
+
 # Cells: fewer of a level are no class of their own.
 LEAST_CELLS = 10
 

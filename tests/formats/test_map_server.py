@@ -280,3 +280,37 @@ def test_pictures_of_another_kind_are_named(tmp_path: Path, kind: str) -> None:
     Image.fromarray(l_room()).save(tmp_path / "map.pgm", format=kind)
     with pytest.raises(MalformedFileError, match=f"is a {kind}; expected PGM.* Save it as PNG"):
         read_map(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("resolution: 0.05", 'resolution: "0.05"'),
+        ("{origin}", '"0", "0", "0"'),
+        ("{origin}", "0, 0, -.nan"),
+        ("{origin}", "0, 0, -nan(ind)"),
+        ("{origin}", "0, 0, 6.2832"),
+        ("negate: 0", "negate: '0'\nmode: Trinary"),
+    ],
+)
+def test_values_as_text_and_in_other_cases(tmp_path: Path, old: str, new: str) -> None:
+    yaml = YAML.replace(old, new)
+    assert yaml != YAML
+    expected = walls(read_map(write(tmp_path, l_room())))
+    assert walls(read_map(write(tmp_path, l_room(), yaml))) == expected
+
+
+def test_thresholds_that_are_exchanged_are_refused(tmp_path: Path) -> None:
+    yaml = YAML.replace("0.65", "x").replace("0.196", "0.65").replace("x", "0.196")
+    with pytest.raises(MalformedFileError, match="exchange them"):
+        read_map(write(tmp_path, l_room(), yaml))
+
+
+def test_doubtful_pictures_and_resolutions_are_said(tmp_path: Path) -> None:
+    coarse = YAML.replace("resolution: 0.05", "resolution: 5")
+    codes = {note.code for note in read_map(write(tmp_path, l_room(), coarse)).report.assumed}
+    assert "resolution" in codes
+    inverted = np.full((60, 80), 255, np.uint8)
+    inverted[[10, 40], 10:60] = inverted[10:40, [10, 59]] = 254
+    report = read_map(write(tmp_path, np.where(inverted == 254, 255, 0).astype(np.uint8))).report
+    assert "set negate to 1" in next(note.message for note in report.assumed if note.code == "inverted")

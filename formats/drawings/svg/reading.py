@@ -63,7 +63,8 @@ def _read_shapes(root: Element, drawing: Drawing) -> None:
             continue
         kind = kind_of(element)
         for points, closed in SHAPES[kind](Measure(element, place.viewport, drawing.name)):
-            drawing.add(_placed(points, place.matrix), closed=closed, width=place.width, layers=place.layers)
+            lines = _placed(points, place.matrix)
+            drawing.add(lines, closed=closed, width=place.width, layers=place.layers, groups=place.groups)
         drawing.notes.add_read(f"element_{kind}", f"{kind} elements", 1)
 
 

@@ -23,6 +23,7 @@ UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 960
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _LENGTH = re.compile(rf"\s*({_NUMBER})\s*([a-zA-Z]*|%)\s*")
 _LIST = re.compile(rf"[\s,]*({_NUMBER})")
+NOT_IN_PATH = re.compile(r"[^MmZzLlHhVvCcSsQqTtAaEe0-9+\-.,\s]")
 
 Points = list[tuple[float, float]]
 Polylines = Iterator[tuple[Points, bool]]
@@ -128,6 +129,8 @@ def _path(measure: Measure) -> Polylines:
     points: Points = []
     text = measure.element.get("d", "")
     try:
+        if (wrong := NOT_IN_PATH.search(text)) and text.strip() != "none":  # where the library ends without a word
+            raise measure.refused("d", text[wrong.start() : wrong.start() + 20], "the commands of a path")
         pieces = svgelements.Path("" if text.strip() == "none" else text)
     except (ValueError, TypeError, LookupError, AttributeError) as error:
         raise measure.refused("d", text[:20], "the commands of a path") from error

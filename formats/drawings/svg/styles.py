@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -19,6 +20,7 @@ PROPERTIES = frozenset((
     "transform", "transform-origin", "transform-box", "clip-path", "mask",
 ))  # fmt: skip
 OF_CSS_ALONE = frozenset({"translate", "rotate", "scale"})  # attributes of these names are something else
+SCREEN = re.compile(r"(only )?(screen|all)?")  # the media whose rules hold
 CACHED = 10_000  # texts of style attributes, which repeat
 
 Declared = tuple[tuple[str, str, bool], ...]
@@ -78,6 +80,10 @@ class Styles:
 def _rules(sheet: str) -> Iterable[tuple[Any, Declared]]:
     """Yield the selectors of a style sheet with their declarations; what is no valid rule is left out, as CSS says."""
     for rule in tinycss2.parse_stylesheet(sheet, skip_comments=True, skip_whitespace=True):
+        if rule.type == "at-rule" and rule.lower_at_keyword == "media" and rule.content:
+            if SCREEN.fullmatch(tinycss2.serialize(rule.prelude).strip().lower()):
+                yield from _rules(tinycss2.serialize(rule.content))
+            continue
         if rule.type != "qualified-rule":
             continue
         declared = _declared(tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True))

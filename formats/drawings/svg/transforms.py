@@ -8,6 +8,7 @@ from typing import Any
 
 import svgelements
 
+from ...errors import MalformedFileError
 from ...report import shown
 from ..drawing import Drawing
 from .shapes import UNITS, Viewport
@@ -15,6 +16,8 @@ from .shapes import UNITS, Viewport
 FUNCTION = re.compile(r"([a-zA-Z]\w*)\s*\(([^)]*)\)")
 LENGTH = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)([a-zA-Z%]*)")
 WORDS = {"left": ("x", 0.0), "right": ("x", 100.0), "top": ("y", 0.0), "bottom": ("y", 100.0), "center": ("", 50.0)}
+
+WHERE = ("transform", "transform-origin", "scale", "rotate", "translate")
 
 Matrix = Any
 Arguments = list[str]
@@ -43,9 +46,23 @@ def matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) ->
     drawing : Drawing
         Its notes take what is not applied.
     """
+    try:
+        return _matrix_of(style, viewport, drawing)
+    except (ValueError, LookupError) as error:
+        told = "; ".join(f"{key}: {style[key]}" for key in WHERE if key in style)
+        raise MalformedFileError(
+            f"has a transform that cannot be read, '{shown(told)}'; expected numbers. Apply the transforms, or save it "
+            "as plain SVG",
+            argument=drawing.name,
+        ) from error
+
+
+def _matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) -> Matrix | None:
     parts = [_transform(style.get("transform", "none"), viewport, drawing)]
     for name, function in (("scale", "scale"), ("rotate", "rotate"), ("translate", "translate")):
         words = style.get(name, "none").split()
+        if name == "scale":
+            words = [f"{float(word[:-1]) / 100.0}" if word.endswith("%") else word for word in words]
         if name == "rotate" and len(words) > 1:  # about an axis: z, or 0 0 1
             words = words[-1:] if words[:-1] in (["z"], ["0", "0", "1"]) else ["none"]
         if words not in ([], ["none"]):
@@ -53,7 +70,9 @@ def matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) ->
     matrices = [part for part in parts if part is not None]
     if not matrices:
         return None
-    x, y = _origin(style, viewport, drawing)
+    if style.get("transform-box", "view-box").lower() != "view-box":
+        drawing.notes.add_assumed("transform_box", "transform-origin refers to the viewBox, not to transform-box", 1)
+    x, y = _origin(style, viewport)
     matrix = svgelements.Matrix.translate(-x, -y)
     for one in (*matrices, svgelements.Matrix.translate(x, y)):
         matrix = matrix * one
@@ -88,7 +107,7 @@ def _length(word: str, axis: str, viewport: Viewport) -> float:
     return float(found[1]) * (viewport.of_axis(axis) / 100.0 if unit == "%" else UNITS[unit])
 
 
-def _origin(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) -> tuple[float, float]:
+def _origin(style: Mapping[str, str], viewport: Viewport) -> tuple[float, float]:
     """Return the point that a transform leaves where it is; without transform-origin the origin of the units."""
     words = style.get("transform-origin", "").lower().split()[:2]
     if not words:
@@ -97,8 +116,6 @@ def _origin(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) -> t
         words = ["center", words[0]] if words[0] in ("top", "bottom") else [words[0], "center"]
     elif WORDS.get(words[0], ("x",))[0] == "y" or WORDS.get(words[1], ("y",))[0] == "x":
         words.reverse()
-    if style.get("transform-box", "view-box").lower() != "view-box" and any(w in WORDS or "%" in w for w in words):
-        drawing.notes.add_assumed("transform_box", "transform-origin refers to the viewBox, not to transform-box", 1)
     starts = {"x": viewport.x, "y": viewport.y}
     places = []
     for axis, word in zip("xy", words, strict=True):

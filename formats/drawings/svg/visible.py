@@ -27,6 +27,7 @@ NOT_DRAWN = {
 }  # fmt: skip
 GROUPS = {"g", "a"}
 CONDITIONS = {"systemLanguage", "requiredExtensions"}  # of a child of switch that is passed over
+FLOORS = ("data-level", "data-floor")
 NOTHING = {"none", "transparent"}  # as a stroke or a fill
 WHOLE = 1e-3  # of the picture; a background covers all but that
 
@@ -41,6 +42,8 @@ class Place:
     ----------
     layers : tuple of str
         Their names.
+    groups : tuple of str
+        The names of groups and classes.
     matrix : Matrix
         From the element's units to the root's.
     viewport : Viewport
@@ -54,6 +57,7 @@ class Place:
     """
 
     layers: tuple[str, ...] = ()
+    groups: tuple[str, ...] = ()
     matrix: Matrix = field(default_factory=svgelements.Matrix)
     viewport: Viewport = field(default_factory=Viewport)
     stroke_width: float = 0.0
@@ -93,7 +97,7 @@ class Visible:
         style = self._styles.of(self._root)
         if not self._displayed(self._root, style):
             return
-        place = replace(self._inherited(self._root, Place(viewport=self._whole), style), layers=())
+        place = replace(self._inherited(self._root, Place(viewport=self._whole), style), layers=(), groups=())
         for child in self._root:
             yield from self._drawn(child, place, 1)
 
@@ -147,7 +151,10 @@ class Visible:
         return False
 
     def _inherited(self, element: Element, outer: Place, style: Mapping[str, str]) -> Place:
-        names = [element.get(key, "") for key in ("id", "class", INKSCAPE_LABEL)]
+        label = element.get(INKSCAPE_LABEL) or element.get("data-name", "")
+        floor = next((f"Level {element.get(key)}" for key in FLOORS if key in element.attrib), "")
+        names = [floor, label, element.get("id", ""), element.get("class", "")]
+        group = label or (names[2] if kind_of(element) in GROUPS else "") or names[3]
         clipped = any(style.get(key, "none").lower() != "none" for key in ("clip-path", "mask"))
         if clipped:
             self._drawing.notes.add_assumed(
@@ -160,6 +167,7 @@ class Visible:
         return replace(
             outer,
             layers=(*outer.layers, *filter(None, names)),
+            groups=(*outer.groups, *filter(None, [group])),
             matrix=outer.matrix if matrix is None else matrix * outer.matrix,
             stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
             visible=visibility == "visible" if visibility else outer.visible,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import IncompleteFileError, InvalidOptionError
 from ...report import listed_counts
 from ..drawing import Drawing, Polyline
+from ..selection import matches
 
 STOREY = 2.0  # m; heights that are less apart belong to one floor
 FLAT = 0.5  # m; a polyline that rises by more is on no floor
@@ -36,29 +37,35 @@ def on_level(drawing: Drawing, metres: float) -> list[Polyline]:
     counts: Counter[str] = Counter()
     for one in lines:
         counts.update(dict.fromkeys(one.levels, len(one.ends)))
-    chosen = next((name for name in counts if wanted is not None and name.casefold() == wanted.casefold()), None)
-    if wanted is not None and chosen is None:
+    chosen = [name for name in counts if wanted is not None and matches((name,), (wanted,))]
+    if wanted is not None and not chosen:
         there = f"one of the levels of the file, with lines: {listed_counts(counts)}" if counts else "none"
         why = "" if counts else ", because the file names no levels"
         raise InvalidOptionError(f"expected {there}{why}, found another name", argument="level")
-    if chosen is None:
+    if not chosen:
         if len(counts) > 1 and _differ(lines, counts, metres, named=any(one.levels for one in drawing.polylines)):
             raise IncompleteFileError(
                 f"has {len(counts)} levels, with lines: {listed_counts(counts)}; choose one with the option level "
-                f"(--level {next(iter(counts))})",
+                f"(--level '{next(iter(counts))}'; '*' is all)",
                 argument=drawing.name,
             )
+        loose = sum(len(one.ends) for one in lines if not one.levels)
+        if len(counts) == 1 and loose and any(one.levels for one in drawing.polylines):
+            said = (
+                f"lines without a level are used with those of level {next(iter(counts))}; the option level omits them"
+            )
+            drawing.notes.add_assumed("no_level", said, loose)
         return lines
     others = Counter[str]()
     for one in lines:
-        if chosen not in one.levels:
+        if not set(chosen) & set(one.levels):
             others["/".join(one.levels) or "no level"] += len(one.ends)
     if others:
         drawing.notes.add_dropped(
-            "other_level", f"lines that are not on level {chosen}: {listed_counts(others)}", others.total()
+            "other_level", f"lines that are not on level {', '.join(chosen)}: {listed_counts(others)}", others.total()
         )
-    drawing.meta |= {"level": chosen}
-    return [one for one in lines if chosen in one.levels]
+    drawing.meta |= {"level": ", ".join(chosen)}
+    return [one for one in lines if set(chosen) & set(one.levels)]
 
 
 def _by_height(lines: list[Polyline], metres: float) -> list[Polyline]:

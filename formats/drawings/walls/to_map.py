@@ -49,7 +49,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
         When a free place lies on a wall or outside.
     """
     metres = options.metres or drawing.metres
-    drawing.note_left_out()
+    drawing.leave_out_others()
     if metres is None:
         doubt = drawing.notes.assumed.get("unknown_unit")
         why = f": {doubt.message}" if doubt is not None else ""
