@@ -130,7 +130,6 @@ def overload(service: Service, pairs: int, seconds: float) -> list[Row]:
     half = stats.t.ppf(0.975, len(ratios) - 1) * np.std(ratios, ddof=1) / math.sqrt(len(ratios))
     times = [1e3 * a.seconds for a in alone]
     rate = float(np.mean(rates))
-    mean_queue = 1e3 * (QUEUE + service.cores) / rate + quantile(times, 0.99)
     return [
         at_least(
             f"goodput at {FACTOR} x over goodput at capacity, mean (+- {half:.3f})", float(np.mean(ratios)), GOODPUT
@@ -141,10 +140,8 @@ def overload(service: Service, pairs: int, seconds: float) -> list[Row]:
             full_queue_ms(times, rate, service.cores),
             form=".1f",
         ),
-        Row("  a queue of mean requests, and one of 99 of 100, ms", f"{mean_queue:.1f}"),
         at_most("answered neither 200 nor 503", lost, 0, form=".0f"),
         at_most(f"/livez meanwhile, p99 of {len(probed)}, ms", 1e3 * quantile(probed, 0.99), PROBE_MS, form=".1f"),
-        Row("/livez meanwhile, longest, ms", f"{1e3 * max(probed):.1f}"),
     ]
 
 

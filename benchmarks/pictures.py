@@ -36,28 +36,6 @@ def save(figure: Figure, name: str) -> None:
     print(f"\nPicture: {path}")
 
 
-def draw_reliability(name: str, title: str, found: Sequence[tuple[int, float, float]], telling: int) -> None:
-    """Draw stated probability against the observed share, one point for each bin of ``(answers, mean, share)``.
-
-    The bar at a point is twice the standard deviation that chance gives a share of so many answers; bins with fewer
-    than `telling` answers are drawn hollow.
-    """
-    figure, [[ax], [below]] = panels(2, 1, (5.5, 3.2), title)
-    ax.plot([0, 1], [0, 1], color="#8c959f", linewidth=1, linestyle="--", label="as stated")
-    for count, p, share in found:
-        if count:
-            spread = 2.0 * (share * (1.0 - share) / count) ** 0.5
-            face = COLOURS[1] if count >= telling else "white"
-            ax.errorbar(p, share, yerr=spread, color=COLOURS[1], marker="o", markerfacecolor=face, capsize=2)
-    ax.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="stated probability", ylabel="fraction that is right")
-    ax.text(0.98, 0.04, f"hollow: fewer than {telling} answers", ha="right", transform=ax.transAxes, fontsize=8)
-    width = 1.0 / max(1, len(found))
-    below.bar([(k + 0.5) * width for k in range(len(found))], [max(c, 0.5) for c, _, _ in found], 0.9 * width,
-              color=COLOURS[1])  # fmt: skip
-    below.set(xlim=(0, 1), yscale="log", xlabel="stated probability", ylabel="answers")
-    save(figure, name)
-
-
 @dataclass(frozen=True, slots=True)
 class Curve:
     """Median and p95 in ms over something, with the goals that were set for some of its values."""

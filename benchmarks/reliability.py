@@ -10,7 +10,6 @@ import numpy as np
 from association import Status
 
 from .outcomes import Outcome
-from .pictures import draw_reliability
 from .table import Row, at_most, mean, print_table
 
 BINS = 10
@@ -45,19 +44,9 @@ def bins(probabilities: np.ndarray, right: np.ndarray) -> list[tuple[int, float,
 
 
 def print_reliability(title: str, outcomes: Sequence[Outcome]) -> None:
-    found = reliability(outcomes)
-    _print(title, found)
-    draw_reliability("reliability-" + title.lower().replace(",", "").replace(" ", "-"), title, found, TELLING)
-
-
-def print_bins(title: str, probabilities: np.ndarray, right: np.ndarray) -> None:
-    _print(title, bins(probabilities, right))
-
-
-def _print(title: str, found: list[tuple[int, float, float]]) -> None:
     cells = [
         (f"{b / BINS:.1f} to {(b + 1) / BINS:.1f}", str(count), *_told(count, p, share))
-        for b, (count, p, share) in enumerate(found)
+        for b, (count, p, share) in enumerate(reliability(outcomes))
     ]
     print_table(title, ("probability", "answers", "mean", "observed", "points off"), cells)
 

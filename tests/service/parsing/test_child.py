@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import threading
 from collections.abc import Iterator
 from importlib.util import find_spec
-from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,7 @@ from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestErr
 from linefix.documents.parts import MapDocument
 from linefix.documents.reading import read_map, read_model
 from service.errors import ParserEndedError
-from service.parsing.child import NICE, Child, receive, send
+from service.parsing.child import NICE, Child
 
 from .bodies import LIMITS, large_map
 
@@ -73,23 +71,6 @@ def test_what_is_wrong_crosses_whole(parser: Child) -> None:
             parser.call(_raise, error)
         assert (str(caught.value), vars(caught.value)) == (str(error), vars(error))
     assert parser.call(len, b"after that it works on") == 22
-
-
-def test_objects_cross_a_channel_without_a_copy_and_its_end_is_told() -> None:
-    one, other = Pipe()
-    sent = (pickle.PickleBuffer(b"x" * 3_000_000), np.arange(400_000.0).reshape(-1, 4), {"a": b"z"}, b"")
-    thread = threading.Thread(target=send, args=(one, sent))
-    thread.start()
-    come = receive(other)
-    thread.join()
-    assert np.array_equal(come[1], sent[1])  # type: ignore[arg-type]
-    assert (come[0], *come[2:]) == (b"x" * 3_000_000, {"a": b"z"}, b"")
-    one.close()
-    with pytest.raises(EOFError):
-        receive(other)
-    with pytest.raises(BrokenPipeError):
-        send(other, (1,))
-    other.close()
 
 
 def test_an_end_of_the_process_is_one_refusal(parser: Child) -> None:
