@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -17,32 +16,26 @@ from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
 from .one_scan import explain, locate, register, vectorize
-from .options import PlainCommand, Text, argument, flag, option
+from .options import PlainCommand, Text, Texts, argument, flag, option
 from .replay import replay
-from .ros2 import ros2
+from .ros2 import RosCommand, ros2
+
+ROLES = ("read", "associate", "write")
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
-class Role(StrEnum):
-    """A permission of a key."""
-
-    READ = "read"
-    ASSOCIATE = "associate"
-    WRITE = "write"
-
-
 def key(
     name: Annotated[str, argument("Name of the key, for people; not secret.", "NAME")],
-    role: Annotated[list[Role] | None, option("Role of the key; repeat for more roles. Default: all.", "ROLE")] = None,
+    role: Annotated[Texts, option(f"Role of the key: {', '.join(ROLES)}; repeatable. Default: all.", "ROLE")] = None,
     maps: Annotated[Text, option("Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX")] = None,
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
     from service.admission.keys import parse_keys
 
     made = secrets.token_urlsafe(32)
-    described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}
+    described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or ROLES}
     if maps is not None:
         described["maps"] = maps
     # A string or a list of them is the same in TOML as in JSON.
@@ -51,15 +44,16 @@ def key(
         parse_keys(lines)
     except ValueError:
         raise WrongUseError(
-            f"the name {name!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for NAME, and letters, "
-            "digits, dots or dashes for --maps"
+            f"the name {name!r}, a role of {role!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for "
+            f"NAME, one of {', '.join(ROLES)} for --role, and letters, digits, dots or dashes for --maps"
         ) from None
     print(lines)
     typer.echo(made, err=True)
 
 
-for command in (locate, explain, replay, analyze, batch, register, vectorize, key, ros2):
+for command in (locate, explain, replay, analyze, batch, register, vectorize, key):
     app.command(cls=PlainCommand)(command)
+app.command(cls=RosCommand)(ros2)
 app.add_typer(maps.app)
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from enum import StrEnum
 from itertools import groupby, islice
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 from .asking import Locate, Where
 from .errors import CommandError, NoSuchMapError, RefusedError
@@ -28,17 +27,8 @@ if TYPE_CHECKING:
 HOPELESS = 20  # scans from the first on
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
 HINT = "linefix map check MAP --log LOG tests the scale, the handedness and the directions of the map"
+MODE = "track: the prior is by odometry from the last usable pose; global: no prior."
 FIELDS = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")  # of a line of --json
-
-
-class Mode(StrEnum):
-    """Where to look."""
-
-    TRACK = "track"
-    GLOBAL = "global"
-
-
-TRACK = Mode.TRACK
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +83,7 @@ class ScanOptions:
     """Which scans of a log to localize, and how, as options."""
 
     mount: Annotated[tuple[float, float, float] | None, option("Pose of the laser on the robot.", "X Y THETA")] = None
-    mode: Annotated[Mode, option("track: the prior is by odometry from the last usable pose; global: no prior.")] = (
-        TRACK
-    )
+    mode: Annotated[Literal["track", "global"], option(MODE)] = "track"
     every: Annotated[int, option("Use each Nth scan.", "N", min=1)] = 1
 
 
@@ -124,7 +112,7 @@ def replay(
         locate = service.locating(target_of(maps), options, {**places_of(maps), "/scan": log.name})
         taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locate, taken, frames, Tracker() if scans.mode is TRACK else None):
+            for one, found in located(locate, taken, frames, Tracker() if scans.mode == "track" else None):
                 tally.take(one, found)
                 if output.as_json:
                     print_json(_line(one, found, frames, several=len(maps) > 1))

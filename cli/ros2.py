@@ -8,14 +8,13 @@ import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import typer
 
 from .asking import Where
 from .errors import RefusedError, WrongUseError
 from .inputs import read_maps
-from .options import File, Text, Texts, UsableOptions, flag, grouped, option
+from .options import File, PlainCommand, Text, Texts, UsableOptions, flag, grouped, option
 from .printing import Json
 from .ros2_parameters import given_parameter, parameters_of, robots_of
 from .scans import needing_formats
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 
 MAX_FRAME = 255  # characters
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
-READ = "linefix.ros2"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "stdout_logs", "help")
 LEAST = "Minimum standard deviation"
 TOGETHER = "Search scans of several topics as one if they are so close in time; 0: never."
@@ -41,32 +39,27 @@ MAPS = (
 )
 
 
-def _read(context: typer.Context, parameter: typer.CallbackParam, value: Any) -> Any:
-    """Take parameters of a file and of ``-p`` as defaults: options of the command line count before them.
+class RosCommand(PlainCommand):
+    """A command whose defaults are parameters of a file and of ``-p``: options of the command line count before them.
 
-    The namespace, from itself or from remappings, chooses the parameters of a file that may come before it.
+    The namespace, from itself or from remappings, chooses the parameters of the file.
     """
-    read = context.meta.setdefault(READ, {"others": context.default_map or {}})
-    read[parameter.name] = value
-    file, rules = read.get("params_file"), read.get("parameter") or []
-    if value is None or not (file or rules):
-        return value
-    spaces = [rule[6:] for rule in read.get("remap") or [] if rule.startswith("__ns:=")]
-    known = {one.name for one in context.command.params if one.name is not None and one.name not in NOT_IN_FILES}
-    values = {} if file is None else parameters_of(file, spaces[-1] if spaces else read.get("namespace"), known)
-    given = {name: one for rule in rules for name, one in given_parameter(rule).items()}
-    for name in {**values, **given}:
-        if name not in known:
-            expected = ", ".join(sorted("map" if one == "on" else one for one in known))
-            source = "-p" if name in given else file
-            raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
-    context.default_map = {**read["others"], **values, **given}
-    return value
 
-
-def chosen(help: str, metavar: str, *names: str) -> Any:
-    """Describe an option that chooses the parameters, so that it is read before others."""
-    return option(help, metavar, *names, is_eager=True, callback=_read)
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line."""
+        given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        file, known = given.get("params_file"), {one.name for one in self.params} - {*NOT_IN_FILES}
+        spaces = [rule[6:] for rule in given.get("remap") or [] if rule.startswith("__ns:=")]
+        space = spaces[-1] if spaces else given.get("namespace")
+        values = {} if file is None else parameters_of(Path(file), space, known)
+        ruled = {name: one for rule in given.get("parameter") or [] for name, one in given_parameter(rule).items()}
+        for name in {**values, **ruled}:
+            if name not in known:
+                expected = ", ".join(sorted("map" if one == "on" else one for one in known))
+                source = "-p" if name in ruled else file
+                raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
+        ctx.default_map = {**(ctx.default_map or {}), **values, **ruled}
+        return super().parse_args(ctx, args)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +75,7 @@ class RobotOptions:
     base: Annotated[str, option("The base frame of the robot.", "FRAME")] = "base_link"
     odom_frame: Annotated[str, option("The odometry frame, if no odometry message names it.", "FRAME")] = "odom"
     namespace: Annotated[
-        Text, chosen("Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE")
+        Text, option("Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE")
     ] = None
     frame_prefix: Annotated[str, option("Prefix of all frames of the robot, such as robot1/.", "PREFIX")] = ""
     agree: Annotated[int, option("Number of scans that have to agree on a published pose.", "N", min=1, max=100)] = 3
@@ -105,13 +98,13 @@ class RobotOptions:
 class RosArguments:
     """Parameters and remappings in the way of ROS 2, as options."""
 
-    params_file: Annotated[File, chosen("A parameter file of ROS 2 (YAML).", "FILE")] = None
+    params_file: Annotated[File, option("A parameter file of ROS 2 (YAML).", "FILE")] = None
     ros_args: Annotated[bool, flag("Ignored; the options after it apply as usual.", "--ros-args")] = False
-    parameter: Annotated[Texts, chosen("Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")] = None
+    parameter: Annotated[Texts, option("Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")] = None
     log_level: Annotated[Texts, option("Ignored, as are rosout logs.", "LEVEL")] = None
     rosout_logs: Annotated[bool, flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)] = False
     stdout_logs: Annotated[bool, flag("Ignored.", "--enable-stdout-logs/--disable-stdout-logs", hidden=True)] = False
-    remap: Annotated[Texts, chosen("Remap the name of a topic.", "FROM:=TO", "--remap", "-r")] = None
+    remap: Annotated[Texts, option("Remap the name of a topic.", "FROM:=TO", "--remap", "-r")] = None
 
 
 @grouped
@@ -121,16 +114,7 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
     """
     try:
-        from ros2 import (
-            ConnectionRefusedError,
-            Node,
-            NodeOptions,
-            OptionError,
-            checked_namespace,
-            domain_of,
-            namespace_of,
-            remapping_of,
-        )
+        import ros2 as node_side
     except ModuleNotFoundError:
         raise RefusedError(
             'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
@@ -146,14 +130,15 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     names, topics = given.pop("on"), tuple(given.pop("scan") or ("scan",))
     given["map_topic"] = None if names else robot.map_topic
     try:
-        remappings = dict(map(remapping_of, rules))
+        remappings = dict(map(node_side.remapping_of, rules))
         remappings.pop("__node", None)
-        chosen = remappings.pop("__ns", robot.namespace)
-        given["namespace"] = checked_namespace(namespace_of(topics) if chosen is None else chosen)
-        options = NodeOptions(scans=topics, remappings=remappings, domain=domain_of(os.environ), **given)
+        space = remappings.pop("__ns", robot.namespace)
+        space = node_side.checked_namespace(node_side.namespace_of(topics) if space is None else space)
+        given |= {"namespace": space, "remappings": remappings, "domain": node_side.domain_of(os.environ)}
+        options = node_side.NodeOptions(scans=topics, **given)
         maps = _maps_at(names) if names else None
-        node = Node(options, maps)
-    except (OptionError, ConnectionRefusedError) as error:
+        node = node_side.Node(options, maps)
+    except (node_side.OptionError, node_side.ConnectionRefusedError) as error:
         raise WrongUseError(str(error)) from None
     _run(node, options, maps)
 

@@ -101,7 +101,8 @@ def read_scan(name: str) -> Json:
     message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
-    scan: Json = _unwrapped(message, name)
+    inner = message.get("msg")  # in the envelope of rosbridge
+    scan: Json = inner if isinstance(inner, dict) else message
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
     views = scan.get("views")
@@ -118,28 +119,6 @@ def _yaml(data: bytes, name: str) -> Any:
 
         text = LOST.sub("", data.decode("utf-8", errors="replace")).removeprefix("---\n")
         return yaml_of(text.partition(NEXT)[0], name)
-
-
-def _unwrapped(message: Json, name: str) -> Json:
-    """Return the message in the envelope of rosbridge, and a LaserScan of Foxglove as one of ROS.
-
-    Raises
-    ------
-    RefusedError
-        When the scan of Foxglove is not in the frame of its sensor.
-    """
-    inner = message.get("msg")
-    scan: Json = inner if isinstance(inner, dict) else message
-    ranges = scan.get("ranges")
-    if not (isinstance(ranges, list) and {"start_angle", "end_angle"} <= scan.keys()):
-        return scan
-    if any(scan.get("pose", {}).get(part, {}).get(key) for part in ("position", "orientation") for key in "xyz"):
-        raise RefusedError(
-            f"{name}: is a foxglove.LaserScan with a pose in another frame; expected one in the frame of its sensor. "
-            "Send the pose as a view"
-        )
-    step = (scan["end_angle"] - scan["start_angle"]) / max(1, len(ranges) - 1)
-    return {"laser": {"angle_min": scan["start_angle"], "angle_increment": step, "ranges": ranges}}
 
 
 def _finite(laser: Json, name: str) -> Json:

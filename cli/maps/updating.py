@@ -65,8 +65,7 @@ def _lines(answer: Json, target: Json, visits: int, where: Where) -> Iterator[st
 def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
     """Return a request for an update; poses are those of the sensor, so that mounts make no difference."""
     sent_visits = [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]
-    request: Json = {"visits": sent_visits, "refuse": changes.refuse or []}
-    return request if changes.accept is None else {**request, "accept": changes.accept}
+    return {"visits": sent_visits, "accept": changes.accept, "refuse": changes.refuse or []}
 
 
 def _sent(one: LoggedScan) -> Json:
