@@ -27,14 +27,10 @@ from .result import (
 )
 from .scan.scan import Scan, Views, mirrored, scaled, turned_round
 from .scan.views import MAX_VIEWS, View, assemble
-from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
+from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps
 from .verdict_explanation import (
     AnswerExplanation,
-    Contribution,
-    ExplainedNull,
     VerdictExplanation,
-    VetoOutcome,
-    WeighedAlternative,
     explain_verdict,
 )
 from .warnings import NOT_IN_ORDER
@@ -55,12 +51,10 @@ __all__ = [
     "AssociationWarning",
     "Beams",
     "CancelledError",
-    "Contribution",
     "Corrections",
     "Correspondence",
     "CriticalWall",
     "Deadline",
-    "ExplainedNull",
     "HardPrior",
     "IndexingEndedError",
     "InvalidMapError",
@@ -79,16 +73,13 @@ __all__ = [
     "SoftPrior",
     "Status",
     "VerdictExplanation",
-    "VetoOutcome",
     "View",
     "Views",
     "WarningCode",
-    "WeighedAlternative",
     "assemble",
     "associate",
     "associate_on_maps",
     "explain_verdict",
-    "map_set",
     "mirrored",
     "scaled",
     "turned_round",

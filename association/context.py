@@ -9,20 +9,17 @@ import numpy as np
 
 from registration import RigidTransform
 from registration.layout import POSE, Floats, Records
-from registration.observability import most_parallel_up_to
 
 from .deadline import Deadline
 from .index.joint import JointIndex
 from .index.map_index import MapIndex
 from .layout import (
-    ENDS,
     HARD_PRIOR,
     NO_PRIOR,
     PRIOR,
     SOFT_PRIOR,
     TERMS,
     Integers,
-    as_records,
     record,
 )
 from .options import AssociationOptions, HardPrior, MapsPrior, Prior, SoftPrior
@@ -107,13 +104,6 @@ class SearchContext:
         return prior if isinstance(prior, HardPrior) else None
 
     @cached_property
-    def ends(self) -> Records:
-        """The ends of the scan's segments, (n,) of `ENDS`, read-only."""
-        ends = as_records(ENDS, self.scan.measured.segments.endpoints).view()
-        ends.flags.writeable = False
-        return ends
-
-    @cached_property
     def viewpoints(self) -> Floats:
         """The places of the sensors, (v, 2) metres in the scan frame; nan where a view is not from one place."""
         if self.scan.views is not None:
@@ -172,11 +162,6 @@ class SearchContext:
     def work(self) -> ScoreWork:
         """The arrays that kernels write to while they score poses."""
         return ScoreWork.of(len(self.lines.rows), len(self.index.walls.rows))
-
-    @cached_property
-    def parallel(self) -> Floats:
-        """The chi-square of their angles up to which so many lines are parallel, (k,)."""
-        return most_parallel_up_to(len(self.lines.rows))
 
     @cached_property
     def question(self) -> Question:

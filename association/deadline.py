@@ -22,13 +22,6 @@ class Deadline:
 
     at: float | None = None
     _cancelled: bool = field(default=False, init=False)
-    _outer: Deadline | None = field(default=None, init=False)
-
-    def within(self, at: float) -> Deadline:
-        """Return an end that comes no later than a time, and is cancelled with this one."""
-        inner = Deadline(at if self.at is None else min(at, self.at))
-        inner._outer = self
-        return inner
 
     def cancel(self) -> None:
         """Make the search give up soon; safe from any thread."""
@@ -37,7 +30,7 @@ class Deadline:
     @property
     def cancelled(self) -> bool:
         """Return whether `cancel` was called."""
-        return self._cancelled or (self._outer is not None and self._outer.cancelled)
+        return self._cancelled
 
     @property
     def passed(self) -> bool:

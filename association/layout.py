@@ -100,16 +100,19 @@ HYPOTHESIS = np.dtype([*POSE.descr, *fields((_F, "cosine sine lever_x lever_y an
 # A scan line at a pose: midpoint, direction, half of its length, m; its gates of offset (m) and angle (rad), and the
 # cosine of the latter.
 POSED_LINE = fields((_F, "x y dx dy half gate angle_gate least_cosine"))
+# What the neighbours of a wall in one direction cover of a line: how far they reach; how much what comes counts; the
+# metres that count as covered, and that are; sums over these of the walls' steps from the wall, and of their squares.
+WAY = fields((_F, "reach weight net covered first second"))
 # The cover of a posed line by a wall and its neighbours on its chain: offset of the line from the wall; abscissae from
-# its midpoint between which the wall covers it; metres that count as covered, and that are; sums over these of the
-# walls' steps from the wall, and of their squares. Of the neighbours in one direction: how far they reach; how much
-# what comes counts; the same sums, and at their best.
-COVER = fields(
-    (
-        _F,
-        "offset low high counted covered first second reach weight net more more_first more_second best_net best_more "
-        "best_first best_second",
-    )
+# its midpoint between which the wall covers it; the same four sums; those of one direction so far, at their best, and
+# of none.
+COVER = np.dtype(
+    [
+        *fields((_F, "offset low high counted covered first second")).descr,
+        ("way", WAY),
+        ("best", WAY),
+        ("none", WAY),
+    ]
 )
 # A pair whose sums are held: the wall or -1; the weight; the shift of the line under the scan line from the wall; the
 # line.
@@ -131,6 +134,7 @@ SCRATCH = np.dtype(
     [
         ("line", POSED_LINE),
         ("cover", COVER),
+        ("nothing", JOINT_SUMS),
         ("plain", JOINT_SUMS),
         ("sums", JOINT_SUMS),
         ("angles", ANGLE_SUMS),

@@ -55,7 +55,10 @@ def _on_map(context: SearchContext, index: JointIndex, result: AssociationResult
     """Return the answer's pose and segments on map `m`; its alternatives stay where they are."""
     first, last = int(index.starts[m]), int(index.starts[m + 1])
     assert result.pose is not None
-    pairs = tuple(_correspondence(pair, first) for pair in result.correspondences)
+    pairs = tuple(
+        replace(pair, map=pair.map - first, alternatives=tuple(i - first for i in pair.alternatives))
+        for pair in result.correspondences
+    )
     pose = _back(index, result.pose, m)
     diagnostics = result.diagnostics
     if diagnostics is not None:
@@ -83,10 +86,6 @@ def _registered_on_map(
     sigma = index.sigma or 0.0
     registered = register(index.parts[m].segments, context.scan.measured, indices, sigma, options, pose)
     return replace(diagnostics, ambiguity_before=registered.diagnostics.ambiguity_before)
-
-
-def _correspondence(pair: Correspondence, first: int) -> Correspondence:
-    return replace(pair, map=pair.map - first, alternatives=tuple(i - first for i in pair.alternatives))
 
 
 def _alternative(context: SearchContext, index: JointIndex, other: Alternative, ids: Sequence[str]) -> Alternative:
@@ -126,48 +125,43 @@ def _map_verdicts(
     firsts: dict[int, ConsensusSet] = {}
     for one in found.explanations.ranked:
         firsts.setdefault(_map_at(context, context.in_map(one.pose)), one)
-    others = [m for m in firsts if m != best]
-    likely = _probabilities(found, {m: firsts[m] for m in others})
+    similar, likely = _of_others(found)
     verdicts: list[MapVerdict] = []
     if best is not None and result.diagnostics is not None:
         score = result.diagnostics.score + float(weights[best])
         verdicts.append(MapVerdict(ids[best], result.status, score, result.probability, pose))
-    similar = similar_maps(found)
-    for m in others:
-        one = firsts[m]
+    for m, one in firsts.items():
+        if m == best:
+            continue
         status = Status.AMBIGUOUS if m in similar else Status.NO_MATCH
         score = one.score + float(weights[m])
         there = None if best is None else _back(index, context.in_map(one.pose), m)
-        verdicts.append(MapVerdict(ids[m], status, score, likely[m], there))
-    none = 0.0 if result.probability is not None else None
+        verdicts.append(MapVerdict(ids[m], status, score, None if likely is None else likely.get(m, 0.0), there))
+    none = None if result.probability is None else 0.0
     listed = {verdict.map_id for verdict in verdicts}
     return (*verdicts, *(MapVerdict(name, Status.NO_MATCH, None, none, None) for name in ids if name not in listed))
 
 
-def similar_maps(found: Stages) -> set[int]:
-    """Return the maps with a pose that explains a scan about as well as the answer, which is not usable."""
-    context, comparison = found.context, found.verdict.comparison
-    if comparison is None or found.result.usable or found.result.status is Status.NO_MATCH:
-        return set()
-    near = [
-        one for one, weight in zip(comparison.others, comparison.weights.tolist(), strict=True) if weight >= AS_LIKELY
-    ]
-    return {_map_at(context, context.in_map(one.pose)) for one in near}
+def _of_others(found: Stages) -> tuple[set[int], dict[int, float] | None]:
+    """Return what the alternatives say of their maps.
 
-
-def _probabilities(found: Stages, firsts: dict[int, ConsensusSet]) -> dict[int, float | None]:
-    """Return the probability that the pose is on each of the other maps: the sum over its poses."""
-    comparison = found.verdict.comparison
-    others = () if comparison is None else comparison.others
-    each = probabilities_of_others(found.verdict, others)
-    if found.result.probability is None or comparison is None:
-        return dict.fromkeys(firsts)
-    total = dict.fromkeys(firsts, 0.0)
-    for one, probability in zip(others, each, strict=True):
-        m = _map_at(found.context, found.context.in_map(one.pose))
-        if m in total:
-            total[m] += probability or 0.0
-    return dict(total)
+    Returns
+    -------
+    the maps with a pose that explains the scan about as well as an answer that is not usable
+    the probability of each map's poses together; None where the answer has none
+    """
+    context, comparison, result = found.context, found.verdict.comparison, found.result
+    similar, likely = set[int](), dict[int, float]()
+    if comparison is None:
+        return similar, None
+    open_still = not result.usable and result.status is not Status.NO_MATCH
+    each = probabilities_of_others(found.verdict, comparison.others)
+    for one, weight, probability in zip(comparison.others, comparison.weights.tolist(), each, strict=True):
+        m = _map_at(context, context.in_map(one.pose))
+        likely[m] = likely.get(m, 0.0) + (probability or 0.0)
+        if open_still and weight >= AS_LIKELY:
+            similar.add(m)
+    return similar, None if result.probability is None else likely
 
 
 def _named(reason: Reason, result: AssociationResult) -> Reason:

@@ -301,17 +301,17 @@ class AssociationResult:
     status: Status
     usable: bool
     probability: float | None
-    pose: RigidTransform | None
-    covariance: Floats | None
-    unobservable: tuple[float, float] | None
-    correspondences: tuple[Correspondence, ...]
     unmatched_scan: tuple[int, ...]
-    missing_map: tuple[int, ...]
-    diagnostics: AssociationDiagnostics | None
     reasons: tuple[Reason, ...]
     alternatives: tuple[Alternative, ...]
     search: SearchReport
     warnings: tuple[AssociationWarning, ...]
+    pose: RigidTransform | None = None
+    covariance: Floats | None = None
+    unobservable: tuple[float, float] | None = None
+    correspondences: tuple[Correspondence, ...] = ()
+    missing_map: tuple[int, ...] = ()
+    diagnostics: AssociationDiagnostics | None = None
     map_id: str | None = None
     maps: tuple[MapVerdict, ...] = ()
 

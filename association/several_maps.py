@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -39,12 +40,14 @@ class MapSet:
         For scans as wide as the largest of the maps.
     """
 
-    def __init__(self, maps: Mapping[str, MapPart], deadline: Deadline | None = None) -> None:
+    def __init__(
+        self, maps: Mapping[str, MapPart] | Sequence[tuple[str, MapPart]], deadline: Deadline | None = None
+    ) -> None:
         """Index several maps together.
 
         Parameters
         ----------
-        maps : mapping of str to MapPart
+        maps : mapping of str to MapPart, or sequence of pairs
             By name; 1 to 256.
         deadline : Deadline, optional
             Looked at every few tenths of a second.
@@ -52,12 +55,17 @@ class MapSet:
         Raises
         ------
         InvalidMapError
-            When a map cannot be searched.
+            When a map cannot be searched, or two have the same name.
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        self.ids = tuple(maps)
-        self.parts = checked_parts(tuple(maps.values()))
+        pairs = list(maps.items() if isinstance(maps, Mapping) else maps)
+        self.ids = tuple(name for name, _ in pairs)
+        if twice := [name for name, count in Counter(self.ids).items() if count > 1]:
+            raise InvalidMapError(
+                f"found the id {twice[0]!r} twice, expected a different one for each map", argument="maps"
+            )
+        self.parts = checked_parts(tuple(part for _, part in pairs))
         self.oriented = all(part.oriented for part in self.parts)
         gap = usual_gap(self.parts)
         self.index = JointIndex.of_parts(self.parts, gap, oriented=self.oriented, deadline=deadline)
@@ -223,20 +231,3 @@ def log_weights(maps: MapSet, weights: Mapping[str, float]) -> Floats:
     with np.errstate(divide="ignore"):
         logarithms: Floats = np.maximum(SOFT_FLOOR, np.log(every / every.max()))
     return logarithms
-
-
-def map_set(maps: Mapping[str, MapPart] | Sequence[tuple[str, MapPart]]) -> MapSet:
-    """Index several named maps together.
-
-    Raises
-    ------
-    InvalidMapError
-        When two have the same name, or one cannot be searched.
-    """
-    pairs = list(maps.items() if isinstance(maps, Mapping) else maps)
-    named = dict(pairs)
-    if len(named) < len(pairs):
-        ids = [name for name, _ in pairs]
-        twice = next(name for name in ids if ids.count(name) > 1)
-        raise InvalidMapError(f"found the id {twice!r} twice, expected a different one for each map", argument="maps")
-    return MapSet(named)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from registration.layout import JOINT_SUMS, Floats, Records
+from registration.layout import Floats, Records
+from registration.observability import most_parallel_up_to
 
 from .layout import HELD, SCRATCH, WALL_SUMS, Integers, record
 
@@ -166,12 +167,10 @@ class ScoreRules(NamedTuple):
     Attributes
     ----------
     rule : (1,) of `RULE`
-    parallel : (k,) chi-square of their angles up to which so many lines are parallel
     packed : whether poses that are kept are to come first
     """
 
     rule: Records
-    parallel: Floats
     packed: bool
 
 
@@ -184,20 +183,20 @@ class ScoreWork(NamedTuple):
     wall_sums : (m,) of `WALL_SUMS`, those of no pair between two calls
     listed : (n,) walls
     scratch : (1,) of `SCRATCH`
-    nothing : (1,) of `JOINT_SUMS`, those of no pair
+    parallel : (n + 1,) chi-square of their angles up to which so many lines are parallel
     """
 
     held: Records
     wall_sums: Records
     listed: Integers
     scratch: Records
-    nothing: Records
+    parallel: Floats
 
     @classmethod
     def of(cls, lines: int, walls: int) -> ScoreWork:
         """Return the arrays for a scan of so many lines on a map of so many walls."""
         held, wall_sums = np.zeros(lines, HELD), np.zeros(walls, WALL_SUMS)
-        return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), record(JOINT_SUMS))
+        return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), most_parallel_up_to(lines))
 
 
 class Model(NamedTuple):

@@ -16,10 +16,9 @@ from .result import AssociationResult, Reason, ReasonCode, Status
 from .scan.scan import Scan
 from .verdict.features import ROLES
 from .verdict.model import ELSEWHERE, USUAL, WRONG
-from .verdict.reasons import taken_by_reason
+from .verdict.reasons import VETOES, taken_by_reason
 from .verdict.tuning import NO_MATCH_PROBABILITY
 from .verdict.verdict import Verdict
-from .verdict.vetoes import VETOES
 
 
 @dataclass(frozen=True, slots=True)

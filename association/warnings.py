@@ -12,9 +12,8 @@ from registration import Beams
 from .consensus.estimator import Estimate
 from .context import SearchContext
 from .explanations import Answer, Explanations
-from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
-from .scan.extents import extent, facing_away, inner_extent
+from .scan.extents import facing_away, inner_extent
 from .tuning import (
     DOUBTING_DEVIATIONS,
     EXCEEDING,
@@ -32,6 +31,7 @@ NOT_IN_ORDER = (
     "Expected is one turn around the viewpoint in one direction or, without a viewpoint, neighbour after neighbour. "
     "Send the points of one scan in the order in which they were measured."
 )
+NO_SEGMENTS = "The scan has no segments, so nothing was searched. Check the ranges, and the least length of segments."
 
 
 def warnings_of(context: SearchContext, search: SearchReport, verdict: Verdict) -> tuple[AssociationWarning, ...]:
@@ -63,7 +63,7 @@ def warnings_of_map(
 
 def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
     return {
-        "no_segments": _no_segments(context),
+        "no_segments": None if len(context.scan.measured) else NO_SEGMENTS,
         "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
         **{warning.code: warning.message for warning in context.scan.warnings},
         "stuck_ranges": _stuck_ranges(context.scan.beams),
@@ -136,12 +136,6 @@ def _turned(explanations: Explanations, found: Estimate) -> str | None:
     )
 
 
-def _no_segments(context: SearchContext) -> str | None:
-    if len(context.scan.measured):
-        return None
-    return "The scan has no segments, so nothing was searched. Check the ranges, and the least length of segments."
-
-
 def _stuck_ranges(beams: Beams | None) -> str | None:
     """Describe ranges most of which have one value; ranges to walls never do."""
     if beams is None:
@@ -162,8 +156,8 @@ def _stuck_ranges(beams: Beams | None) -> str | None:
 def _exceeding(context: SearchContext) -> str | None:
     """Describe a scan that, without its outermost pieces, is larger than the box around the map."""
     segments, room = context.scan.measured.segments, context.index.diagonal
-    # With its outermost pieces it is no less wide, and that extent is computed faster.
-    if extent(context.ends) <= EXCEEDING * room:
+    # The box around it is no less wide, and that is computed faster.
+    if not len(segments) or np.hypot(*np.ptp(segments.endpoints.reshape(-1, 2), axis=0)) <= EXCEEDING * room:
         return None
     reach = inner_extent(segments)
     if reach <= EXCEEDING * room:
@@ -181,11 +175,11 @@ def _facing_away(context: SearchContext) -> str | None:
     views = context.scan.views
     # A segment without a viewpoint, nan, does not face away from any.
     places = context.viewpoints if views is None else context.viewpoints[views.of_segment]
-    seen_from = as_records(POINT, places)
-    away = facing_away(context.ends, seen_from, FACING)
+    ends = context.scan.measured.segments.endpoints
+    away = facing_away(ends, places, FACING)
     if not away:
         return None
     return (
-        f"{away} of {len(context.ends)} segments have the viewpoint on their right, but a sensor sees only their left "
+        f"{away} of {len(ends)} segments have the viewpoint on their right, but a sensor sees only their left "
         "side. Exchange their begin and end, or check that they are in the sensor's frame."
     )

@@ -20,8 +20,8 @@ from association.explanations import explain_scan
 from association.verdict.alternatives import compare
 from association.verdict.features import Features, describe, with_null
 from association.verdict.null import find_null
+from association.verdict.reasons import applied
 from association.verdict.verdict import findings_of
-from association.verdict.vetoes import applied
 from batch import Lost, Processes
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.segments import Beams

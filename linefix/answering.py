@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from association import AssociationOptions, AssociationResult, Deadline, KnownOfMaps, MapIndex, MapSet, Scan, map_set
+from association import AssociationOptions, AssociationResult, Deadline, KnownOfMaps, MapIndex, MapSet, Scan
 from map_quality import check_map
 
 from .analyzing import Progress, finished, look_on_all_cores
@@ -88,7 +88,7 @@ def target_of(asked: OnMaps, oriented: bool | None, within: Within) -> Target:
         frames.setdefault(None, document.frame_id)
         frames[one.map_id] = document.frame_id
         references[one.map_id] = reference or {"map_id": one.map_id, "revision": None}
-    return Target(map_set(parts), frames, references, asked.map_weights)
+    return Target(MapSet(parts), frames, references, asked.map_weights)
 
 
 def _document_of(on: InlineMap | StoredMap, within: Within) -> tuple[MapDocument, Json | None]:

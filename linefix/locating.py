@@ -21,7 +21,6 @@ from association import (
     Prior,
     Scan,
     assemble,
-    map_set,
 )
 from registration import InvalidArgumentError, MeasuredSegments, Segments
 from vectorization import LaserScan
@@ -181,7 +180,7 @@ def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
     [('room', 'ok'), ('hall', 'no_match')]
     """
     named = list(maps.items()) if isinstance(maps, Mapping) else [(str(n), one) for n, one in enumerate(maps)]
-    return map_set([(name, _part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
+    return MapSet([(name, _part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
 
 
 def _several(map: Any) -> MapSet | None:

@@ -15,13 +15,13 @@ from association import (
     MapIndex,
     MapPart,
     MapPoints,
+    MapSet,
     Scan,
     SoftPrior,
     View,
     assemble,
     associate,
     associate_on_maps,
-    map_set,
 )
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from registration import (
@@ -115,7 +115,7 @@ def warm_up_searching() -> None:
     # The mirrored scan is found as well; a map that is not to scale states no sigma.
     for other in (MapIndex.build(symmetric, 0.0), MapIndex.build(Segments.from_array(1.02 * SYMMETRIC_ROOM))):
         associate(other, Scan(MeasuredSegments.from_segments(symmetric)))
-    maps = map_set({"room": MapPart(room, 0.0), "symmetric": MapPart(symmetric, 0.0)})
+    maps = MapSet({"room": MapPart(room, 0.0), "symmetric": MapPart(symmetric, 0.0)})
     for known in (KnownOfMaps(), KnownOfMaps(window, "room", {"room": 0.5})):
         associate_on_maps(maps, _with_beams(), known)
 

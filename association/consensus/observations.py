@@ -92,7 +92,7 @@ def _set_times(context: SearchContext, lines: Records) -> None:
         return
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
     sweep = last - first
-    if scan.still or not abs(sweep) > 0.0:
+    if scan.sweep_s == 0.0 or not abs(sweep) > 0.0:
         return
     x, y = lines["centroid_x"] - context.sensor[0], lines["centroid_y"] - context.sensor[1]
     bearings = math.copysign(1.0, sweep) * (np.arctan2(y, x) - first) % math.tau

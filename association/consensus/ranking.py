@@ -46,7 +46,7 @@ def score(context: SearchContext, estimates: Records) -> tuple[Records, Records]
         START_VARIANCE + t * x * x,
     )
     estimates["xt"], estimates["yt"], estimates["tt"] = t * y, -t * x, t
-    rules = ScoreRules(record(RULE), context.parallel, False)
+    rules = ScoreRules(record(RULE), False)
     step = max(2, int(RANKED_AT_ONCE / (max(1, n) * max(1.0, context.index.crowd))))
     for begin in range(0, k, step):
         if context.deadline.cancelled:

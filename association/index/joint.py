@@ -125,8 +125,6 @@ class JointIndex(MapIndex):
         return cls(either, sigma, np.zeros(2), directed, points, *tables, *together).warmed()
 
     def _undirected(self, deadline: Deadline | None) -> JointIndex:
-        if len(self.segments) > self.directed:
-            return self
         return JointIndex.of_parts(self.parts, self.gap, oriented=False, deadline=deadline)
 
     @cached_property

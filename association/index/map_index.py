@@ -118,7 +118,8 @@ class MapIndex:
         low, high = cls.require(segments, sigma, "map.")
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
-        return cls._of(either, sigma, origin, len(segments), points.near(low, high), deadline)
+        tables = tables_of(either.shifted(-origin), sigma, deadline)
+        return cls(either, sigma, origin, len(segments), points.near(low, high), *tables).warmed()
 
     @staticmethod
     def require(segments: Segments, sigma: float | None, path: str) -> tuple[Floats, Floats]:
@@ -145,31 +146,18 @@ class MapIndex:
             )
         return low, high
 
-    @classmethod
-    def _of(
-        cls,
-        segments: Segments,
-        sigma: float | None,
-        origin: Floats,
-        directed: int,
-        points: MapPoints,
-        deadline: Deadline | None,
-    ) -> MapIndex:
-        tables = tables_of(segments.shifted(-origin), sigma, deadline)
-        return cls(segments, sigma, origin, directed, points, *tables).warmed()
-
     def warmed(self) -> Self:
         """Compute what the first search would wait for, and return the index."""
         for name in ("crowd", "most_near", "area", "diagonal", "tables", "obstacles"):
             getattr(self, name)
         return self
 
-    @cached_property
+    @property
     def undirected(self) -> MapIndex:
         """The same map with every segment in both directions; itself where it was built so."""
-        return self._undirected(None)
+        return self.undirected_by(None)
 
-    def undirected_by(self, deadline: Deadline) -> MapIndex:
+    def undirected_by(self, deadline: Deadline | None) -> MapIndex:
         """Return `undirected`, which is kept, if it is there before a deadline.
 
         Raises
@@ -177,16 +165,16 @@ class MapIndex:
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
-        kept = vars(self)
-        if "undirected" not in kept:
-            kept["undirected"] = self._undirected(deadline)
-        return self.undirected
-
-    def _undirected(self, deadline: Deadline | None) -> MapIndex:
         if len(self.segments) > self.directed:
             return self
-        either = both_ways(self.segments)
-        return MapIndex._of(either, self.sigma, self.origin, self.directed, self.points, deadline)
+        kept = vars(self)
+        if "both_ways" not in kept:
+            kept["both_ways"] = self._undirected(deadline)
+        undirected: MapIndex = kept["both_ways"]
+        return undirected
+
+    def _undirected(self, deadline: Deadline | None) -> MapIndex:
+        return MapIndex.build(self.segments, self.sigma, oriented=False, points=self.points, deadline=deadline)
 
     @cached_property
     def obstacles(self) -> Place:

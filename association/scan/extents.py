@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from registration import Segments
-from registration.layout import Records
+from registration.layout import Floats
 
 from .scan import Scan
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
@@ -14,16 +14,8 @@ _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for
 
 
-def extent(ends: Records) -> float:
-    """Return how wide segments, (n,) of `ENDS`, lie apart in the direction in which that is most, metres; 0 of none."""
-    if not len(ends):
-        return 0.0
-    along = DIRECTIONS @ ends.view(np.float64).reshape(-1, 2).T
-    return float((along.max(axis=1) - along.min(axis=1)).max())
-
-
 def inner_extent(segments: Segments) -> float:
-    """Return the extent without its outermost parts, metres.
+    """Return how wide segments lie apart in the direction in which that is most, without their outermost parts, metres.
 
     Of their length a fraction of `OUTERMOST_SHARE` at either end does not count: some beams leave through a window.
     """
@@ -54,12 +46,11 @@ def whole_extent(scan: Scan) -> float:
     return float(np.hypot(*np.ptp(every, axis=0))) if len(every) else 0.0
 
 
-def facing_away(ends: Records, seen_from: Records, least: float) -> int:
-    """Count the segments, (n,) of `ENDS`, that have the place they were seen from on their right, by over `least` m.
+def facing_away(rows: Floats, places: Floats, least: float) -> int:
+    """Count the segments, (n, 4), that have the place they were seen from on their right, by over `least` metres.
 
-    `seen_from` (n,) of `POINT`, or (1,) where all were seen from there; nan where the place is unknown.
+    `places` (n, 2), or (1, 2) where all were seen from there; nan where the place is unknown.
     """
-    rows, places = ends.view(np.float64).reshape(-1, 4), seen_from.view(np.float64).reshape(-1, 2)
     dx, dy = (rows[:, 2:] - rows[:, :2]).T
     x, y = (places - 0.5 * (rows[:, :2] + rows[:, 2:])).T
     return int(np.count_nonzero(dx * y - dy * x < -least * np.sqrt(dx * dx + dy * dy)))

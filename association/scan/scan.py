@@ -129,11 +129,6 @@ class Scan:
     warnings: tuple[AssociationWarning, ...] = ()
     sweep_s: float | None = None
 
-    @property
-    def still(self) -> bool:
-        """Return whether the sensor is known not to have turned, or its motion is corrected."""
-        return self.sweep_s == 0.0
-
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left.
@@ -142,14 +137,12 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     """
     at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
-    measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
+    seen = scan.measured
+    measured = replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
+    measured = measured if segments else NOTHING_MEASURED
     return Scan(
         measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings, scan.sweep_s
     )
-
-
-def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
-    return replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
 
 
 def turned_round(scan: Scan) -> Scan:

@@ -283,7 +283,7 @@ class _Search:
     def _propose(self, propose: Callable[[int, Records], tuple[int, int]], gains: Floats, best: _BestPoses) -> bool:
         """Propose poses, reject most of them, score the rest; return False where the deadline passes."""
         context, place, raster = self.context, self.context.index.tables.place, self.context.index.tables.raster
-        rules = ScoreRules(best.rule, context.parallel, True)
+        rules = ScoreRules(best.rule, True)
         first, chains = 0, len(self.sweep.chains)
         while first < chains:
             if context.deadline.passed:

@@ -14,10 +14,9 @@ from .alternatives import Comparison, compare
 from .features import Described, describe, with_null
 from .model import MODELS, Model
 from .null import find_null
-from .reasons import reasons_of, weighed_reasons
+from .reasons import INCOMPLETE, VETOES, Findings, Veto, applied, reasons_of, weighed_reasons
 from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY
 from .unobservable import choose_along_direction
-from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied
 
 NEUTRAL = 0.5  # prior probability at which it is judged whether a scan is of the map at all
 

@@ -14,11 +14,11 @@ from association import (
     MapIndex,
     MapPart,
     MapPoints,
+    MapSet,
     Scan,
     Status,
     associate,
     associate_on_maps,
-    map_set,
 )
 from registration import RigidTransform, Segments
 
@@ -177,7 +177,7 @@ def test_a_map_without_directions_has_its_points() -> None:
 def test_points_of_several_maps_lie_on_their_own() -> None:
     """Two equal rooms as two maps, and the legs are in the second."""
     legs = LEGS - SHIFT
-    maps = map_set({"bare": MapPart(WALLS, points=NO_POINTS), "legs": MapPart(WALLS, points=MapPoints.of(legs))})
+    maps = MapSet({"bare": MapPart(WALLS, points=NO_POINTS), "legs": MapPart(WALLS, points=MapPoints.of(legs))})
     scan = ranges(furnished(ROOM, legs), INSIDE, 1, beams=1440)
     found = associate_on_maps(maps, scan)
     assert found.map_id == "legs"

@@ -29,7 +29,6 @@ from association import (
     assemble,
     associate,
     associate_on_maps,
-    map_set,
 )
 from registration import MeasuredSegments, RigidTransform, Segments
 
@@ -77,7 +76,7 @@ def part(walls: Floats, **how: Any) -> MapPart:
 
 @cache
 def building() -> MapSet:
-    return map_set({name: part(floor(k)) for k, name in enumerate(NAMES)})
+    return MapSet({name: part(floor(k)) for k, name in enumerate(NAMES)})
 
 
 def probabilities(result: AssociationResult) -> float:
@@ -108,7 +107,7 @@ def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(number: in
     gone = [[14.0, 5.0, 14.0, 7.0], [14.0, 7.0, 14.0, 5.0]]
     mapped = [np.vstack([floor(k), gone]) + np.tile(k * far, 2) for k in range(5)]
     alone = associate(MapIndex.build(Segments.from_array(mapped[number])), seen_on(number))
-    among = associate_on_maps(map_set({str(k): part(one) for k, one in enumerate(mapped)}), seen_on(number))
+    among = associate_on_maps(MapSet({str(k): part(one) for k, one in enumerate(mapped)}), seen_on(number))
     assert among.map_id == str(number)
     assert same_pose(pose_in(among), pose_in(alone), 1e-6, 1e-6)
     np.testing.assert_allclose(covariance_in(among), covariance_in(alone), rtol=1e-5)
@@ -118,7 +117,7 @@ def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(number: in
 
 
 def test_equal_floors_are_ambiguous_and_both_are_listed() -> None:
-    found = associate_on_maps(map_set({"a": part(floor(0)), "b": part(floor(0)), "c": part(floor(1))}), seen_on(0))
+    found = associate_on_maps(MapSet({"a": part(floor(0)), "b": part(floor(0)), "c": part(floor(1))}), seen_on(0))
     assert (found.status, found.usable) == (Status.AMBIGUOUS, False)
     assert {one.map_id: one.status for one in found.maps}["a"] is Status.AMBIGUOUS
     assert {one.map_id: one.status for one in found.maps}["b"] is Status.AMBIGUOUS
@@ -155,7 +154,7 @@ def similar(seed: int) -> tuple[MapSet, Scan]:
     second = np.vstack([first[:-4], box(20.5, 8.0, *rng.uniform(0.5, 2.0, 2))])
     at = pose(rng.uniform(3.0, 16.0), 6.0, rng.uniform(-3.0, 3.0))
     scan = ranges(first, at, seed, reach=(6.0, 10.0, 20.0)[seed % 3])
-    return map_set({"a": part(first), "b": part(second), "c": part(floor(40 + seed))}), scan
+    return MapSet({"a": part(first), "b": part(second), "c": part(floor(40 + seed))}), scan
 
 
 def variants(seed: int) -> tuple[MapSet, Scan]:
@@ -167,7 +166,7 @@ def variants(seed: int) -> tuple[MapSet, Scan]:
         other[-4:] += np.tile(rng.uniform(-0.6, 0.6, 2), 2)
         rooms.append(other)
     scan = ranges(rooms[0], at, seed, reach=(20.0, 5.0)[seed % 2])
-    return map_set({name: part(one) for name, one in zip("abc", rooms, strict=True)}), scan
+    return MapSet({name: part(one) for name, one in zip("abc", rooms, strict=True)}), scan
 
 
 @pytest.mark.parametrize(("drawn", "seeds"), [(similar, range(8)), (variants, range(25, 43))])
@@ -195,7 +194,7 @@ def test_probabilities_sum_to_at_most_one_and_statuses_agree_with_reasons(
 
 
 def test_weights_decide_between_equal_floors_and_are_not_fused() -> None:
-    maps = map_set({"a": part(floor(0)), "b": part(floor(0))})
+    maps = MapSet({"a": part(floor(0)), "b": part(floor(0))})
     plain = associate_on_maps(maps, seen_on(0))
     for name in ("a", "b"):
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(map_weights={name: 0.9999}))
@@ -215,7 +214,7 @@ def test_weights_do_not_overrule_the_scan() -> None:
 
 @pytest.mark.parametrize("hard", [True, False])
 def test_a_prior_is_on_its_map(hard: bool) -> None:
-    maps = map_set({"a": part(floor(0)), "b": part(floor(0))})
+    maps = MapSet({"a": part(floor(0)), "b": part(floor(0))})
     prior = HardPrior(TRUTH, 1.0, 0.5) if hard else SoftPrior(TRUTH, np.diag([0.1, 0.1, 0.05]))
     for name in ("a", "b"):
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(prior, name))
@@ -251,13 +250,13 @@ def test_maps_that_cannot_be_searched_are_named() -> None:
         ([(str(k), room) for k in range(257)], "maps"),
     ]:
         with pytest.raises(InvalidMapError) as refused:
-            map_set(maps)
+            MapSet(maps)
         assert refused.value.argument == argument
 
 
 def test_alternatives_are_in_the_frames_of_their_maps() -> None:
     shift = np.array([1000.0, -2000.0])
-    maps = map_set({"a": part(floor(0)), "b": part(floor(0) + np.tile(shift, 2))})
+    maps = MapSet({"a": part(floor(0)), "b": part(floor(0) + np.tile(shift, 2))})
     found = associate_on_maps(maps, seen_on(0))
     places = {found.map_id: pose_in(found), found.alternatives[0].map_id: found.alternatives[0].pose}
     assert same_pose(places["a"], TRUTH, 0.05)
@@ -280,7 +279,7 @@ def test_parts_of_an_answer_are_left_out_as_of_one_map() -> None:
 
 def test_one_map_alone_is_a_set_as_well() -> None:
     alone = associate(MapIndex.build(Segments.from_array(floor(2))), seen_on(2))
-    found = associate_on_maps(map_set({"only": part(floor(2))}), seen_on(2))
+    found = associate_on_maps(MapSet({"only": part(floor(2))}), seen_on(2))
     assert (found.map_id, found.status, len(found.maps)) == ("only", alone.status, 1)
     assert found.probability == pytest.approx(alone.probability, abs=1e-6)
     assert same_pose(pose_in(found), pose_in(alone), 1e-6, 1e-6)
@@ -288,7 +287,7 @@ def test_one_map_alone_is_a_set_as_well() -> None:
 
 def test_the_order_of_the_maps_does_not_matter() -> None:
     names = [NAMES[k] for k in (3, 0, 4, 2, 1)]
-    other = map_set({name: part(floor(NAMES.index(name))) for name in names})
+    other = MapSet({name: part(floor(NAMES.index(name))) for name in names})
     for k in range(3):
         one, two = (associate_on_maps(maps, seen_on(k)) for maps in (building(), other))
         assert (one.map_id, one.status, one.usable) == (two.map_id, two.status, two.usable)
@@ -299,7 +298,7 @@ def test_the_order_of_the_maps_does_not_matter() -> None:
 def test_maps_without_directions_and_maps_with_them_may_be_mixed() -> None:
     """Then directions mean nothing on any."""
     reversed_floor = floor(1)[:, [2, 3, 0, 1]]
-    maps = map_set({"a": part(floor(0)), "b": part(reversed_floor, oriented=False)})
+    maps = MapSet({"a": part(floor(0)), "b": part(reversed_floor, oriented=False)})
     found = associate_on_maps(maps, seen_on(1), options=Options(oriented=False))
     assert found.map_id == "b"
     assert same_pose(pose_in(found), TRUTH)

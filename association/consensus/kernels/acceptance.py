@@ -10,32 +10,9 @@ from compiled import kernel
 from registration.layout import Floats, Records
 
 from ...layout import Indices, Integers
+from ...scan.kernels.joining import insert, union
 from ...tables import Pieces
 from ..tuning import LEAST_KNOWN_VARIANCE, MAX_OTHERS, MIN_EXTENT, MOST_UNDER
-
-
-@kernel
-def covered(lows: Floats, highs: Floats, count: int, low: float, high: float) -> float:
-    """Return the length between two abscissae that intervals cover, of which those that begin first come first."""
-    total = 0.0
-    for k in range(count):
-        begin = max(lows[k], low)
-        end = min(highs[k], high)
-        if end > begin:
-            total += end - begin
-            low = end
-    return total
-
-
-@kernel
-def insert(lows: Floats, highs: Floats, count: int, low: float, high: float) -> int:
-    """Add an interval to some that are ordered by their begins; return where it stands."""
-    k = count
-    while k > 0 and lows[k - 1] > low:
-        lows[k], highs[k] = lows[k - 1], highs[k - 1]
-        k -= 1
-    lows[k], highs[k] = low, high
-    return k
 
 
 @kernel
@@ -91,7 +68,7 @@ def lay_segments(
                     count += 1
             v = walls[v].after
         on[i] = most
-        overlaps[i] = min(1.0, covered(lows, highs, count, low, high) / max(high - low, MIN_EXTENT))
+        overlaps[i] = min(1.0, union(lows, highs, count, low, high) / max(high - low, MIN_EXTENT))
         listed = 0
         others[i] = -1
         for k in range(count):
@@ -147,7 +124,7 @@ def weigh_pairs(
                 insert(lows, highs, count, middle - 0.5 * lengths[j], middle + 0.5 * lengths[j])
                 count += 1
         middle = 0.5 * ((ends[i, 0] + ends[i, 2]) * dx + (ends[i, 1] + ends[i, 3]) * dy) / size
-        free = lengths[i] - covered(lows, highs, count, middle - 0.5 * lengths[i], middle + 0.5 * lengths[i])
+        free = lengths[i] - union(lows, highs, count, middle - 0.5 * lengths[i], middle + 0.5 * lengths[i])
         alone[i] = max(0.0, free) / max(lengths[i], MIN_EXTENT) / max(variances[i], LEAST_KNOWN_VARIANCE)
     for i in range(n):
         together = 0.0

@@ -75,7 +75,7 @@ def match_lines(
                         if v < 0 or not short:
                             continue
                         begin_way(cover, way)
-                        while v >= 0 and cover.reach < line.half and to_follow > 0:
+                        while v >= 0 and cover.way.reach < line.half and to_follow > 0:
                             to_follow -= 1
                             if not follow(walls[v], wall, line, way, cover):
                                 break

@@ -69,16 +69,10 @@ def begin_cover(wall: Record, line: Record, cover: Record) -> bool:
 @kernel
 def begin_way(cover: Record, way: float) -> None:
     """Start to follow the walls that continue a wall in one direction: 1 forwards, -1 backwards."""
-    cover.reach = cover.high if way > 0.0 else -cover.low
-    cover.weight = 1.0
-    cover.net = 0.0
-    cover.more = 0.0
-    cover.more_first = 0.0
-    cover.more_second = 0.0
-    cover.best_net = 0.0
-    cover.best_more = 0.0
-    cover.best_first = 0.0
-    cover.best_second = 0.0
+    cover.way = cover.none
+    cover.best = cover.none
+    cover.way.reach = cover.high if way > 0.0 else -cover.low
+    cover.way.weight = 1.0
 
 
 @kernel
@@ -87,18 +81,19 @@ def follow(wall: Record, base: Record, line: Record, way: float, cover: Record) 
 
     A gap up to `WHOLE_GAP` is as good as covered; a wider one counts against the cover, and what lies behind it less.
     """
+    sums = cover.way
     along = wall.dx * line.x + wall.dy * line.y
     begin = wall.begin - along if way > 0.0 else along - wall.end
     end = wall.end - along if way > 0.0 else along - wall.begin
     if begin >= line.half:
         return False
-    if begin > cover.reach:
-        gap = begin - cover.reach
+    if begin > sums.reach:
+        gap = begin - sums.reach
         whole = fade(gap, WHOLE_GAP, APART_GAP)
         bridges = min(1.0, max(0.0, (2.0 * line.half - SHORT_BRIDGE) / (LONG_BRIDGE - SHORT_BRIDGE)))
-        cover.weight *= whole + (1.0 - whole) * bridges
-        cover.net += cover.weight * gap * (2.0 * whole - 1.0)
-    start = max(begin, cover.reach)
+        sums.weight *= whole + (1.0 - whole) * bridges
+        sums.net += sums.weight * gap * (2.0 * whole - 1.0)
+    start = max(begin, sums.reach)
     stop = min(end, line.half)
     if stop > start:
         middle = way * 0.5 * (start + stop)
@@ -106,28 +101,25 @@ def follow(wall: Record, base: Record, line: Record, way: float, cover: Record) 
         y = line.y + middle * line.dy
         off = wall.dx * y - wall.dy * x - wall.offset
         beside = base.dx * y - base.dy * x - base.offset - off
-        part = cover.weight * (stop - start)
+        part = sums.weight * (stop - start)
         part *= fade(abs(off), FLAT_GATE * line.gate, line.gate) * fade(abs(beside), FLAT_STEP, APART_STEP)
-        cover.net += part
-        cover.more += part
-        cover.more_first += part * beside
-        cover.more_second += part * beside * beside
-        if cover.net > cover.best_net:
-            cover.best_net = cover.net
-            cover.best_more = cover.more
-            cover.best_first = cover.more_first
-            cover.best_second = cover.more_second
-        cover.reach = end
+        sums.net += part
+        sums.covered += part
+        sums.first += part * beside
+        sums.second += part * beside * beside
+        if sums.net > cover.best.net:
+            cover.best = sums
+        sums.reach = end
     return True
 
 
 @kernel
 def end_way(cover: Record) -> None:
     """Take over what the walls in one direction cover, as far as that is to the good."""
-    cover.counted += cover.best_net
-    cover.covered += cover.best_more
-    cover.first += cover.best_first
-    cover.second += cover.best_second
+    cover.counted += cover.best.net
+    cover.covered += cover.best.covered
+    cover.first += cover.best.first
+    cover.second += cover.best.second
 
 
 @kernel
@@ -162,7 +154,8 @@ def change_pair(
 ) -> None:
     """Add (`sign` 1) or remove (-1) a pair, in constant time, from the sums, those of its angles and of its wall.
 
-    `held` has the weight of the pair, and the shift of the line under the scan line from the wall's own.
+    `held` has the weight of the pair, and the shift of the line under the scan line from the wall's own. The sums of a
+    wall without pairs are exactly 0.
     """
     line = held.line
     line.dx = wall.dx
@@ -181,6 +174,8 @@ def change_pair(
     own.y += weight * line.dx
     own.one -= weight * line.offset
     own.weight += weight
+    if own.count <= 0.0:
+        scale_wall(own, 0.0)
 
 
 @kernel
@@ -223,29 +218,6 @@ def subtract_square(sums: Record, own: Record, k: float) -> None:
     sums.yy -= k * own.y * own.y
     sums.y1 -= k * own.y * own.one
     sums.one -= k * own.one * own.one
-
-
-@kernel
-def copy_sums(one: Record, other: Record) -> None:
-    """Write the first sums to the second."""
-    other.cc = one.cc
-    other.cs = one.cs
-    other.cx = one.cx
-    other.cy = one.cy
-    other.c1 = one.c1
-    other.ss = one.ss
-    other.sx = one.sx
-    other.sy = one.sy
-    other.s1 = one.s1
-    other.xx = one.xx
-    other.xy = one.xy
-    other.x1 = one.x1
-    other.yy = one.yy
-    other.y1 = one.y1
-    other.one = one.one
-    other.wahba_cos = one.wahba_cos
-    other.wahba_sin = one.wahba_sin
-    other.count = one.count
 
 
 @kernel

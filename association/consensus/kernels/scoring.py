@@ -8,13 +8,12 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import HARD_PRIOR, NO_PRIOR
-from ...scan.kernels.freedom import log_determinant
 from ...tables import Place, Question, ScoreRules, ScoreWork
 from ...tuning import INSIDE
 from ..tuning import ROUNDS, SAME_SHIFT
-from .geometry import prior_value
+from .geometry import log_determinant, prior_value
 from .matching import match_lines
-from .pairs import change_pair, copy_sums, scale_wall, solve_pose
+from .pairs import change_pair, scale_wall, solve_pose
 from .wall_errors import eliminate, infer, list_walls, residual_of_wall
 
 UNFIT, SOLVED, CHANGED = 0, 1, 2  # what refinement leaves of a pose; a changed set is not solved yet
@@ -64,9 +63,9 @@ def score_poses(
         if match_lines(scan, gates, place, pose, found, floor, work.scratch[0]) < 0.0:
             continue
         refined += 1
-        left = refine(question, place, pose, found, floor, rules.parallel, work)
+        left = refine(question, place, pose, found, floor, work)
         if left >= SOLVED:
-            score_set(question, place, pose, found, floor, left == CHANGED, rules.parallel, out, work)
+            out.score = score_set(question, place, pose, found, floor, left == CHANGED, work)
         forget(work.held, work.wall_sums)
         if out.score > 0.0:
             bonus = prior_value(prior, pose)
@@ -91,19 +90,16 @@ def score_poses(
 
 
 @kernel
-def refine(
-    question: Question, place: Place, pose: Record, found: Records, floor: float, parallel: Floats, work: ScoreWork
-) -> int:
+def refine(question: Question, place: Place, pose: Record, found: Records, floor: float, work: ScoreWork) -> int:
     """Change the set to the lines that match, solve for the pose, and match again; up to `ROUNDS` times."""
     scan = question.scan
     terms = question.terms[0]
-    model = terms.model
     scratch = work.scratch[0]
     plain = scratch.plain
     angles = scratch.angles
     for i in range(len(scan)):
         work.held[i].wall = -1
-    copy_sums(work.nothing[0], plain)
+    scratch.plain = scratch.nothing
     angles.xx = 0.0
     angles.xy = 0.0
     angles.yy = 0.0
@@ -115,14 +111,21 @@ def refine(
             return UNFIT
         if not changed or last:
             return CHANGED if changed else SOLVED
-        count = list_walls(work.held, work.wall_sums, place.ties, work.listed)
-        variance = model.wall_variance
-        eliminate(work.wall_sums, place.ties, work.listed, count, variance, plain, scratch.sums, scratch.common)
-        moved = solve_pose(scratch.sums, angles, parallel[int(plain.count)], model, pose, scratch.solution)
+        moved = solve_set(place.ties, terms.model, pose, work)
         rounds += 1
         last = rounds == ROUNDS or not moved
         if match_lines(scan, terms.gates, place, pose, found, floor if last else 0.0, scratch) < 0.0:
             return UNFIT
+
+
+@kernel
+def solve_set(ties: Floats, model: Record, pose: Record, work: ScoreWork) -> bool:
+    """Move a pose to where the pairs that are held lie best, the walls' own errors eliminated: see `solve_pose`."""
+    scratch = work.scratch[0]
+    count = list_walls(work.held, work.wall_sums, ties, work.listed)
+    eliminate(work.wall_sums, ties, work.listed, count, model.wall_variance, scratch)
+    parallel = work.parallel[int(scratch.plain.count)]
+    return solve_pose(scratch.sums, scratch.angles, parallel, model, pose, scratch.solution)
 
 
 @kernel
@@ -140,8 +143,6 @@ def change_set(
             changed = True
             if h >= 0:
                 change_pair(plain, angles, wall_sums[h], walls[h], scan[i], held[i], -1.0)
-                if wall_sums[h].count <= 0.0:
-                    scale_wall(wall_sums[h], 0.0)
             held[i].wall = w
             if w >= 0:
                 held[i].shift = found[i].shift
@@ -152,10 +153,9 @@ def change_set(
 
 @kernel
 def score_set(
-    question: Question, place: Place, pose: Record, found: Records, floor: float, changed: bool, parallel: Floats,
-    out: Record, work: ScoreWork,
-) -> None:  # fmt: skip
-    """Drop the pairs without which a set scores more, solve again where it changed, and score it."""
+    question: Question, place: Place, pose: Record, found: Records, floor: float, changed: bool, work: ScoreWork
+) -> float:
+    """Drop the pairs without which a set scores more, solve again where it changed, and return its score, nats."""
     scratch = work.scratch[0]
     plain = scratch.plain
     model = question.terms[0].model
@@ -164,15 +164,12 @@ def score_set(
     infer(work.wall_sums, place.ties, work.listed, count, model.wall_variance, pose)
     gain = drop_pairs(question.scan, place.walls, pose, found, work.held, work.wall_sums, scratch)
     if not (plain.count > 0.0 and gain > 0.0 and gain >= floor):
-        return
+        return 0.0
     if changed or plain.count < before:
-        count = list_walls(work.held, work.wall_sums, place.ties, work.listed)
-        variance = model.wall_variance
-        eliminate(work.wall_sums, place.ties, work.listed, count, variance, plain, scratch.sums, scratch.common)
-        solve_pose(scratch.sums, scratch.angles, parallel[int(plain.count)], model, pose, scratch.solution)
+        solve_set(place.ties, model, pose, work)
     solution = scratch.solution
     freedom = log_determinant(solution, model, math.cos(pose.theta), math.sin(pose.theta))
-    out.score = max(0.0, gain - 0.5 * solution.chi_square - freedom)
+    return max(0.0, gain - 0.5 * solution.chi_square - freedom)
 
 
 @kernel
@@ -208,8 +205,6 @@ def drop_pairs(
         else:
             match.wall = -1
             change_pair(plain, angles, own, walls[w], scan[i], held[i], -1.0)
-            if own.count <= 0.0:
-                scale_wall(own, 0.0)
             held[i].wall = -1
     return gain
 

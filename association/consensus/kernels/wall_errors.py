@@ -8,7 +8,7 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
-from .pairs import add_wall, copy_sums, scale_wall, subtract_square
+from .pairs import add_wall, scale_wall, subtract_square
 
 
 @kernel
@@ -45,16 +45,15 @@ def list_walls(held: Records, wall_sums: Records, ties: Floats, listed: Integers
 
 
 @kernel
-def eliminate(
-    wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, plain: Record, sums: Record,
-    common: Record,
-) -> None:  # fmt: skip
-    """Write sums without the errors of the listed walls.
+def eliminate(wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, scratch: Record) -> None:
+    """Write the sums of `scratch` without the errors of the listed walls, from its plain ones.
 
     The error of a wall has that variance; those of tied walls correlate by ``exp(-distance)`` along their chain, so
     that each passes on, as a filter does, what the walls before it show.
     """
-    copy_sums(plain, sums)
+    scratch.sums = scratch.plain
+    sums = scratch.sums
+    common = scratch.common
     if variance <= 0.0:
         return
     for k in range(count):

@@ -115,6 +115,15 @@ def list_begins(ends: Records, cell: float, heads: Integers) -> Integers:
 
 
 @kernel
+def root_of(parent: Integers, one: int) -> int:
+    """Return the root of one of a union-find forest, and shorten the way there."""
+    while parent[one] != one:
+        parent[one] = parent[parent[one]]
+        one = parent[one]
+    return one
+
+
+@kernel
 def join_collinear(
     ends: Records,
     directions: Records,
@@ -161,14 +170,7 @@ def join_collinear(
                         continue
                     if abs(along) > gap and abs((ends[j].y2 - y2) * dx - (ends[j].x2 - x2) * dy) > lateral:
                         continue
-                    one = i
-                    while parent[one] != one:
-                        parent[one] = parent[parent[one]]
-                        one = parent[one]
-                    other = j
-                    while parent[other] != other:
-                        parent[other] = parent[parent[other]]
-                        other = parent[other]
+                    one, other = root_of(parent, i), root_of(parent, j)
                     parent[max(one, other)] = min(one, other)
 
 

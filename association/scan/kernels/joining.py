@@ -5,11 +5,92 @@ import math
 import numpy as np
 
 from compiled import kernel
-from registration.layout import LEAST_POINTS, Floats, Records
+from registration.layout import LEAST_POINTS, Floats, Record, Records
 
+from ...consensus.kernels.geometry import ascending
 from ...layout import LINE_PARTS, SCAN_LINE, SIGHTING, Indices
 from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, LOOSE_WALLS, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
 from ..tuning import LEAST_SPREAD, LEAST_VARIANCE, LINE_GAP
+
+
+@kernel
+def union(lows: Floats, highs: Floats, count: int, low: float, high: float) -> float:
+    """Return the length between two abscissae that intervals cover, of which those that begin first come first."""
+    total = 0.0
+    for k in range(count):
+        begin = max(lows[k], low)
+        end = min(highs[k], high)
+        if end > begin:
+            total += end - begin
+            low = end
+    return total
+
+
+@kernel
+def insert(lows: Floats, highs: Floats, count: int, low: float, high: float) -> int:
+    """Add an interval to some that are ordered by their begins; return where it stands."""
+    k = count
+    while k > 0 and lows[k - 1] > low:
+        lows[k], highs[k] = lows[k - 1], highs[k - 1]
+        k -= 1
+    lows[k], highs[k] = low, high
+    return k
+
+
+@kernel
+def join_parts(
+    parts: Records, members: Indices, count: int, line: Record, lows: Floats, highs: Floats, weights: Floats
+) -> None:
+    """Write the line through the first `count` members to `line`, which is the first of them; see `join_lines`.
+
+    The last three are room for as many numbers.
+    """
+    dx, dy = line.dx, line.dy
+    line.covered = points = information = 0.0
+    exact = False
+    for m in range(count):
+        part = parts[members[m]]
+        # The union of the parts so far along the line, in the order of their begins.
+        along = dx * (part.x - line.x) + dy * (part.y - line.y)
+        begin, end = along - 0.5 * part.length, along + 0.5 * part.length
+        insert(lows, highs, m, begin, end)
+        covered = union(lows, highs, m + 1, -math.inf, math.inf)
+        weights[m] = min(1.0, max(0.0, (covered - line.covered) / part.length)) * part.points
+        line.covered = covered
+        points += weights[m]
+        if part.sigma > 0.0:
+            information += weights[m] / part.sigma**2
+        else:
+            exact = exact or weights[m] > 0.0
+    line.points, line.variance = points, 0.0 if exact else 1.0 / information
+    x = y = lengths = common_offset = common_angle = 0.0
+    for m in range(count):
+        part = parts[members[m]]
+        x += weights[m] / points * part.centroid_x
+        y += weights[m] / points * part.centroid_y
+        lengths += part.length
+        common_offset += part.length * part.common_offset
+        common_angle += part.length * part.common_angle
+    line.common_offset, line.common_angle = common_offset / lengths, common_angle / lengths
+    xx = xy = yy = 0.0
+    for m in range(count):
+        part = parts[members[m]]
+        fraction, gx, gy = weights[m] / points, part.centroid_x - x, part.centroid_y - y
+        xx += fraction * (gx * gx + part.spread * part.dx * part.dx)
+        xy += fraction * (gx * gy + part.spread * part.dx * part.dy)
+        yy += fraction * (gy * gy + part.spread * part.dy * part.dy)
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    sign = 1.0 if math.cos(angle) * dx + math.sin(angle) * dy >= 0.0 else -1.0
+    dx, dy = sign * math.cos(angle), sign * math.sin(angle)
+    low, high = math.inf, -math.inf
+    for m in range(count):
+        part = parts[members[m]]
+        along = dx * (part.x - x) + dy * (part.y - y)
+        low, high = min(low, along - 0.5 * part.length), max(high, along + 0.5 * part.length)
+    line.dx, line.dy, line.length = dx, dy, high - low
+    line.centroid_x, line.centroid_y = x, y
+    line.x, line.y = x + 0.5 * (low + high) * dx, y + 0.5 * (low + high) * dy
+    line.spread = dx * dx * xx + 2.0 * dx * dy * xy + dy * dy * yy
 
 
 @kernel
@@ -37,13 +118,7 @@ def join_lines(given: Records, joints: Floats, counted: bool, directed: bool) ->
     parts = given
     for done in range(len(joints) + 1):
         n = len(parts)
-        order = np.empty(n, np.int64)
-        for i in range(n):
-            k = i
-            while k > 0 and parts[order[k - 1]].length < parts[i].length:
-                order[k] = order[k - 1]
-                k -= 1
-            order[k] = i
+        order = ascending(-parts["length"])
         if done == len(joints):
             break
         lateral, least_cosine = joints[done, 0], joints[done, 1]
@@ -93,59 +168,7 @@ def join_lines(given: Records, joints: Floats, counted: bool, directed: bool) ->
             line = lines[found]
             line.covered, line.variance = first.length, first.sigma**2 / first.points
             if count > 1:
-                line.covered = points = information = 0.0
-                exact = False
-                for m in range(count):
-                    part = parts[members[m]]
-                    # The union of the parts so far along the line, in the order of their begins.
-                    along = dx * (part.x - first.x) + dy * (part.y - first.y)
-                    begin, end = along - 0.5 * part.length, along + 0.5 * part.length
-                    k = m
-                    while k > 0 and lows[k - 1] > begin:
-                        lows[k], highs[k] = lows[k - 1], highs[k - 1]
-                        k -= 1
-                    lows[k], highs[k] = begin, end
-                    covered, reach = 0.0, -math.inf
-                    for k in range(m + 1):
-                        if highs[k] > max(lows[k], reach):
-                            covered += highs[k] - max(lows[k], reach)
-                            reach = highs[k]
-                    weights[m] = min(1.0, max(0.0, (covered - line.covered) / part.length)) * part.points
-                    line.covered = covered
-                    points += weights[m]
-                    if part.sigma > 0.0:
-                        information += weights[m] / part.sigma**2
-                    else:
-                        exact = exact or weights[m] > 0.0
-                line.points, line.variance = points, 0.0 if exact else 1.0 / information
-                x = y = lengths = common_offset = common_angle = 0.0
-                for m in range(count):
-                    part = parts[members[m]]
-                    x += weights[m] / points * part.centroid_x
-                    y += weights[m] / points * part.centroid_y
-                    lengths += part.length
-                    common_offset += part.length * part.common_offset
-                    common_angle += part.length * part.common_angle
-                line.common_offset, line.common_angle = common_offset / lengths, common_angle / lengths
-                xx = xy = yy = 0.0
-                for m in range(count):
-                    part = parts[members[m]]
-                    fraction, gx, gy = weights[m] / points, part.centroid_x - x, part.centroid_y - y
-                    xx += fraction * (gx * gx + part.spread * part.dx * part.dx)
-                    xy += fraction * (gx * gy + part.spread * part.dx * part.dy)
-                    yy += fraction * (gy * gy + part.spread * part.dy * part.dy)
-                angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-                sign = 1.0 if math.cos(angle) * dx + math.sin(angle) * dy >= 0.0 else -1.0
-                dx, dy = sign * math.cos(angle), sign * math.sin(angle)
-                low, high = math.inf, -math.inf
-                for m in range(count):
-                    part = parts[members[m]]
-                    along = dx * (part.x - x) + dy * (part.y - y)
-                    low, high = min(low, along - 0.5 * part.length), max(high, along + 0.5 * part.length)
-                line.dx, line.dy, line.length = dx, dy, high - low
-                line.centroid_x, line.centroid_y = x, y
-                line.x, line.y = x + 0.5 * (low + high) * dx, y + 0.5 * (low + high) * dy
-                line.spread = dx * dx * xx + 2.0 * dx * dy * xy + dy * dy * yy
+                join_parts(parts, members, count, line, lows, highs, weights)
             if not counted and done + 1 == len(joints) and line.points < LEAST_POINTS:
                 line.variance *= line.points / LEAST_POINTS
             line.sigma = math.sqrt(line.variance * line.points)

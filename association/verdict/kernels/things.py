@@ -9,7 +9,8 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Floats, Records
 
-from ...scan.kernels.ordering import ascending
+from ...consensus.kernels.geometry import ascending
+from ...index.kernels.walls import root_of
 from ..tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 
 
@@ -52,21 +53,11 @@ def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
                     break
                 # Most places of a band are too far along y, which costs less to find than a distance.
                 if abs(y[j] - y[i]) <= THINGS_APART and math.hypot(x[j] - x[i], y[j] - y[i]) <= THINGS_APART:
-                    # Each step halves the way to the first place of a thing: the chains of large things stay short.
-                    one, another = i, j
-                    while thing[one] != one:
-                        thing[one] = thing[thing[one]]
-                        one = thing[one]
-                    while thing[another] != another:
-                        thing[another] = thing[thing[another]]
-                        another = thing[another]
+                    one, another = root_of(thing, i), root_of(thing, j)
                     thing[max(one, another)] = min(one, another)
         low, high, total = np.full((count, 2), math.inf), np.full((count, 2), -math.inf), np.zeros(count)
         for i in range(count):
-            one = i
-            while thing[one] != one:
-                one = thing[one]
-            thing[i] = one
+            one = thing[i] = root_of(thing, i)
             low[one, 0], high[one, 0] = min(low[one, 0], x[i]), max(high[one, 0], x[i])
             low[one, 1], high[one, 1] = min(low[one, 1], y[i]), max(high[one, 1], y[i])
             total[one] += more[i]
