@@ -1,15 +1,13 @@
-"""Small arithmetic that several kernels share: angles, gates, priors, order, freedom."""
+"""Small arithmetic that several kernels share: angles, gates, priors, freedom."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from compiled import kernel
-from registration.layout import Floats, Record
+from registration.layout import Record
 
-from ...layout import HARD_PRIOR, NO_PRIOR, Indices
+from ...layout import HARD_PRIOR, NO_PRIOR
 from ...tuning import INSIDE, SOFT_FLOOR
 
 
@@ -71,9 +69,3 @@ def log_determinant(information: Record, model: Record, c: float, s: float) -> f
     second = max(1.0, yy - xy / xx * xy)
     third = max(1.0, tt - xt / xx * xt - left / second * left)
     return 0.5 * math.log(xx * second * third)
-
-
-@kernel
-def ascending(values: Floats) -> Indices:
-    """Return the places of values in their order, ties by place; one sorting for all, which is compiled once."""
-    return np.argsort(values, kind="mergesort")

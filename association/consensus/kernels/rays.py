@@ -10,9 +10,9 @@ from compiled import kernel
 from registration.layout import Floats, Records
 
 from ...layout import Indices
+from ...scan.kernels.joining import ascending
 from ...tables import Place
 from ..tuning import SIGHT_TOLERANCE
-from .geometry import ascending
 
 
 @kernel

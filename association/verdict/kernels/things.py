@@ -9,8 +9,8 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Floats, Records
 
-from ...consensus.kernels.geometry import ascending
 from ...index.kernels.walls import root_of
+from ...scan.kernels.joining import ascending
 from ..tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 
 
