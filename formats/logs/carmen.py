@@ -31,6 +31,7 @@ FIELDS_OF_VIEW = (
     | dict.fromkeys((541, 811, 1081), 270.0) | {540: 269.5, 1080: 269.75}
 )  # fmt: skip
 HALF_TURN = (180, 181, 360, 361, 720, 721)  # beams of a scanner of 180 degrees
+FINEST = 0.05  # degrees between beams; a PARAM below it is in radians
 FEW_BEAMS = 100  # up to which the report has no note
 
 
@@ -153,6 +154,9 @@ def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple
     step = _setting(settings, f"laser_{side}_laser_resolution")
     field = _setting(settings, f"laser_{side}_laser_fov")
     why, spaces = "by the PARAM of the log", max(1, n - 1)
+    if step and step < FINEST:
+        step, field = math.degrees(step), field and math.degrees(field)
+        why += ", which has radians"
     if step and field and min(abs(n * step - field), abs((n - 1) * step - field)) > 1.5 * step:
         why, step, field = f"because its PARAM {field:g} and {step:g} degrees contradict each other", None, None
     elif step and field is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -224,7 +225,7 @@ class Sensors:
         base = base_of(above)
         fitting = self._frames.odometry_of(topic, namespace, above, base)
         if not fitting:
-            self._note_missing(frame, paths)
+            self._note_missing(tree, frame, paths)
             return None
         found = Odometry.of_messages(tree, tree.path(fitting[0].child or base or frame, frame) or [frame], fitting[0])
         self._note_messages(found, [one.topic for one in fitting[1:]])
@@ -234,7 +235,7 @@ class Sensors:
         found.note_doubts(self._notes)
         return found
 
-    def _note_missing(self, frame: str, paths: list[list[str]]) -> None:
+    def _note_missing(self, tree: Transforms, frame: str, paths: list[list[str]]) -> None:
         moving = [path for path in paths if len(path) > 1 and path[-1] != base_of(path)]
         base = base_of(moving[0]) or frame if moving else base_of(paths[0] if paths else []) or frame
         why = (
@@ -242,6 +243,12 @@ class Sensors:
             if moving
             else f"no frame is above {shown(base) or NAMELESS}"
         )
+        unset = [
+            (child, parent) for path in paths for child, parent in pairwise(path) if tree.track(parent, child).unset
+        ]
+        if unset:
+            child, parent = map(shown, unset[0])
+            why = f"all transforms of {child} in {parent} have the stamp 0; set it in their publisher"
         self._notes.add_assumed(
             "no_odometry", f"no odometry was found: {why}, and there is no Odometry message of this robot"
         )

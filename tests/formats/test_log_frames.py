@@ -89,6 +89,17 @@ def test_what_does_not_move_is_no_odometry(tmp_path: Path, frames: Callable[[Rob
     assert note.message.startswith("no odometry was found: ")
 
 
+def test_transforms_without_a_stamp_are_named(tmp_path: Path) -> None:
+    bag = Robots("mcap", tmp_path)
+    for k in range(4):
+        bag.transform("/tf", 0, "odom", "base_link", (0.5 * k, 0.0, 0.0))
+    fixed(bag, "base_link", "laser")
+    bag.scan(SECOND)
+    _, log = read(bag)
+    (note,) = (note for note in log.report.assumed if note.code == "no_odometry")
+    assert "base_link in odom have the stamp 0" in note.message
+
+
 @pytest.mark.parametrize("chain", [("base_link",), ("base_footprint", "base_link"), ("base_footprint",), ("robot",)])
 def test_a_frame_that_moves_is(tmp_path: Path, chain: tuple[str, ...]) -> None:
     bag = Robots("mcap", tmp_path)

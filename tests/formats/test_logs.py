@@ -67,6 +67,7 @@ FIELD, STEP = "PARAM laser_front_laser_fov", "PARAM laser_front_laser_resolution
         (f"{FIELD} 190\n", 191, -95, 95, "by the PARAM"), (f"{FIELD} 180\n{STEP} 1.0\n", 180, -90, 89, None),
         (f"{FIELD} 240\n{STEP} 0.36\n", 667, -120, 119.76, "by the PARAM"),
         (f"{FIELD} 180\n{STEP} 0.25\n", 541, -135, 135, "contradict"),
+        (f"{FIELD} 4.712389\n{STEP} 0.00872665\n", 541, -135, 135, "which has radians"),
     ],
 )  # fmt: skip
 def test_the_field_of_view_of_flaser(
