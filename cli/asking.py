@@ -206,7 +206,7 @@ class Server:
         from linefix_client import LinefixError, ProblemError
 
         if method in OF_STORED:
-            arguments = (_id_of(arguments[0]), *arguments[1:])
+            arguments = (self._id_of(arguments[0]), *arguments[1:])
         try:
             answer: Json = getattr(self._client, method)(*arguments, **more)
         except ProblemError as error:
@@ -221,6 +221,15 @@ class Server:
             raise WrongUseError(f"not sent: {error}") from None
         self._require_fields(method, answer)
         return answer
+
+    def _id_of(self, on: Json) -> str:
+        """Return the id of a stored map; raises `WrongUseError` where it is a map file."""
+        if "map_id" not in on:
+            raise WrongUseError(
+                "found a map file, expected the id of a stored map with --server; "
+                f"store it with linefix map put ID FILE --server {self._url}, or omit --server"
+            )
+        return str(on["map_id"])
 
     def _require_fields(self, method: str, answer: Json) -> None:
         from pydantic import ValidationError
@@ -243,7 +252,7 @@ class Server:
         on = arguments[0] if arguments else None
         map_id = on["map"].get("map_id") if isinstance(on, dict) and isinstance(on.get("map"), dict) else on
         if error.code == "unknown_map" and isinstance(map_id, str):
-            return NoSuchMapError(map_id)
+            return NoSuchMapError(map_id, f"--server {self._url}")
         found = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
         faults = [(one["pointer"], one["message"]) for one in found]
         detail = ": ".join((*filter(None, [names.get("")]), f"{self._url}: {error.detail}"))
@@ -260,13 +269,3 @@ def _fields(method: str) -> Any:
     from pydantic import TypeAdapter
 
     return TypeAdapter(get_type_hints(getattr(Client, method))["return"])
-
-
-def _id_of(on: Json) -> str:
-    """Return the id of a stored map; raises `WrongUseError` where it is a map file."""
-    if "map_id" not in on:
-        raise WrongUseError(
-            "found a map file, expected the id of a stored map with --server; "
-            "store it with linefix map put, or omit --server"
-        )
-    return str(on["map_id"])

@@ -53,12 +53,13 @@ class NoSuchMapError(RefusedError):
     ----------
     name : str
         As it was given.
+    more : str
+        Options of the command that lists the maps, such as ``--server URL``.
     """
 
-    def __init__(self, name: str) -> None:
-        super().__init__(
-            f"{name}: no such file, and no map is stored under this id; linefix map list shows the stored maps"
-        )
+    def __init__(self, name: str, more: str = "") -> None:
+        command = f"linefix map list {more}".rstrip()
+        super().__init__(f"{name}: no such file, and no map is stored under this id; {command} shows the stored maps")
 
 
 class NoServerError(CommandError):

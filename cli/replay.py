@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 HOPELESS = 20  # scans from the first on
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
-HINT = "linefix map check MAP --log LOG tests the scale, the handedness and the directions of the map"
+HINT = "linefix map check MAP --log LOG{} tests the scale, the handedness and the directions of the map"
 MODE = "track: the prior is by odometry from the last usable pose; global: no prior."
 FIELDS = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")  # of a line of --json
 
@@ -127,7 +127,7 @@ def replay(
     print_notes(opened_log, output.notes)
     print_lines(_log_lines(opened_log, frames), output.notes)
     if not output.as_json:
-        print_lines(_lines(tally))
+        print_lines(_lines(tally, where.server))
     if broken is not None:
         raise broken
     if tally.refused is not None and tally.count == tally.verdicts["refused"]:
@@ -225,7 +225,7 @@ def _log_lines(log: Log, frames: Frames) -> Lines:
     return rows([*found, ("poses", frames.told)], 10)
 
 
-def _lines(tally: Tally) -> Iterator[str]:
+def _lines(tally: Tally, server: str | None) -> Iterator[str]:
     count, usable = max(1, tally.count), tally.usable
     verdicts = [(name, number, f"{100.0 * number / count:.1f} %") for name, number in tally.verdicts.most_common()]
     yield from table(("verdict", "scans", "fraction"), verdicts)
@@ -237,7 +237,7 @@ def _lines(tally: Tally) -> Iterator[str]:
         if counts:
             yield from table((name, "scans"), counts.most_common())
     if len(usable) < FEW * tally.count or "map_scale" in tally.warnings:
-        yield from rows([("hint", HINT)])
+        yield from rows([("hint", HINT.format("" if server is None else f" --server {server}"))])
     if tally.refused is not None:
         yield from rows([("refused", str(tally.refused))])
     if tally.times:

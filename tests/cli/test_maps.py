@@ -103,6 +103,8 @@ def test_maps_are_stored_listed_and_forgotten(
     linefix.done("map", "rm", listed["map_id"], *server)
     assert f"{listed['map_id']}: no such file" in refused(linefix("map", "rm", listed["map_id"], *server), 3)
     assert stored() == []
+    listing = " ".join(["linefix map list", *server])
+    assert f"; {listing} shows the stored maps" in refused(linefix("map", "rm", listed["map_id"], *server), 3)
 
 
 def test_a_check_beside_the_scans_of_a_log(linefix: Linefix, folder: Path) -> None:
@@ -152,7 +154,8 @@ def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Pat
 
 
 def test_a_server_checks_stored_maps_alone(linefix: Linefix) -> None:
-    assert "map put" in refused(linefix("map", "check", "floor.json", "--server", "http://127.0.0.1:9"), 2)
+    server = "--server http://127.0.0.1:9"
+    assert f"map put ID FILE {server}," in refused(linefix("map", "check", "floor.json", *server.split()), 2)
 
 
 def test_an_id_is_one(linefix: Linefix) -> None:
