@@ -19,7 +19,7 @@ from .result import SearchReport
 from .scan.scan import corrected_scan
 from .scan.views import corrected
 from .search.search import Effort, search
-from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, SUGGESTED
+from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, SHOWN_TURN, SUGGESTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +72,13 @@ class Explanations:
     def wall_sigma(self) -> float:
         """The standard deviation of the walls' own errors, metres."""
         return USUAL_WALL_ERROR if self.answer is None else self.answer.estimate.wall_sigma
+
+    @property
+    def shown_turn(self) -> float:
+        """By how much the sensor turned during the scan, as the walls show it, radians; 0 where they do not."""
+        found = None if self.answer is None else self.answer.estimate
+        turn = self.turn + (found.turn[0] if found is not None and found.with_columns else 0.0)
+        return turn if abs(turn) > SHOWN_TURN else 0.0
 
     @property
     def others(self) -> Iterator[ConsensusSet]:

@@ -17,7 +17,6 @@ from .index.joint import JointIndex
 from .options import MapsPrior
 from .report import probabilities_of_others
 from .result import (
-    Alternative,
     AssociationDiagnostics,
     AssociationResult,
     Correspondence,
@@ -43,7 +42,11 @@ def in_own_frames(found: Stages, ids: Sequence[str]) -> AssociationResult:
     context, result = found.context, found.result
     index = context.index
     assert isinstance(index, JointIndex)
-    others = tuple(_alternative(context, index, other, ids) for other in result.alternatives)
+    at = [_map_at(context, other.pose) for other in result.alternatives]
+    others = tuple(
+        replace(other, pose=_back(index, other.pose, m), map_id=ids[m])
+        for other, m in zip(result.alternatives, at, strict=True)
+    )
     best = None if result.pose is None else _map_of(context, index, result)
     own = result if best is None else _on_map(context, index, result, best)
     verdicts = _map_verdicts(found, index, ids, best, own.pose)
@@ -86,11 +89,6 @@ def _registered_on_map(
     sigma = index.sigma or 0.0
     registered = register(index.parts[m].segments, context.scan.measured, indices, sigma, options, pose)
     return replace(diagnostics, ambiguity_before=registered.diagnostics.ambiguity_before)
-
-
-def _alternative(context: SearchContext, index: JointIndex, other: Alternative, ids: Sequence[str]) -> Alternative:
-    m = _map_at(context, other.pose)
-    return replace(other, pose=_back(index, other.pose, m), map_id=ids[m])
 
 
 def _map_of(context: SearchContext, index: JointIndex, result: AssociationResult) -> int:

@@ -25,7 +25,7 @@ from .result import (
     CriticalWall,
     Status,
 )
-from .tuning import CRITICAL_DISPLACEMENT, SHOWN_TURN
+from .tuning import CRITICAL_DISPLACEMENT
 from .verdict.verdict import Verdict
 from .warnings import warnings_of, warnings_of_map
 
@@ -84,6 +84,7 @@ def _diagnostics(
         margin = max(0.0, best.posterior - nearest.posterior)
         runner_up = max(0.0, nearest.posterior / best.posterior) if best.posterior > 0.0 else None
     fit = answer.registered.diagnostics
+    turn, seconds = explanations.shown_turn, context.scan.sweep_s
     return AssociationDiagnostics(
         **{one.name: getattr(fit, one.name) for one in fields(fit)},
         inlier_fraction=best.fraction(context.lines.rows),
@@ -92,7 +93,7 @@ def _diagnostics(
         margin=margin,
         critical_wall=_critical_wall(context, answer),
         corrections=corrections_of(explanations, answer),
-        turn_rate=turn_rate_of(context, explanations, answer),
+        turn_rate=turn / seconds if turn and seconds else None,
     )
 
 
@@ -103,18 +104,6 @@ def corrections_of(explanations: Explanations, answer: Answer) -> Corrections | 
         return None
     xx, yy, xy = found.strain[0].tolist()
     return Corrections(explanations.scale, found.offset[0], (xx, yy, xy))
-
-
-def turn_of(explanations: Explanations, answer: Answer) -> float:
-    """Return by how much the sensor turned during the scan, as the walls show it, radians; 0 where they do not."""
-    turn = explanations.turn + (answer.estimate.turn[0] if answer.estimate.with_columns else 0.0)
-    return turn if abs(turn) > SHOWN_TURN else 0.0
-
-
-def turn_rate_of(context: SearchContext, explanations: Explanations, answer: Answer) -> float | None:
-    """Return the rate of that rotation, rad/s; None where it is not shown, or the duration of the scan not known."""
-    turn, seconds = turn_of(explanations, answer), context.scan.sweep_s
-    return turn / seconds if turn and seconds else None
 
 
 def _critical_wall(context: SearchContext, answer: Answer) -> CriticalWall | None:

@@ -21,7 +21,6 @@ from .tuning import (
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LEAST_STUCK,
-    SHOWN_TURN,
     STUCK_SHARE,
 )
 from .verdict.verdict import Verdict
@@ -36,7 +35,13 @@ NO_SEGMENTS = "The scan has no segments, so nothing was searched. Check the rang
 
 def warnings_of(context: SearchContext, search: SearchReport, verdict: Verdict) -> tuple[AssociationWarning, ...]:
     """List the warnings about scan and search."""
-    found = _of_scan(context) | {
+    found: dict[WarningCode, str | None] = {
+        "no_segments": None if len(context.scan.measured) else NO_SEGMENTS,
+        "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
+        **{warning.code: warning.message for warning in context.scan.warnings},
+        "stuck_ranges": _stuck_ranges(context.scan.beams),
+        "scan_exceeds_map": _exceeding(context),
+        "faces_away": _facing_away(context),
         "prior_contradicted": "A clearly better pose lies where the prior excludes it. Check the prior, or search "
         "without it."
         if verdict.contradicted
@@ -59,17 +64,6 @@ def warnings_of_map(
             "turned": _turned(explanations, found),
         }
     )
-
-
-def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
-    return {
-        "no_segments": None if len(context.scan.measured) else NO_SEGMENTS,
-        "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
-        **{warning.code: warning.message for warning in context.scan.warnings},
-        "stuck_ranges": _stuck_ranges(context.scan.beams),
-        "scan_exceeds_map": _exceeding(context),
-        "faces_away": _facing_away(context),
-    }
 
 
 def _listed(found: Mapping[WarningCode, str | None]) -> tuple[AssociationWarning, ...]:
@@ -126,8 +120,8 @@ def _distorted(found: Estimate) -> str | None:
 
 def _turned(explanations: Explanations, found: Estimate) -> str | None:
     """Describe a rotation of the sensor during the scan."""
-    turn = explanations.turn + (found.turn[0] if found.with_columns else 0.0)
-    if abs(turn) <= SHOWN_TURN:
+    turn = explanations.shown_turn
+    if not turn:
         return None
     return (
         f"The sensor turned by {math.degrees(turn):.1f} degrees (+-{math.degrees(found.turn[1]):.1f}) during the scan, "

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from typing import Any, Self
 
@@ -232,20 +233,17 @@ class MapIndex:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        tables: list[Any] = [
-            self.pieces,
-            self.walls,
-            self.chains,
-            self.grid,
-            self.sweep.sectors,
-            self.raster,
-        ]
-        tables.append((self.sweep.chains, self.sweep.lengths, self.sweep.present))
-        lines = [getattr(self.segments, field.name) for field in fields(Segments)]
-        if len(self.points):
-            tables += [(self.points.positions, self.obstacles.walls, self.obstacles.ties), self.obstacles.grid]
-        arrays = [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
-        return sum(int(array.nbytes) for array in arrays)
+        held = [getattr(self, field.name) for field in fields(MapIndex)]
+        return sum({id(one): int(one.nbytes) for one in _arrays((*held, self.obstacles))}.values())
+
+
+def _arrays(held: Any) -> Iterator[NDArray[Any]]:
+    """Yield the arrays in a value, in its parts if it is a tuple or a dataclass, and in theirs."""
+    if isinstance(held, np.ndarray):
+        yield held
+    parts = held if isinstance(held, tuple) else ()
+    for part in [getattr(held, field.name) for field in fields(held)] if is_dataclass(held) else parts:
+        yield from _arrays(part)
 
 
 def tables_of(
