@@ -68,12 +68,6 @@ class Row:
     index: int
     values: dict[str, Any]
 
-    @property
-    def stamp(self) -> int | None:
-        """Nanoseconds; None where it is unknown."""
-        stamp = self.values.get("stamp")
-        return None if stamp is None else int(stamp)
-
     def scan(self) -> Scan:
         """Return the scans to search.
 

@@ -54,32 +54,20 @@ class WorkerError(Exception):
     """The function raised, which is a defect; the message is the worker's traceback."""
 
 
-@dataclass(frozen=True, slots=True)
-class Raised:
-    """Instead of a result: the exception of the function, as text, since not every exception can be pickled."""
-
-    text: str
-
-
-def attempt(function: Callable[[Any], Any], item: Any) -> Any:
-    """Return the result, or the exception."""
+def attempt(function: Callable[[Any], Any], item: Any) -> tuple[Any, str]:
+    """Return the result, and the exception as text, since not every exception can be pickled."""
     try:
-        return function(item)
+        return function(item), ""
     except Exception:
-        return Raised(traceback.format_exc())
+        return None, traceback.format_exc()
 
 
-def checked(outcome: Any) -> Any:
-    """Return a result.
-
-    Raises
-    ------
-    WorkerError
-        When it is none.
-    """
-    if isinstance(outcome, Raised):
-        raise WorkerError(outcome.text)
-    return outcome
+def checked(outcome: tuple[Any, str]) -> Any:
+    """Return a result; raises `WorkerError` when it is none."""
+    result, error = outcome
+    if error:
+        raise WorkerError(error)
+    return result
 
 
 # A worker is a core: a second layer of threads in numpy's libraries would only get in its way.
@@ -134,7 +122,7 @@ class Processes:
                             waiting.append(number)
                             _give(worker, waiting, items)
                             continue
-                        outcome = Lost()
+                        outcome = Lost(), ""
                     _give(worker, waiting, items)
                     yield items[number], checked(outcome)
         finally:

@@ -19,7 +19,7 @@ from .errors import UnreadableScansError
 from .tables import COLUMNS, FORMS, LASER, MOTION, SCANS
 
 if TYPE_CHECKING:
-    from formats import Log, LoggedScan
+    from formats import LoggedScan
 
 PARQUET = (".parquet", ".pq")
 NOTES = b"linefix.notes"  # in the metadata of a file that a log is laid out in
@@ -140,41 +140,33 @@ def lay_out(layout: Layout) -> None:
                 writer.write_batch(batch, layout.block)
     else:
         with pq.ParquetWriter(begun, SCANS) as writer:
-            reading = _Reading(layout.log)
-            found = reading.rows()
+            notes = list[dict[str, Any]]()
+            found = _rows(layout.log, notes)
             while rows := list(islice(found, layout.block)):
                 writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
-            writer.add_key_value_metadata({NOTES: orjson.dumps(reading.notes())})
+            writer.add_key_value_metadata({NOTES: orjson.dumps(notes)})
     begun.rename(target)
 
 
-@dataclass(slots=True)
-class _Reading:
-    """A log of another tool while it is laid out."""
+def _rows(log: str, notes: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield the scans of a log of another tool; at the end a row for each unusable one, and for what ends the log.
 
-    log: str
-    _opened: Log | None = None
+    Its assumptions and omissions are added to `notes` at the end.
+    """
+    from formats import UNUSABLE, read_log
 
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield the scans; at the end a row for each that cannot be used, and for what ends the log."""
-        from formats import UNUSABLE, read_log
-
+    try:
+        opened = read_log(log)
         try:
-            self._opened = read_log(self.log)
-            yield from map(_row, self._opened)
-            for note in self._opened.report.dropped:
+            yield from map(_row, opened)
+            for note in opened.report.dropped:
                 if note.code in UNUSABLE:
                     yield from ({"error": note.message} for _ in range(note.count))
-        except InputError as error:
-            yield {"error": f"the rest of the log cannot be read: {error}"}
-
-    def notes(self) -> list[dict[str, Any]]:
-        """Return the assumptions and the omissions so far."""
-        if self._opened is None:
-            return []
-        report = self._opened.report
-        noted = (("assumed", report.assumed), ("dropped", report.dropped))
-        return [{"kind": kind, **asdict(note)} for kind, notes in noted for note in notes]
+        finally:
+            noted = (("assumed", opened.report.assumed), ("dropped", opened.report.dropped))
+            notes += [{"kind": kind, **asdict(note)} for kind, some in noted for note in some]
+    except InputError as error:
+        yield {"error": f"the rest of the log cannot be read: {error}"}
 
 
 def _row(scan: LoggedScan) -> dict[str, Any]:

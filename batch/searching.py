@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -132,7 +132,10 @@ class BlockSearch:
     def __call__(self, block: Block) -> pa.Table:
         """Return one row of `POSES` for each scan, in order."""
         _prepared(self.options.prepare)
-        rows = [_told(block, row) | self._found(block, row) for row in rows_of(block)]
+        rows = [
+            {"log": block.log, "index": row.index, "stamp": row.values.get("stamp"), **self._found(block, row)}
+            for row in rows_of(block)
+        ]
         return pa.Table.from_pylist(rows, schema=POSES)
 
     def _found(self, block: Block, row: Row) -> dict[str, Any]:
@@ -162,24 +165,18 @@ def lost_row(block: Block) -> pa.Table:
     return pa.Table.from_pylist([row | {"error": "worker_lost: its search ended each worker early"}], schema=POSES)
 
 
-def _told(block: Block, row: Row) -> dict[str, Any]:
-    return {"log": block.log, "index": row.index, "stamp": row.stamp}
-
-
 def _answered(result: AssociationResult) -> dict[str, Any]:
-    pose, found = result.pose, result.diagnostics
-    placed = {} if pose is None else {"x": pose.x, "y": pose.y, "theta": pose.theta}
-    judged = {} if found is None else {"inlier_fraction": found.inlier_fraction, "margin": found.margin}
-    covariance = result.covariance
+    found, covariance = result.diagnostics, result.covariance
     return {
         "status": str(result.status),
         "usable": result.usable,
         "probability": result.probability,
-        **placed,
+        **({} if result.pose is None else asdict(result.pose)),
         "covariance": None if covariance is None else covariance.ravel().tolist(),
         "unobservable": None if result.unobservable is None else [float(c) for c in result.unobservable],
         "reasons": [reason.code for reason in result.reasons],
         "warnings": [warning.code for warning in result.warnings],
-        **judged,
+        "inlier_fraction": None if found is None else found.inlier_fraction,
+        "margin": None if found is None else found.margin,
         "complete": result.search.complete,
     }
