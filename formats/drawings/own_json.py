@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,6 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}", argument=name)
     drawing = Drawing(name, "json", notes, options, 1.0)
     _take_properties(told, drawing)
-    _take_points(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
         notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
     drawing.add_segments(rows)
@@ -52,40 +52,36 @@ def _fault_of_row(row: Any, width: int, named: str) -> str | None:
     return next((f"{kind_of(c)} in {named}" for c in row if type(c) not in (int, float)), None)
 
 
+def _within(value: Any, low: float, high: float) -> bool:
+    return value is None or (type(value) in (int, float) and low <= value <= high)
+
+
+LEAST_SIGMA = 5e-324  # m; above 0
+CHECKS: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
+    ("oriented", lambda value: isinstance(value, bool), "true or false"),
+    ("sigma", lambda value: _within(value, 0.0, 10.0), "a number from 0 to 10, or null"),
+    ("frame_id", lambda value: isinstance(value, str), "text"),
+    ("meta", lambda value: isinstance(value or {}, dict), "an object"),
+    ("points", lambda value: isinstance(value, list), "[[x, y], ...]"),
+    ("points_sigma", lambda value: _within(value, LEAST_SIGMA, 10.0), "a number above 0 and up to 10, or null"),
+)
+USUAL: dict[str, Any] = {"oriented": True, "sigma": None, "frame_id": "map", "points": [], "points_sigma": None}
+
+
 def _take_properties(told: dict[str, Any], drawing: Drawing) -> None:
-    oriented, sigma = told.get("oriented", True), told.get("sigma")
-    frame_id, meta = told.get("frame_id", "map"), told.get("meta") or {}
-    if not isinstance(oriented, bool):
-        raise MalformedFileError(
-            f"expected oriented to be true or false, found {kind_of(oriented)}", argument=drawing.name
-        )
-    if sigma is not None and not (type(sigma) in (int, float) and 0.0 <= sigma <= 10.0):
-        raise MalformedFileError(
-            f"expected sigma to be a number from 0 to 10, or null, found {kind_of(sigma)}", argument=drawing.name
-        )
-    if not isinstance(frame_id, str) or not isinstance(meta, dict):
-        raise MalformedFileError(
-            f"expected frame_id to be text and meta an object, found {kind_of(frame_id)} and {kind_of(meta)}",
-            argument=drawing.name,
-        )
-    drawing.oriented, drawing.sigma = oriented, None if sigma is None else float(sigma)
-    drawing.frame_id = shown(frame_id)
-    drawing.meta = {shown(str(k)): shown(v) for k, v in meta.items() if isinstance(v, str)}
-
-
-def _take_points(told: dict[str, Any], drawing: Drawing) -> None:
-    points, sigma = told.get("points", []), told.get("points_sigma")
-    if not isinstance(points, list):
-        raise MalformedFileError(f"expected points to be [[x, y], ...], found {kind_of(points)}", argument=drawing.name)
+    values = USUAL | told
+    for key, is_good, what in CHECKS:
+        if not is_good(values.get(key)):
+            found = kind_of(values[key])
+            raise MalformedFileError(f"expected {key} to be {what}, found {found}", argument=drawing.name)
+    points, sigma, points_sigma = values["points"], values["sigma"], values["points_sigma"]
     wrong = next((fault for k, row in enumerate(points) if (fault := _fault_of_row(row, 2, f"point {k}"))), None)
     if wrong is not None:
         raise MalformedFileError(f"expected every point to be [x, y], found {wrong}", argument=drawing.name)
     if len(points) > MAX_POINTS:
         raise TooLargeError(f"expected at most {MAX_POINTS} points, found {len(points)}", argument=drawing.name)
-    if sigma is not None and not (type(sigma) in (int, float) and 0.0 < sigma <= 10.0):
-        raise MalformedFileError(
-            f"expected points_sigma to be a number above 0 and up to 10, or null, found {kind_of(sigma)}",
-            argument=drawing.name,
-        )
+    drawing.oriented, drawing.sigma = values["oriented"], None if sigma is None else float(sigma)
+    drawing.frame_id = shown(values["frame_id"])
+    drawing.meta = {shown(str(k)): shown(v) for k, v in (values.get("meta") or {}).items() if isinstance(v, str)}
     drawing.points = np.array(points, dtype=np.float64).reshape(-1, 2)
-    drawing.points_sigma = None if sigma is None else float(sigma)
+    drawing.points_sigma = None if points_sigma is None else float(points_sigma)

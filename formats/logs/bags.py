@@ -80,11 +80,6 @@ class Bag:
         every = [one for file in self._files for one in file.connections]
         return [one for one in every if one.msgtype in kinds and one.encoding in (CDR, ROS1)] if kinds else every
 
-    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, Any]]:
-        """Yield the messages of some connections, in the order of the bag; see `received`."""
-        for connection, _received, message in self.received(connections):
-            yield connection, message
-
     def received(self, connections: Collection[Connection]) -> Iterator[Received]:
         """Yield the messages of some connections with the time of their reception, in the order of the bag.
 

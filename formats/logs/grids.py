@@ -81,7 +81,7 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
 def _last_grids(bag: Bag, topics: Collection[str]) -> dict[str, Any]:
     """Return the last message with cells of each topic."""
     found: dict[str, Any] = {}
-    for connection, message in bag.messages([one for one in bag.connections(GRID) if one.topic in topics]):
+    for connection, _, message in bag.received([one for one in bag.connections(GRID) if one.topic in topics]):
         if len(message.data) or connection.topic not in found:
             found[connection.topic] = message
     return {topic: found[topic] for topic in sorted(found)}
