@@ -153,7 +153,10 @@ def _require_plain(scope: Scope) -> None:
     """
     hosts = [value for name, value in scope["headers"] if name == b"host"]
     codings = [value.strip().lower() for name, value in scope["headers"] if name == b"transfer-encoding"]
-    if len(hosts) > 1 or (scope["http_version"] == "1.1" and not hosts) or codings not in ([], [b"chunked"]):
+    has_length = any(name == b"content-length" for name, _ in scope["headers"])
+    if len(hosts) > 1 or (scope["http_version"] == "1.1" and not hosts):
+        raise NotHttpError
+    if codings not in ([], [b"chunked"]) or (codings and has_length):
         raise NotHttpError
     if hosts and not _HOST.fullmatch(hosts[0]):
         raise NotHttpError

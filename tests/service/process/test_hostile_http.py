@@ -181,6 +181,8 @@ REFUSED = {
     "a head without end": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nA: " + b"a" * 3_000_000,
     "a target without end": b"GET /" + b"a" * 3_000_000,
     "NUL in a field": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nA: a\0b\r\n\r\n",
+    "a length and chunks": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
+    b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
     "two lengths": HEAD + b"Content-Length: 1\r\nContent-Length: 2\r\n\r\n{}",
     "a length below zero": HEAD + b"Content-Length: -1\r\n\r\n",
     "chunked in HTTP/1.0": HEAD.replace(b"1.1", b"1.0") + b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
