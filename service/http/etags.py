@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 
 from starlette.requests import Request
 
 from linefix.documents.errors import Fault, InvalidRequestError
 
-from ..maps import Preconditions
+from ..maps import EVERY_REVISION, Preconditions
 
 _TAG = re.compile(r'(W/)?"([^"]*)"')
 _REVISION = re.compile(r"[1-9][0-9]{0,17}")
@@ -35,19 +36,14 @@ def demands_of(request: Request) -> Preconditions:
     ]
     if wrong:
         raise InvalidRequestError(wrong)
-    return Preconditions(
-        # A weak tag never matches strongly: RFC 9110, 8.8.3.2.
-        if_match=None if match in (None, "*") else _revisions(match or "", weak=False),
-        any_match=match == "*",
-        if_none_match=None if none_match in (None, "*") else _revisions(none_match or "", weak=True),
-        none_may_exist=none_match == "*",
-    )
+    # A weak tag never matches strongly: RFC 9110, 8.8.3.2.
+    return Preconditions(_revisions(match, weak=False), _revisions(none_match, weak=True))
 
 
 def is_unchanged(request: Request, revision: int) -> bool:
     """Return whether a reader has this revision already."""
-    none_match = _joined(request, "if-none-match")
-    return none_match is not None and (none_match == "*" or revision in _revisions(none_match, weak=True))
+    revisions = _revisions(_joined(request, "if-none-match"), weak=True)
+    return revisions is not None and revision in revisions
 
 
 def _joined(request: Request, name: str) -> str | None:
@@ -65,6 +61,11 @@ def _found(header: str) -> str:
     return "text next to the tags" if _TAG.search(header) else "no tag in quotes"
 
 
-def _revisions(header: str, *, weak: bool) -> frozenset[int]:
+def _revisions(header: str | None, *, weak: bool) -> Container[int] | None:
+    """Return the revisions that a header names; None where there is no header."""
+    if header is None:
+        return None
+    if header == "*":
+        return EVERY_REVISION
     found = (tag for is_weak, tag in _TAG.findall(header) if weak or not is_weak)
     return frozenset(int(tag) for tag in found if _REVISION.fullmatch(tag))

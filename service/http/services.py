@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from ..admission.budget import ByteBudget
-from ..admission.entrance import Entrance
+from ..admission.entrance import Entrance, Origins
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
-from ..admission.origins import Origins
 from ..importing.reader import Bounds
 from ..maps import IndexCache, MapStore
 from ..maps.lookup import MapLookup

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -38,6 +38,7 @@ from .tables import (
 )
 
 T = TypeVar("T")
+EVERY_REVISION = range(1, 1 << 63)
 BEYOND = "\x7f"  # every letter that an id may have comes before it
 BYTES_OF_ID = 500  # that an id takes in addition to its map, about
 SHARE = 0.5  # of all bytes, that maps whose ids begin alike may take: as of memory, no key has more than half
@@ -56,31 +57,20 @@ class Preconditions:
 
     Attributes
     ----------
-    if_match : frozenset of int, or None
-        Revisions of which the present one must be.
-    any_match : bool
-        ``If-Match: *``: there must be a map.
-    if_none_match : frozenset of int, or None
-        Revisions that the present one must not be.
-    none_may_exist : bool
-        ``If-None-Match: *``: there must be no map.
+    if_match : container of int, or None
+        Revisions of which the present one must be; `EVERY_REVISION` for ``If-Match: *``: there must be a map.
+    if_none_match : container of int, or None
+        Revisions that the present one must not be; `EVERY_REVISION` for ``If-None-Match: *``: there must be no map.
     """
 
-    if_match: frozenset[int] | None = None
-    any_match: bool = False
-    if_none_match: frozenset[int] | None = None
-    none_may_exist: bool = False
+    if_match: Container[int] | None = None
+    if_none_match: Container[int] | None = None
 
     def check(self, revision: int | None) -> None:
         """Raise `RevisionConflictError` unless the present revision, None for no map, is as demanded."""
-        present = revision is not None
-        if (
-            (self.any_match and not present)
-            or (self.if_match is not None and revision not in self.if_match)
-            or (self.none_may_exist and present)
-            or (self.if_none_match is not None and present and revision in self.if_none_match)
-        ):
-            raise RevisionConflictError(revision)
+        for revisions, demanded in ((self.if_match, True), (self.if_none_match, False)):
+            if revisions is not None and (revision is not None and revision in revisions) != demanded:
+                raise RevisionConflictError(revision)
 
 
 ANY = Preconditions()

@@ -18,7 +18,7 @@ from service.errors import (
     StoreFullError,
     UnknownMapError,
 )
-from service.maps import MapOutline, MapRecord, MapStore, Preconditions
+from service.maps import EVERY_REVISION, MapOutline, MapRecord, MapStore, Preconditions
 from service.maps.tables import row_of
 
 from .stores import ANY, BOX, alter, opened
@@ -58,9 +58,9 @@ def test_demands_are_of_the_present_revision(store: MapStore) -> None:
         return caught.value.revision
 
     only_over = Preconditions(if_match=frozenset([1, 7]))
-    none = Preconditions(none_may_exist=True)
+    none = Preconditions(if_none_match=EVERY_REVISION)
     assert refused(lambda: store.put("m", b"x", BOX, only_over)) is None
-    assert refused(lambda: store.put("m", b"x", BOX, Preconditions(any_match=True))) is None
+    assert refused(lambda: store.put("m", b"x", BOX, Preconditions(if_match=EVERY_REVISION))) is None
     assert refused(lambda: store.delete("m", only_over)) is None
     assert store.put("m", b"one", BOX, none) == (1, True)
     assert refused(lambda: store.put("m", b"x", BOX, none)) == 1
@@ -68,7 +68,7 @@ def test_demands_are_of_the_present_revision(store: MapStore) -> None:
     assert store.put("m", b"two", BOX, only_over) == (2, False)
     assert refused(lambda: store.put("m", b"x", BOX, only_over)) == 2
     assert refused(lambda: store.delete("m", only_over)) == 2
-    assert store.put("m", b"three", BOX, Preconditions(any_match=True)) == (3, False)
+    assert store.put("m", b"three", BOX, Preconditions(if_match=EVERY_REVISION)) == (3, False)
     assert store.put("m", b"four", BOX, Preconditions(if_none_match=frozenset([1, 2]))) == (4, False)
     assert store.load("m").document == b"four"
     store.delete("m", Preconditions(if_match=frozenset([4])))
