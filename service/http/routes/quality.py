@@ -20,13 +20,14 @@ from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, U
 from linefix.operations import Json, Steps, analysis_steps, check_steps, update_steps
 
 from ...maps.lookup import FoundMaps
+from ...telemetry.traces import queued
 from ...work.job import Done, Job, Operation, begin
 from ...work.results import answer_apply
 from ..bodies import read_request
 from ..exchange import Exchange, Searching
-from ..map_stage import index_map, looking_up_map
+from ..map_stage import looking_up_map
 from ..openapi import EVERYWHERE, SEARCHES, problems, searches
-from ..search_stage import in_search_slot, in_short_slots
+from ..search_stage import in_short_slots
 from ..sending import answer, answer_in_slot
 from .maps import MapIdPath
 
@@ -160,12 +161,12 @@ async def _in_turns(
     """Answer with an operation on a map; `noted` are fields of the log, `name` is that of the map's reference."""
 
     async def work() -> Done:
-        lookup, run = exchange.services.lookup, exchange.services.parse_threads.run
+        services, run = exchange.services, exchange.services.parse_threads.run
         async with looking_up_map(exchange, on, job.deadline, oriented=oriented) as source:
-            await index_map(exchange, source, job.deadline, oriented=oriented)
             reference = source.references[None]
-            beginning = partial(begin, operation, lookup, source, job, oriented=oriented)
-            begun = await in_search_slot(exchange, beginning, job.deadline)
+            beginning = partial(begin, operation, services.lookup, source, job, oriented=oriented)
+            # What is read and indexed does not look at the deadline: not in a slot of a search.
+            begun = await services.indexing.run(queued(beginning), job.deadline, exchange.ticket)
         if not await in_short_slots(exchange, begun.take_turn, job.deadline):  # the rest then searches nothing
             while await run(begun.take_turn):
                 await asyncio.sleep(0)
