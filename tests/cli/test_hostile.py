@@ -194,7 +194,7 @@ def test_all_misspelt_names_are_listed_with_the_names_that_are_meant(linefix: Li
     [
         (("locate", "room.json", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
         (("locate", "room.json", "bad.json", "scan.json"), "bad.json: /segments/0: expected 4 numbers"),
-        (("register", "room.json", "scan.json", "--pairs", "pairs.json"), "pairs.json: /0"),
+        (("register", "room.json", "scan.json", "--correspondences", "pairs.json"), "pairs.json: /0"),
         (("map", "check", "room.json", "--scan", "scan.json", "--scan", "bad.json"), "bad.json: /segments/0"),
         (("map", "check", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
         (("map", "put", "bad", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
