@@ -11,7 +11,6 @@ from .check.check import check_map
 from .check.judging import conclude
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
-from .update.applying import apply_changes
 from .update.result import (
     NOT_SHARPENED,
     Change,
@@ -22,6 +21,7 @@ from .update.result import (
     Replacement,
     Sharpened,
     Usable,
+    apply_changes,
 )
 from .update.scans import UpdateError, VisitScan
 from .update.update import update, updating

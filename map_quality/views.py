@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # m; accepted values of the sigma of range
 ALL_ROUND = math.tau - 0.01  # rad; a full turn, and what people write for one
 HEADINGS = 4  # of a scanner that does not see all round, from each place
 SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; a pose that is nearer to another one is the same
+T = TypeVar("T")
 
 
 class AnalysisError(InputError):
@@ -120,3 +123,13 @@ def is_same(found: RigidTransform, pose: RigidTransform) -> bool:
     """Return whether two poses are of the same place."""
     away = math.hypot(found.x - pose.x, found.y - pose.y)
     return away < SAME_PLACE and abs(wrap_angle(found.theta - pose.theta)) < SAME_HEADING
+
+
+def finished(steps: Generator[None, None, T]) -> T:
+    """Take all steps, and return their result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: T = done.value
+            return result

@@ -19,7 +19,7 @@ from association import (
 )
 from registration import RigidTransform, Segments
 
-from ..views import AnalysisError, Robot, is_elsewhere, is_same, look, similar_pose
+from ..views import AnalysisError, Robot, finished, is_elsewhere, is_same, look, similar_pose
 from .drive import STEP, seen_on_the_way, ways_from
 from .standing import CLEARANCE, Standing, is_free, standing_places
 
@@ -159,13 +159,7 @@ class Analysis:
         CancelledError
             When the deadline was cancelled.
         """
-        steps = self.looking(number, deadline)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as done:
-                found: PlaceVerdict | None = done.value
-                return found
+        return finished(self.looking(number, deadline))
 
     def looking(self, number: int, deadline: Deadline | None = None) -> Generator[None, None, PlaceVerdict | None]:
         """Do what `look` does, one search at a step, and return the same; between steps others may have their turn.

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from association import Deadline, MapIndex, Scan
+from association import AssociationResult, Deadline, MapIndex, Scan
 
 from ..scale import Matched, agreed
+from ..scale import fits as explains
 from . import tuning
 from .result import Advice, Finding, SampleReport
-from .samples import Hypothesis, Mistake, Sample, Trial
+from .samples import Hypothesis, Mistake, Sample, score_of
 from .scaling import Scale, find_scale, unit_mistake
 
 MISTAKES: Mapping[Mistake, str] = {
@@ -79,7 +80,7 @@ class _Fits:
         """Return the number of scans that are usable under a hypothesis."""
         return sum(sample.trials[one].usable for sample in self.samples if one in sample.trials)
 
-    def both(self, one: Hypothesis, other: Hypothesis) -> list[tuple[Trial, Trial]]:
+    def both(self, one: Hypothesis, other: Hypothesis) -> list[tuple[AssociationResult, AssociationResult]]:
         """Return the trials of the samples that were tried under both of two hypotheses."""
         return [(s.trials[one], s.trials[other]) for s in self.samples if {one, other} <= s.trials.keys()]
 
@@ -90,7 +91,7 @@ class _Fits:
         if usable > known + min(clearly, len(self.samples) - 1):
             return True
         # Scores of scans of another building are better by chance: hardly any of these is usable, or clearly fewer.
-        better = sum(one.score for _, one in both) > tuning.BETTER_SCORE * sum(one.score for one, _ in both)
+        better = sum(score_of(one) for _, one in both) > tuning.BETTER_SCORE * sum(score_of(one) for one, _ in both)
         return better and usable >= max(min(2, len(self.samples)), known - clearly)
 
     def mistakes(self) -> list[Finding]:
@@ -101,7 +102,7 @@ class _Fits:
             usable = self.usable(self.present), self.usable(undone)
             if self.is_better(widest, replace(widest, mistake=mistake), *usable):
                 both = self.both(self.present, undone)
-                count = sum(one.score > sent.score or one.usable > sent.usable for sent, one in both)
+                count = sum(score_of(one) > score_of(sent) or one.usable > sent.usable for sent, one in both)
                 found.append(Finding(mistake, f"{count} of {len(self.samples)} scans {message}"))
         return found
 
@@ -135,7 +136,8 @@ class _Fits:
         seen: dict[int, list[float]] = {}
         for one in self.samples:
             trial = one.trials.get(Hypothesis(directed, tuning.WIDEST))
-            for wall, offset in trial.offsets.items() if trial is not None else ():
+            offsets = {} if trial is None or not explains(trial) else {o.map: o.offset for o in trial.correspondences}
+            for wall, offset in offsets.items():
                 seen.setdefault(wall, []).append(offset)
         if not seen:
             return None
@@ -150,7 +152,7 @@ def _thickness(index: MapIndex, tried: Sequence[tuple[Scan, Sample]], *, oriente
     drawn is half of the thickness that is missing.
     """
     wide = Hypothesis(oriented, tuning.THICKNESS_SIGMA)
-    trials = [(scan, sample.trials[wide].result) for scan, sample in tried if wide in sample.trials]
+    trials = [(scan, sample.trials[wide]) for scan, sample in tried if wide in sample.trials]
     found = [Matched.of(index.segments, scan, result) for scan, result in trials]
     offset = agreed([one for one in found if one is not None], tuning.LITTLE, "offset", 0.5 * tuning.SAME_THICKNESS)
     thicker = 2.0 * offset.value if oriented else max(0.0, 2.0 * offset.value)

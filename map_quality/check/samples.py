@@ -20,7 +20,6 @@ from association import (
 )
 from registration import RigidTransform
 
-from ..scale import fits
 from . import tuning
 
 Mistake = Literal["mirrored", "reversed"]
@@ -51,26 +50,9 @@ class Hypothesis:
     mistake: Mistake | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """The answer for a scan under a hypothesis."""
-
-    result: AssociationResult
-
-    @property
-    def usable(self) -> bool:
-        """Return whether a robot may use the answer."""
-        return self.result.usable
-
-    @property
-    def score(self) -> float:
-        """Nats; 0 where nothing fits."""
-        return 0.0 if self.result.diagnostics is None else max(0.0, self.result.diagnostics.score)
-
-    @property
-    def offsets(self) -> dict[int, float]:
-        """By map segment, how far its matched scan segments are off, metres; none where too little of the scan fits."""
-        return {pair.map: pair.offset for pair in self.result.correspondences} if fits(self.result) else {}
+def score_of(result: AssociationResult) -> float:
+    """Return the score of an answer, nats; 0 where nothing fits."""
+    return 0.0 if result.diagnostics is None else max(0.0, result.diagnostics.score)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +63,14 @@ class Sample:
     ----------
     result : AssociationResult
         In the map as it is.
-    trials : dict of Hypothesis to Trial
+    trials : dict of Hypothesis to AssociationResult
         As far as there was time; that of `result` is always among them.
     moved : RigidTransform or None
         From its stated pose to the pose where it was found, in the map frame. None where either is not known.
     """
 
     result: AssociationResult
-    trials: Mapping[Hypothesis, Trial]
+    trials: Mapping[Hypothesis, AssociationResult]
     moved: RigidTransform | None
 
 
@@ -119,7 +101,7 @@ def try_sample(
     if not oriented:
         index.undirected_by(deadline)  # the search takes it from there
     result = associate(index, scan, None, AssociationOptions(oriented=oriented, on_map=1.0), deadline)
-    trials = {Hypothesis(oriented, index.sigma): Trial(result)}
+    trials = {Hypothesis(oriented, index.sigma): result}
     for one in hypotheses(oriented, index.sigma):
         if not deadline.passed:
             with suppress(IndexingEndedError):
@@ -140,7 +122,7 @@ def hypotheses(oriented: bool, sigma: float | None) -> Iterator[Hypothesis]:
             yield Hypothesis(oriented, other, mistake)
 
 
-def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> Trial:
+def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> AssociationResult:
     place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)
     options = AssociationOptions(max_alternatives=0, confidence=tuning.CONFIDENCE, oriented=one.oriented, on_map=1.0)
-    return Trial(associate(place, UNDONE[one.mistake](scan), None, options, deadline))
+    return associate(place, UNDONE[one.mistake](scan), None, options, deadline)

@@ -27,7 +27,7 @@ from registration import Segments
 
 from ..scale import Matched, agreed
 from . import tuning
-from .samples import Sample, Trial
+from .samples import Sample, score_of
 
 # Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
 TAKEN_FOR: Mapping[float, tuple[str, str]] = {
@@ -190,7 +190,7 @@ def _best_rung(sent: _Scaled) -> _Scaled | None:
         if sent.deadline.passed:
             return None
         place = few.by(factor)
-        score = 0.0 if place is None else sum(Trial(one).score for one in place.search(lax=True))
+        score = 0.0 if place is None else sum(score_of(one) for one in place.search(lax=True))
         if score > most:
             best, most = factor, score
     return None if best is None else sent.by(best)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import Deadline
 from registration import Segments
@@ -14,12 +13,9 @@ from registration import Segments
 from . import tuning
 from .beams import within
 from .evidence import are_enough
+from .result import Bools, Floats, Indices
 from .scans import Localized, blocks, go_on
 from .walls import runs
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import Deadline
 from registration import Segments
@@ -14,12 +13,9 @@ from registration import Segments
 from . import tuning
 from .beams import Chunks
 from .evidence import Judged, WallEvidence, are_enough
-from .result import Change, Evidence
+from .result import Bools, Change, Evidence, Floats
 from .scans import blocks, go_on
-from .walls import NO_SIGMA, NO_WALLS, Bools, Draft, find_cuts, runs
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from .walls import NO_SIGMA, NO_WALLS, Draft, find_cuts, runs
 
 
 def draft_changes(

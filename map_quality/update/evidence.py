@@ -6,19 +6,14 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import AssociationResult, Deadline
 from registration import Segments
 
 from . import tuning
-from .beams import NOTHING, Chunks, Followed, follow
-from .hanging import hanging_lines
+from .beams import NOTHING, Chunks, Followed, follow, hanging_lines
+from .result import Bools, Floats, Indices
 from .scans import Localized
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,6 @@ from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import (
     AssociationOptions,
@@ -25,10 +24,7 @@ from registration import Correspondences, InputError, RigidTransform, Segments, 
 
 from ..scale import Matched, errors_of
 from . import tuning
-from .result import RefusedVisit
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from .result import Floats, Indices, RefusedVisit
 
 # Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
 DOUBTFUL = frozenset(("map_scale", "stuck_ranges", "scan_exceeds_map"))

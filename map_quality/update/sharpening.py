@@ -18,19 +18,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from association import Deadline, MapIndex
 from registration import Segments
 
 from . import tuning
-from .result import Sharpened
+from .result import Bools, Floats, Indices, Sharpened
 from .scans import Localized, blocks, go_on
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

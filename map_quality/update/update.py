@@ -9,19 +9,18 @@ from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from registration import InvalidArgumentError, Segments
 
+from ..views import finished
 from . import tuning
 from .additions import candidates, unexplained
-from .applying import apply, apply_changes, with_ends
 from .beams import Chunks, sees
 from .changes import draft_changes
 from .evidence import Gatherer, WallEvidence
 from .odometry import Carrying
-from .result import Change, MapUpdate, RefusedVisit, Sharpened
+from .result import Change, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
 from .scans import (
     Localized,
     TimeOverError,
@@ -39,7 +38,6 @@ from .sharpening import sharpen
 from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
 from .walls import Draft
 
-Floats = NDArray[np.float64]
 Drafts = Sequence[tuple[Draft, Change]]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
 
@@ -87,13 +85,7 @@ def update(
     CancelledError
         When the deadline was cancelled.
     """
-    steps = updating(index, scans, deadline, accept=accept, refuse=refuse)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            found: MapUpdate = done.value
-            return found
+    return finished(updating(index, scans, deadline, accept=accept, refuse=refuse))
 
 
 def updating(

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -16,13 +15,8 @@ from registration import Segments
 from . import tuning
 from .beams import NOTHING, Chunks
 from .evidence import Judged, WallEvidence, are_enough
-from .result import ChangeCode
+from .result import Bools, ChangeCode, Floats, Indices
 from .scans import go_on
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
-
 
 NO_WALLS, NO_SIGMA = np.zeros((0, 4)), np.zeros(0)
 

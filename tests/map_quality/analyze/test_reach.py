@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from map_quality import AnalysisError
-from map_quality.analyze.reach import Reach
+from map_quality.analyze.standing import Reach
 from registration import Segments
 from registration.layout import Floats
 

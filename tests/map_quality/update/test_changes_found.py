@@ -8,8 +8,8 @@ import pytest
 import map_quality
 from association import MapIndex
 from map_quality import Change, Evidence, MapUpdate, VisitScan, apply_changes
-from map_quality.update.applying import apply
 from map_quality.update.evidence import are_enough
+from map_quality.update.result import apply
 from registration import Segments
 
 from .hall import OUTLINE, PILLAR, RACK, box, segments, visit

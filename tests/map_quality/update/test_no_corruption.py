@@ -15,7 +15,7 @@ from association import CancelledError, Deadline, MapIndex, mirrored
 from linefix import LaserScan, scan_of
 from map_quality import UpdateError, VisitScan
 from map_quality.scale import Matched, errors_of
-from map_quality.update.hanging import hanging_lines, on_lines
+from map_quality.update.beams import hanging_lines, on_lines
 from map_quality.update.scans import Localized, held_back, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner, scan
