@@ -101,8 +101,10 @@ def read_scan(name: str) -> Json:
     message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
-    inner = message.get("msg")  # in the envelope of rosbridge
+    inner = message.get("msg", message.get("message"))  # in the envelope of rosbridge, or of Foxglove
     scan: Json = inner if isinstance(inner, dict) else message
+    if {"start_angle", "end_angle"} <= scan.keys():
+        raise RefusedError(f"{name}: is a LaserScan of Foxglove, expected one of ROS; export sensor_msgs/LaserScan")
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
     views = scan.get("views")

@@ -188,12 +188,15 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
     lost = "A message was lost!!!\n\ttotal count change:1\n\ttotal count: 1---\n"
     wrapped = json.dumps({"op": "publish", "topic": "/scan", "msg": known})
     for name, content in (
-        ("bare.yaml", bare), ("lost.yaml", lost + bare), ("bridge.json", wrapped)
+        ("bare.yaml", bare), ("lost.yaml", lost + bare), ("bridge.json", wrapped),
+        ("panel.json", json.dumps({"topic": "/scan", "message": known})),
     ):  # fmt: skip
         (folder / name).write_text(content)
         assert linefix.done("locate", "room.json", name, "--json").answer["usable"], name
     (folder / "noarr.yaml").write_text(echoed([]).replace("ranges:", "ranges: '<array type: float32>'"))
     assert "without --noarr" in refused(linefix("locate", "room.json", "noarr.yaml"), 3)
+    (folder / "foxglove.json").write_text(json.dumps({"start_angle": 0.0, "end_angle": 1.0, "ranges": [1.0, 1.0]}))
+    assert "export sensor_msgs/LaserScan" in refused(linefix("locate", "room.json", "foxglove.json"), 3)
 
 
 def test_ranges_that_ros2_topic_echo_has_cut_are_refused(linefix: Linefix, folder: Path) -> None:
