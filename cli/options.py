@@ -70,6 +70,7 @@ class TopicOptions:
     tf_namespace: Annotated[
         Text, option("Namespace of transforms, in a bag of several robots: /robot1.", "NAMESPACE")
     ] = None
+    base: Annotated[Text, option("Base frame of the robot. Default: base_link or base_footprint.", "FRAME")] = None
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:

@@ -133,9 +133,9 @@ def _speed(step: RigidTransform, seconds: float) -> Speed:
     return Speed(vx / seconds, vy / seconds, step.theta / seconds)
 
 
-def base_of(path: Sequence[str]) -> str | None:
+def base_of(path: Sequence[str], bases: Sequence[str] = BASES) -> str | None:
     """Return the robot's own frame among frames; with a prefix, as ``robot1/base_link``, too."""
-    return next((frame for base in BASES for frame in path if frame.rpartition("/")[2] == base), None)
+    return next((frame for base in bases for frame in path if base in (frame, frame.rpartition("/")[2])), None)
 
 
 def outer_frames(tree: Transforms, frame: str) -> list[str]:
@@ -145,13 +145,13 @@ def outer_frames(tree: Transforms, frame: str) -> list[str]:
     return named or [one for one in above if not tree.parents(one)] or above[-1:]
 
 
-def moves(tree: Transforms, path: Sequence[str]) -> bool:
+def moves(tree: Transforms, path: Sequence[str], names: Sequence[str] = BASES) -> bool:
     """Tell whether a robot moves, by the frames from its sensor outwards: a mount that moves is no robot that does.
 
     The frame that has to move is the robot's own. If no frame has that name, a frame has to change its position in
     its parent: a rotating sensor does not.
     """
-    bases = [k for k, frame in enumerate(path) if frame.rpartition("/")[2] in BASES]
+    bases = [k for k, frame in enumerate(path) if frame in names or frame.rpartition("/")[2] in names]
     if bases:
         return _moves(tree, path[bases[-1] :], turning=True)
     return any(_moves(tree, path[k : k + 2], turning=False) for k in range(len(path) - 1))

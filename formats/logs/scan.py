@@ -34,12 +34,15 @@ class LogOptions:
         Of a bag of several robots, the namespace of the transforms, such as ``/robot1``; None: that of the scans.
     mount : RigidTransform or None
         base_from_sensor; None: as the log says.
+    base : str or None
+        The robot's own frame in a bag, with or without its prefix; None: ``base_link``, else ``base_footprint``.
     """
 
     topic: str | None = None
     pose_frame: str | None = None
     tf_namespace: str | None = None
     mount: RigidTransform | None = None
+    base: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

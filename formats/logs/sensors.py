@@ -13,7 +13,7 @@ from registration import RigidTransform
 from vectorization import Motion
 from vectorization.laser import LONGEST_SCAN, USUAL_SCAN
 
-from ..errors import UprightFrameError
+from ..errors import IncompleteFileError, UprightFrameError
 from ..report import Notes, shown
 from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
@@ -188,6 +188,7 @@ class Sensors:
     def __init__(self, frames: BagFrames, options: LogOptions, notes: Notes) -> None:
         self._frames, self._options, self._notes = frames, options, notes
         self._known: dict[tuple[str, str], Sensor] = {}
+        self._bases = (options.base.strip("/"),) if options.base else BASES
 
     def of(self, topic: str, frame: str) -> Sensor:
         """Return the scanner that a scan comes from; raises `IncompleteFileError` when its transforms are not clear."""
@@ -199,13 +200,19 @@ class Sensors:
     def _made(self, topic: str, frame: str) -> Sensor:
         namespace, tree = self._frames.tree(topic, frame, self._options.tf_namespace, self._notes)
         above = tree.above(frame)
-        base = base_of(above) or ""
+        base = base_of(above, self._bases) or ""
+        if self._options.base and not base:
+            raise IncompleteFileError(
+                f"no transform from {shown(frame) or NAMELESS} to the base frame {shown(self._options.base)}: expected "
+                f"one of {', '.join(map(shown, above))}; correct the option base (--base)",
+                argument=self._frames.name,
+            )
         mounting = tuple(tree.path(base or above[-1], frame) or (frame,))
         mount = self._options.mount
         if mount is None:
             return Sensor(frame, base, self._odometry(topic, namespace, tree, frame), None, tree, mounting)
         children = [*tree.frames(), *(one.child for one in self._frames.odometry)]
-        base = base or base_of(children) or BASES[0]
+        base = base or base_of(children, self._bases) or self._bases[0]
         given = np.eye(4)
         c, s = math.cos(mount.theta), math.sin(mount.theta)
         given[:2, :2], given[:2, 3] = [[c, -s], [s, c]], [mount.x, mount.y]
@@ -218,11 +225,11 @@ class Sensors:
             path = tree.path(wanted, frame)
             return None if path is None or len(path) < 2 else self._doubted(Odometry.of_tree(tree, path))
         paths = [tree.path(outer, frame) or [frame] for outer in outer_frames(tree, frame)]
-        moving = next((path for path in paths if moves(tree, path)), None)
+        moving = next((path for path in paths if moves(tree, path, self._bases)), None)
         if moving is not None:
             return self._doubted(Odometry.of_tree(tree, moving))
         above = tree.above(frame)
-        base = base_of(above)
+        base = base_of(above, self._bases)
         fitting = self._frames.odometry_of(topic, namespace, above, base)
         if not fitting:
             self._note_missing(tree, frame, paths)
@@ -236,8 +243,8 @@ class Sensors:
         return found
 
     def _note_missing(self, tree: Transforms, frame: str, paths: list[list[str]]) -> None:
-        moving = [path for path in paths if len(path) > 1 and path[-1] != base_of(path)]
-        base = base_of(moving[0]) or frame if moving else base_of(paths[0] if paths else []) or frame
+        moving = [path for path in paths if len(path) > 1 and path[-1] != base_of(path, self._bases)]
+        base = base_of((*moving, *paths, [])[0], self._bases) or frame
         why = (
             f"{shown(base)} does not move in {shown(moving[0][-1])}"
             if moving

@@ -354,3 +354,23 @@ def test_a_carmen_log_whose_robot_is_never_anywhere_has_no_odometry(tmp_path: Pa
     assert [scan.pose is not None for scan in log] == [known] * 3
     assert ("no_odometry" in codes(log)) is not known
     assert near(next(iter(log)).mount, 0.1, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("base", ["chassis", "robot1/chassis"])
+def test_a_base_of_another_name_is_chosen_by_an_option(tmp_path: Path, base: str) -> None:
+    def recorded(name: str) -> Robots:
+        (tmp_path / name).mkdir()
+        bag = Robots("mcap", tmp_path / name)
+        bag.drive("/tf", "robot1/odom", "robot1/chassis")
+        bag.transform("/tf_static", 0, "robot1/chassis", "laser", (0.3, 0.0, 0.0))
+        for k in range(4):
+            bag.scan(k * SECOND)
+        return bag
+
+    without, _ = read(recorded("without"))
+    assert without[0].mount is None
+    scans, _ = read(recorded("with"), LogOptions(base=base))
+    assert scans[0].mount is not None
+    assert (scans[0].base_frame, scans[0].mount.x) == ("robot1/chassis", 0.3)
+    with pytest.raises(IncompleteFileError, match="no transform from laser to the base frame body: expected one of"):
+        read(recorded("wrong"), LogOptions(base="body"))
