@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from .messages import LaserScan
 from .odometry import OdometryHistory
 from .options import NodeOptions, quoted
 from .topics import Topics
-from .tuning import CLOCKS_APART, ENDED_SECONDS, MISSED_PERIODS, SILENT_SECONDS
+from .tuning import CLOCKS_APART, ENDED_SECONDS, MISSED_PERIODS, SEVERAL_SCANS, SILENT_SECONDS
 from .wire import Subscription
 
 
@@ -53,9 +54,10 @@ class Inputs:
     ) -> None:
         self._options, self._topics, self._odometry, self._clock, self._log = options, topics, odometry, clock, log
         self._began: float | None = None
+        self._started: float | None = None  # the same without a clock
         self._looked = time.monotonic()
         self._scans, self._ranges, self._searched = _Seen(), _Seen(), _Seen()
-        self._senders: dict[tuple[str, Any], float] = {}  # when publishers last sent scans of a frame
+        self._senders: deque[tuple[float, str, Any]] = deque(maxlen=200)  # time, frame and publisher of the last scans
         self._latency: int | None = None  # ns from the stamp of the last scan to its reception
         self._apart = 0  # scans one after the other whose clock differs from that of odometry
         self._disagreeing: float | None = None  # since when scans are usable, but none is agreed
@@ -70,9 +72,8 @@ class Inputs:
         ranges = np.asarray(scan.ranges)
         if ((ranges >= scan.range_min) & (ranges <= scan.range_max)).any():
             self._ranges.note(now)
-            publisher = getattr(getattr(scan, "sample_info", None), "publication_handle", None)
-            self._senders = {key: at for key, at in self._senders.items() if now - at < ENDED_SECONDS}
-            self._senders[scan.header.frame_id, publisher] = now
+            info = getattr(scan, "sample_info", None)
+            self._senders.append((now, scan.header.frame_id, getattr(info, "publication_handle", None)))
         self._latency = received - stamp
         offset = self._odometry.clock_offset(stamp, received)
         self._apart = self._apart + 1 if abs(offset) > CLOCKS_APART and self._odometry.silent_s < ENDED_SECONDS else 0
@@ -103,8 +104,11 @@ class Inputs:
     @property
     def shared(self) -> str:
         """The frame of which several publishers send scans: all but one are not where it is; empty: none."""
-        frames = [name for (name, _), at in self._senders.items() if self._now - at < ENDED_SECONDS]
-        return next((name for name in frames if frames.count(name) > 1), "")
+        while self._senders and self._now - self._senders[0][0] > ENDED_SECONDS:
+            self._senders.popleft()
+        scans = Counter((frame, publisher) for _, frame, publisher in self._senders)
+        frames = Counter(frame for (frame, _), count in scans.items() if count >= SEVERAL_SCANS)
+        return next((frame for frame, count in frames.items() if count > 1), "")
 
     @property
     def doubt(self) -> str:
@@ -137,8 +141,10 @@ class Inputs:
         Inputs that were never there are no doubt.
         """
         topics, odometry, now = self._topics, self._odometry, self._now
+        self._started = self._started or time.monotonic()
         if not self._clock.started:
-            yield "", "no message on /clock; start the simulation, or unset use_sim_time"
+            if time.monotonic() - self._started > patience:
+                yield "", "no message on /clock; start the simulation, or unset use_sim_time"
             return
         self._began = began = now if self._began is None else min(self._began, now)
 

@@ -66,6 +66,7 @@ TRANSFORM_PERIOD_NS = 50_000_000  # ns between two transforms: 20 Hz
 TRANSFORM_TOLERANCE_NS = 200_000_000  # ns that a published transform is dated ahead, as AMCL does
 ENDED_SECONDS = 2.0  # s without scans or odometry after which the pose is stale
 MISSED_PERIODS = 3  # of scans, at least, before they count as ended: slow lasers
+SEVERAL_SCANS = 3  # within `ENDED_SECONDS`, from which on a publisher counts: drivers start again
 CLOCKS_APART = 0.5  # s by which the times from stamp to reception of scans and of odometry may differ
 SILENT_SECONDS = 10.0  # s without scans, a map or a transform, after which that is logged
 RESULT_SECONDS = 30.0  # s after which a request without an agreed pose is answered
