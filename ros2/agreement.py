@@ -7,7 +7,8 @@ The state is a list of hypotheses, each a pose of the robot in a map that odomet
    neither its pose nor one of its alternatives although all poses that explain it as well are listed.
 3. A hypothesis is agreed when the scans that support it, less those against it, are as many as needed, and the robot
    has moved far enough between them, or has rested long enough while nothing spoke against it. Where another pose was
-   likely, twice as many scans over twice the way are needed, and rest is no evidence.
+   likely, twice as many scans over twice the way are needed, and rest is no evidence. Where scans contradict odometry,
+   only way is evidence: at rest and in a turn, a mount or a scale that is wrong is not seen.
 4. The agreed hypothesis stays until another one is agreed; what speaks against it meanwhile is reported at once. It is
    also supported over a short time in which odometry is not known.
 """
@@ -125,13 +126,14 @@ class _Hypothesis:
             self.counted = scan
         self.latest = scan
 
-    def agreed(self, needed: int) -> bool:
+    def agreed(self, needed: int, *, contradicted: bool) -> bool:
         if needed == 1:
             return self.supporting > self.against
         times = 2 if self.rival else 1
         rested = times == 1 and self.against == 0 and self.latest.stamp - self.first.stamp >= tuning.RESTED_NS
-        driven = self.moved >= times * tuning.MOVED or self.turned >= times * tuning.TURNED
-        return self.supporting - self.against >= times * needed and (driven or rested)
+        turned = self.turned >= times * tuning.TURNED
+        enough = self.moved >= times * tuning.MOVED or ((turned or rested) and not contradicted)
+        return self.supporting - self.against >= times * needed and enough
 
     def verdict(self, scan: Observation, *, agreed: bool) -> bool | None:
         """Return whether a scan agrees; None where that is undecided.
@@ -165,6 +167,7 @@ class Agreement:
     _newest: int | None = None
     _held: Observation | None = None  # whose stamp fits that of no other scan yet
     _contradicted: bool = False
+    _unexplained: int = 0  # scans since the last agreement that contradict odometry
 
     @property
     def latest(self) -> Observation | None:
@@ -190,7 +193,7 @@ class Agreement:
     def reset(self) -> None:
         """Forget everything, as when the robot was carried, or the map changed."""
         self._hypotheses, self._agreed, self._newest, self._contradicted = [], None, None, False
-        self._held = None
+        self._held, self._unexplained = None, 0
 
     def take(self, scan: Observation) -> Event:
         """Take the next scan.
@@ -218,37 +221,34 @@ class Agreement:
             if one is self._agreed or scan.stamp - one.latest.stamp <= tuning.FORGOTTEN_NS
         ]
         verdicts = [(one, one.verdict(scan, agreed=one is self._agreed)) for one in self._hypotheses]
-        for one, agrees in verdicts:
-            if agrees is False:
-                one.against += 1
+        against = [one for one, agrees in verdicts if agrees is False]
+        for one in against:
+            one.against += 1
         supported = [one for one, agrees in verdicts if agrees and scan.usable]
         for one in supported:
             one.support(scan)
         if scan.usable and not supported:
-            self._begin(scan)
-            supported = self._hypotheses[-1:]
-        return self._event(supported, {id(one): agrees for one, agrees in verdicts})
-
-    def _begin(self, scan: Observation) -> None:
-        self._hypotheses.append(_Hypothesis(scan, scan, scan, rival=scan.rival))
-        if len(self._hypotheses) > tuning.MAX_HYPOTHESES:
-            self._hypotheses.remove(
-                min((one for one in self._hypotheses if one is not self._agreed), key=lambda one: one.latest.stamp)
-            )
-
-    def _event(self, supported: Sequence[_Hypothesis], verdicts: dict[int, bool | None]) -> Event:
-        if self._agreed is not None and any(one is self._agreed for one in supported):
+            supported = [self._begin(scan)]
+            self._unexplained += scan.odometry is not None and bool(against)
+        if self._agreed is not None and self._agreed in supported:
             self._agreed.against, self._contradicted = 0, False
             return Event.CONFIRMED
+        contradicted = self._unexplained >= tuning.UNEXPLAINED_SCANS
         for one in supported:
-            if one.agreed(self.needed):
-                self._agreed, self._contradicted = one, False
-                self._hypotheses = [one]
+            if one.agreed(self.needed, contradicted=contradicted):
+                self._agreed, self._contradicted, self._hypotheses, self._unexplained = one, False, [one], 0
                 return Event.AGREED
-        if self._agreed is not None and verdicts.get(id(self._agreed)) is False:
+        if self._agreed in against:
             self._contradicted = True
             return Event.CONTRADICTED
         return Event.NOTHING
+
+    def _begin(self, scan: Observation) -> _Hypothesis:
+        if len(self._hypotheses) >= tuning.MAX_HYPOTHESES:
+            others = (one for one in self._hypotheses if one is not self._agreed)
+            self._hypotheses.remove(min(others, key=lambda one: one.latest.stamp))
+        self._hypotheses.append(_Hypothesis(scan, scan, scan, rival=scan.rival))
+        return self._hypotheses[-1]
 
 
 def step_between(begin: Observation, end: Observation) -> RigidTransform | None:

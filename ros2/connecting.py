@@ -113,27 +113,25 @@ class Endpoints:
     def __init__(self, participant: DomainParticipant, topic: str, own: Sequence[Qos], *, writers: bool) -> None:
         self._participant, self._topic, self._own, self._writers = participant, topic, own, writers
         self._reader: Any = None
-        self._known: dict[Any, bool] = {}
-        self._lossy: set[Any] = set()
+        self._known: dict[Any, Qos] = {}
 
     @property
     def connected(self) -> frozenset[Any]:
         """The ids of those whose quality of service fits."""
-        return frozenset(key for key, fitting in self._found().items() if fitting)
+        return frozenset(key for key, qos in self._found().items() if self._fits(qos))
 
     @property
     def incompatible(self) -> bool:
         """Return whether there are some whose quality of service does not fit."""
-        return not all(self._found().values())
+        return not all(map(self._fits, self._found().values()))
 
     @property
     def best_effort(self) -> bool:
         """Return whether one of them is best effort."""
-        self._found()
-        return bool(self._lossy)
+        return not all(map(_reliable, self._found().values()))
 
-    def _found(self) -> dict[Any, bool]:
-        """Take what has changed; return for each id whether it fits."""
+    def _found(self) -> dict[Any, Qos]:
+        """Take what has changed; return the quality of service of each id."""
         if self._reader is None:
             built_in = BuiltinTopicDcpsPublication if self._writers else BuiltinTopicDcpsSubscription
             self._reader = BuiltinDataReader(self._participant, built_in)
@@ -141,11 +139,8 @@ class Endpoints:
             for one in changed:
                 if one.sample_info.instance_state != InstanceState.Alive:
                     self._known.pop(one.key, None)
-                    self._lossy.discard(one.key)
                 elif one.topic_name == self._topic and one.participant_key != self._participant.guid:
-                    self._known[one.key] = self._fits(one.qos)
-                    if not _reliable(one.qos):
-                        self._lossy.add(one.key)
+                    self._known[one.key] = one.qos
         return self._known
 
     def _fits(self, other: Qos) -> bool:

@@ -66,24 +66,21 @@ class Health:
 
     def problem(self, problem: str, stamp: Time | None = None) -> None:
         """Publish a problem, and log it; the same one at most once in `REPEAT_SECONDS` and `LOG_SECONDS`."""
-        if _is_new(self._published, NUMBER.sub("#", problem), time.monotonic(), REPEAT_SECONDS):
-            self.publish("scan", stamp or Time(), (ERROR, problem))
-        self.remind(problem)
+        self._report((ERROR, problem), stamp or Time(), NUMBER.sub("#", problem))
 
     def warn(self, warning: str, stamp: Time, about: str) -> None:
-        """Publish a warning, and log it, as often as a problem; warnings `about` one thing may differ in numbers."""
-        if _is_new(self._published, about, time.monotonic(), REPEAT_SECONDS):
-            self.publish("scan", stamp, (WARN, warning))
-        self.note(warning, about)
+        """Publish a warning, and log it, as often as a problem; warnings `about` one thing may differ."""
+        self._report((WARN, warning), stamp, about)
+
+    def _report(self, verdict: tuple[int, str], stamp: Time, about: str) -> None:
+        if _is_new(self._published, about, REPEAT_SECONDS):
+            self.publish("scan", stamp, verdict)
+        self.note(verdict[1], about)
 
     def note(self, line: str, about: str | None = None) -> None:
-        """Log a line; the same one, or one `about` the same, at most once in `LOG_SECONDS`."""
-        if _is_new(self._logged, about or line, time.monotonic(), LOG_SECONDS):
+        """Log a line; one `about` the same, or the same but for numbers, at most once in `LOG_SECONDS`."""
+        if _is_new(self._logged, about or NUMBER.sub("#", line), LOG_SECONDS):
             self.log(line)
-
-    def remind(self, line: str) -> None:
-        """Log a line as `note`, also where it differs in numbers."""
-        self.note(line, NUMBER.sub("#", line))
 
     def publish(
         self, part: str, stamp: Time, verdict: tuple[int, str], values: Mapping[str, str] | None = None
@@ -111,7 +108,8 @@ class Health:
             self.log(f"state {state.value}: {verdict[1]}")
 
 
-def _is_new(times: dict[str, float], text: str, now: float, seconds: float) -> bool:
+def _is_new(times: dict[str, float], text: str, seconds: float) -> bool:
+    now = time.monotonic()
     if now - times.get(text, -seconds) < seconds:
         return False
     if len(times) >= MOST_PROBLEMS:

@@ -190,8 +190,8 @@ class Inputs:
     def _jump(self) -> str:
         topic, odometry = self._topics.odometry, self._odometry
         remedy = "its publisher was reset, or merges two sources"
-        if topic.publishers > 1:
-            remedy = f"stop all but one of the {topic.publishers} publishers of {topic.name}"
+        if len(topic.writers.connected) > 1:
+            remedy = f"stop all but one of the {len(topic.writers.connected)} publishers of {topic.name}"
         return (
             f"odometry on {odometry.source} contradicts itself: {odometry.jump}; {remedy}. Odometry near such steps is "
             "not used"
@@ -209,10 +209,10 @@ class Inputs:
 
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._options.domain
-        if topic.publishers:
+        if topic.writers.connected:
             silent = f"no valid message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
             return f"{silent}; check the driver and the network"
-        if topic.incompatible:
+        if topic.writers.incompatible:
             return (
                 f"the publisher of {topic.name} in domain {domain} has an incompatible QoS; publish with reliable QoS"
             )

@@ -193,7 +193,8 @@ class Localization:
         widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
         self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame_of(scan)))
         self._localizer_map = scan.map_id
-        self._health.note(f"published {name} ({reason}): {place}")
+        line = f"published {name} ({reason}): {place}"
+        self._health.note(line, line)
 
     def publish_transform(self) -> None:
         """Publish the transform from the map to the odometry frame, if that is wanted and it is time."""

@@ -11,10 +11,11 @@ import hashlib
 import multiprocessing
 import os
 import pickle
-import queue
 import signal
 import threading
+import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -62,32 +63,42 @@ class MapConverter:
 
     def __init__(self, done: Callable[[], None], surface: float | None = None) -> None:
         self._done, self._surface = done, surface
-        self._grids: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._results: queue.SimpleQueue[Converted] = queue.SimpleQueue()
         self._digest = b""
+        self._next: bytes | None = None  # the grid that is converted next
+        self._work: Future[Converted] | None = None
         self._process: _Process | None = None
+        self._used = time.monotonic()
         self._ended = False
-        self.busy = False
-        self.ready = threading.Event()
         self._starting = threading.Lock()  # no process starts after the end
-        self._thread = threading.Thread(target=self._run, name="map conversion", daemon=True)
-        self._thread.start()
+        self._pool = ThreadPoolExecutor(1, "map conversion")
+        self.ready = self._pool.submit(self._answer, b"")  # starts the process, which loads the code
+
+    @property
+    def busy(self) -> bool:
+        """Return whether a result is still to be taken."""
+        return self._work is not None
 
     def take(self, grid: SerializedGrid) -> None:
         """Convert a grid, unless it is the one that was converted last; a grid that still waits is left out."""
         digest = digest_of(grid.serialized)
         if digest != self._digest:
-            self._digest, self.busy = digest, True
-            self._grids.put(grid.serialized)
+            self._digest, self._next = digest, grid.serialized
+            self._begin()
+
+    def _begin(self) -> None:
+        if self._work is None and self._next is not None:
+            self._work, self._next = self._pool.submit(self._convert, self._next), None
+            self._work.add_done_callback(lambda _: self._done())
 
     def result(self) -> Converted | None:
         """Return the result of the last conversion once, None where there is none."""
-        try:
-            found = self._results.get_nowait()
-        except queue.Empty:
-            return None
-        self.busy = not self._grids.empty()
-        return found
+        if self._work is not None and self._work.done():
+            found, self._work, self._used = self._work.result(), None, time.monotonic()
+            self._begin()
+            return found
+        if self._work is None and self.ready.done() and time.monotonic() - self._used > CONVERSION_IDLE:
+            self._stop()
+        return None
 
     def end(self, seconds: float) -> bool:
         """Stop converting, and return whether thread and process have ended within a time."""
@@ -95,29 +106,12 @@ class MapConverter:
             self._ended = True
             if self._process is not None:
                 self._process.kill()
-        self._grids.put(None)
-        self._thread.join(seconds)
-        return not self._thread.is_alive()
-
-    def _run(self) -> None:
-        self._answer(b"")  # starts the process, which loads the code
-        self.ready.set()
-        idle: float | None = None
-        while not self._ended:
-            try:
-                grid = self._grids.get(timeout=idle)
-                while not self._grids.empty():
-                    grid = self._grids.get()
-            except queue.Empty:
-                self._stop()
-                idle = None
-                continue
-            if grid is None:
-                break
-            self._results.put(self._convert(grid))
-            self._done()
-            idle = CONVERSION_IDLE
+        self._pool.shutdown(wait=False)
+        works: list[Future[Any]] = [one for one in (self.ready, self._work) if one is not None]
+        if wait(works, seconds).not_done:
+            return False
         self._stop()
+        return True
 
     def _convert(self, grid: bytes) -> Converted:
         if len(grid) > MAX_GRID_BYTES:

@@ -84,7 +84,7 @@ class Node:
         prefix = f"{options.namespace.strip('/')}/" if options.namespace else ""
         names = prefix, options.hardware_id or options.namespace.strip("/")
         self._health = Health(self._topics.diagnostics, self._topics.status, names, log)
-        self._inputs = Inputs(options, self._topics, self._odometry, self._clock, self._health.remind)
+        self._inputs = Inputs(options, self._topics, self._odometry, self._clock, self._health.note)
         shared = self._frames, self._odometry, self._clock
         self._localization = Localization(options, self._topics, self._health, *shared)
         self._waiting = Waiting(participant, self._topics.subscriptions)
@@ -96,7 +96,7 @@ class Node:
     def wait_until_ready(self) -> None:
         """Return when a map that comes would be converted at once."""
         if self._converter is not None:
-            self._converter.ready.wait()
+            self._converter.ready.result()
 
     def run(self) -> None:
         """Search scans until `end` is called."""

@@ -54,7 +54,7 @@ class Transforms:
     @property
     def lossy(self) -> bool:
         """Return whether transforms that were published once may be lost."""
-        return self.static and self.subscription.best_effort
+        return self.static and self.subscription.writers.best_effort
 
 
 class Topics:

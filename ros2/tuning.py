@@ -47,6 +47,7 @@ SEPARATE_NS = 1_000_000_000  # ns and time count once: their errors are the same
 MOVED = 0.5  # m, or
 TURNED = math.radians(30.0)  # between the scans that agree, or
 RESTED_NS = 5_000_000_000  # ns at rest
+UNEXPLAINED_SCANS = 5  # that agree with no hypothesis by odometry, from which on only way counts
 FORGOTTEN_NS = 60_000_000_000  # ns after which a hypothesis without support is dropped
 MAX_HYPOTHESES = 20
 INCONCLUSIVE_NATS = 10.0  # a scan decides only if poses that are not listed score lower by at least this

@@ -71,6 +71,11 @@ class Subscription(Generic[Message]):
         published before it came. Messages then come twice.
     problem : callable
         Called with a sentence for each message that cannot be decoded.
+
+    Attributes
+    ----------
+    writers : Endpoints
+        The publishers of others.
     """
 
     def __init__(
@@ -84,26 +89,11 @@ class Subscription(Generic[Message]):
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name, self.problem, self._kind = name, problem, kind
         self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
-        self._writers = Endpoints(participant, topic_name(name), profiles, writers=True)
+        self.writers = Endpoints(participant, topic_name(name), profiles, writers=True)
 
     def take(self) -> Sequence[Message]:
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
         return [message for reader in self.readers for message in self._taken(reader)]
-
-    @property
-    def publishers(self) -> int:
-        """The number of publishers that are connected."""
-        return len(self._writers.connected)
-
-    @property
-    def incompatible(self) -> bool:
-        """Return whether there are publishers whose quality of service fits none of the readers."""
-        return self._writers.incompatible
-
-    @property
-    def best_effort(self) -> bool:
-        """Return whether a publisher is best effort."""
-        return self._writers.best_effort
 
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []

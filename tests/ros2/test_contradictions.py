@@ -57,6 +57,14 @@ def test_a_mount_that_is_turned_by_180_degrees_is_never_agreed() -> None:
     assert first_agreed(scans) is None
 
 
+def test_turning_in_place_does_not_hide_a_mount_that_is_turned() -> None:
+    turned = RigidTransform(0.0, 0.0, math.pi)
+    way = [*LONG, *(RigidTransform(LONG[-1].x, 0.0, 0.2 * k) for k in range(20))]
+    scans = [replace(one, pose=one.pose.compose(turned)) for one in drive(way) if one.pose is not None]
+    assert first_agreed(scans) is None
+    assert first_agreed(drive(way)) is not None
+
+
 @pytest.mark.parametrize("ahead", [100, 6, -100])
 def test_a_single_stamp_of_another_time_is_left_out(ahead: int) -> None:
     scans = drive(LONG)
