@@ -93,10 +93,10 @@ class Health:
     def beat(self, state: State, stamp: Time, values: Mapping[str, str], doubt: str = "") -> None:
         """Publish the state, with why it is no better: at once where it or the map has changed, else once a second."""
         now = time.monotonic()
-        changed, map_changed = state is not self._state, values.get("map") != self._map
+        changed, map_changed = state is not self._state, values.get("map_id") != self._map
         if not changed and not map_changed and now - self._beat < 1.0:
             return
-        self._beat, self._map = now, values.get("map")
+        self._beat, self._map = now, values.get("map_id")
         values = {"state": state.value, **values}
         level, message = STATES[state]
         verdict = level, f"{message}: {doubt}" if doubt and level != OK else message

@@ -51,7 +51,7 @@ class Requests:
             return
         place, turn = agreed.pose.pose.position, agreed.pose.pose.orientation
         values = {
-            "map": map_name,
+            "map_id": map_name,
             "frame_id": agreed.header.frame_id,
             "x": f"{place.x:.4f}",
             "y": f"{place.y:.4f}",
