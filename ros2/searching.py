@@ -109,6 +109,7 @@ class Searcher:
 
     def submit(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> None:
         """Search a scan; only while not `busy`."""
+        self._deadline = linefix.Deadline(time.monotonic() + SEARCH_SECONDS)
         self._search = self._pool.submit(self._searched, index, looks, generation)
         self._search.add_done_callback(lambda _: self._found())
 
@@ -128,7 +129,7 @@ class Searcher:
     def _searched(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> Found:
         begun, answer, problem = time.monotonic(), None, ""
         try:
-            answer = locate(index, looks, self._options, self._deadline.within(begun + SEARCH_SECONDS))
+            answer = locate(index, looks, self._options, self._deadline)
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan
