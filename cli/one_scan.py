@@ -42,7 +42,7 @@ PLACES: Names = {  # options of a search, by their places in a request
 
 @dataclass(frozen=True, slots=True)
 class SearchOptions:
-    """Where and how to search, as options."""
+    """The options of a search: the part of the map and the time."""
 
     near: Annotated[tuple[float, float, float] | None, option("Search only near this pose.", "X Y THETA")] = None
     radius: Annotated[float, option("Maximum distance from --near.", "METRES")] = 1.0

@@ -18,7 +18,7 @@ Lines = Iterable[str]
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """How an answer is printed, as an option."""
+    """The option that prints an answer as JSON."""
 
     as_json: Annotated[bool, flag("Print the complete answer as JSON.", "--json")] = False
 

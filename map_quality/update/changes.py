@@ -47,7 +47,7 @@ def draft_changes(
     cuts = find_cuts(evidence, judged, known, sigma, deadline)
     extended, added = _new_walls(judged, known, {cut.segments[0] for cut in cuts}, sigmas, sigma, deadline)
     added = [one for one, _ in shown(_joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline))]
-    # What remains of a wall that moved is not seen again; its faces may have no end in common.
+    # Nothing of a wall that moved is seen again; its faces may have no end in common.
     whole = [replace(cut, code="removed", new=NO_WALLS, sigma=NO_SIGMA) for cut in cuts if not cut.rest_read]
     gone = [one for one, _ in shown(_joined_in_map(whole, known, tuning.NEW_JOINED, deadline))]
     moved, added = _moves(gone, added, known, deadline)

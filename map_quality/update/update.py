@@ -137,7 +137,7 @@ class _Update:
             len(index.segments) == index.directed,
         )
         names = list(dict.fromkeys(one.visit for one in scans))
-        # What is proposed must not depend on the order of the visits.
+        # The proposal must not depend on the order of the visits.
         return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, oriented, deadline))
 
     @property

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("ray")
 
 from tests.batch.logs import rows, write_log, write_room
 
@@ -42,6 +41,7 @@ cluster.shutdown()
 
 
 @pytest.mark.long
+@pytest.mark.skipif(find_spec("ray") is None, reason="needs Ray")
 def test_a_lost_node_costs_no_row(tmp_path: Path) -> None:
     log, room, out = write_log(tmp_path / "a.parquet", 400), write_room(tmp_path), tmp_path / "out.parquet"
     command = [sys.executable, "-c", SCRIPT, str(log), str(room), str(out)]

@@ -165,7 +165,7 @@ async def _in_turns(
         async with looking_up_map(exchange, on, job.deadline, oriented=oriented) as source:
             reference = source.references[None]
             beginning = partial(begin, operation, services.lookup, source, job, oriented=oriented)
-            # What is read and indexed does not look at the deadline: not in a slot of a search.
+            # Reading and indexing do not look at the deadline, so they take no slot of a search.
             begun = await services.indexing.run(queued(beginning), job.deadline, exchange.ticket)
         if not await in_short_slots(exchange, begun.take_turn, job.deadline):  # the rest then searches nothing
             while await run(begun.take_turn):
