@@ -156,15 +156,13 @@ def server_at(url: str) -> Iterator[Server]:
 
     Raises
     ------
-    RefusedError
-        When the client is not installed.
     WrongUseError
-        When the URL is none, or no header can hold the key.
+        When the client is not installed, the URL is none, or no header can hold the key.
     """
     try:
         from linefix_client import Client
     except ModuleNotFoundError as error:
-        raise RefusedError(
+        raise WrongUseError(
             f"--server needs {error.name}: in a checkout, pip install ./clients/python, or omit --server"
         ) from None
     try:

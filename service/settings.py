@@ -250,7 +250,7 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     if any(argument.partition("=")[0] == "--keys" for argument in arguments):
         # Arguments of a process are seen by everyone on the machine.
         raise SettingsError(
-            "keys: set LINEFIX_KEYS, or name a file with --keys-file; other users of the machine can see arguments"
+            "keys: name their file with --keys-file or LINEFIX_KEYS_FILE; other users of the machine can see arguments"
         )
     parser = argparse.ArgumentParser(prog="linefix serve", description=HELP, allow_abbrev=False)
     try:

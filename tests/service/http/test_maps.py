@@ -7,7 +7,7 @@ import sqlite3
 import httpx
 
 from linefix.documents import examples
-from tests.running import RunningService
+from tests.running import RunningService, until
 
 
 def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:
@@ -159,6 +159,7 @@ def test_a_damaged_map_is_named_and_not_served(service: RunningService) -> None:
     assert running.client.get("/v1/maps/whole").status_code == 200
     listed = running.client.get("/v1/maps").json()
     assert ("whole" in {item["map_id"] for item in listed["maps"]}, listed["corrupt"]) == (True, ["damaged"])
+    until(lambda: "map quarantined" in running.log())  # lines are written by a thread of their own
     quarantined = [line for line in running.log().splitlines() if "map quarantined" in line]
     assert len(quarantined) == 1
     assert '"damaged"' in quarantined[0]
