@@ -9,6 +9,7 @@ import numpy as np
 
 from registration import RigidTransform
 from registration.layout import POSE, Floats, Records
+from registration.observability import most_parallel_up_to
 
 from .deadline import Deadline
 from .index.joint import JointIndex
@@ -161,7 +162,8 @@ class SearchContext:
     @cached_property
     def work(self) -> ScoreWork:
         """The arrays that kernels write to while they score poses."""
-        return ScoreWork.of(len(self.lines.rows), len(self.index.walls.rows))
+        lines, walls = len(self.lines.rows), len(self.index.walls.rows)
+        return ScoreWork.of(lines, walls, most_parallel_up_to(lines))
 
     @cached_property
     def question(self) -> Question:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from registration.layout import Floats, Records
-from registration.observability import most_parallel_up_to
 
 from .layout import HELD, SCRATCH, WALL_SUMS, Integers, record
 
@@ -193,10 +192,10 @@ class ScoreWork(NamedTuple):
     parallel: Floats
 
     @classmethod
-    def of(cls, lines: int, walls: int) -> ScoreWork:
+    def of(cls, lines: int, walls: int, parallel: Floats) -> ScoreWork:
         """Return the arrays for a scan of so many lines on a map of so many walls."""
         held, wall_sums = np.zeros(lines, HELD), np.zeros(walls, WALL_SUMS)
-        return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), most_parallel_up_to(lines))
+        return cls(held, wall_sums, np.zeros(lines, np.int64), record(SCRATCH), parallel)
 
 
 class Model(NamedTuple):
