@@ -57,7 +57,7 @@ unit: kernels
 serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000, or as ARGS="--port 8001" says
 	$(BIN)/python -m service $(ARGS)
 
-long: $(VENV)/.ready  ## the long forms of the other tests (7 min)
+long: $(VENV)/.ready  ## the long forms of the other tests (5 to 7 min)
 	$(BIN)/python -m pytest -m long --ignore tests/faults -n 2 --dist loadfile
 
 faults: $(VENV)/.ready  ## kill, fill, flip, drain and load for hours: the long forms of tests/faults
