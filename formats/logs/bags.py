@@ -29,7 +29,7 @@ from ..limits import MAX_MESSAGE_BYTES
 from ..report import Notes, shown
 from .folders import recorded_files
 from .mcap_files import McapFile
-from .recording import CDR, ROS1, Connection, RawMessage, RecordedFile
+from .recording import CDR, ROS1, Connection, RawMessage
 from .rosbag_files import RosbagFile
 
 SCAN = "sensor_msgs/msg/LaserScan"
@@ -71,7 +71,7 @@ class Bag:
 
     name: str
     format: str
-    _files: tuple[RecordedFile, ...]
+    _files: tuple[McapFile | RosbagFile, ...]
     _notes: Notes
     _folder: Path
 
@@ -150,7 +150,7 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
     notes = Notes() if notes is None else notes
     paths, name = recorded_files(path, notes), name_of(path)
     with ExitStack() as stack:
-        files: list[RecordedFile] = []
+        files: list[McapFile | RosbagFile] = []
         for one in paths:
             try:
                 with refusing(name if len(paths) == 1 else one.name, _mended_by(one.name), one.parent):

@@ -5,12 +5,11 @@ https://mcap.dev/spec
 
 from __future__ import annotations
 
-import heapq
 import struct
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator
 from io import BufferedReader, FileIO
-from itertools import count
 from pathlib import Path
 
 import zstandard
@@ -101,7 +100,11 @@ class McapFile:
     def messages(self, connections: Collection[Connection]) -> Iterator[RawMessage]:
         """Yield the messages of some connections, by the time of their reception where the file has an index."""
         wanted = {connection.key: connection for connection in connections}
-        found = self._by_index(wanted.keys()) if self._chunks else self._in_file_order()
+        found = (
+            self._by_index(wanted.keys())
+            if self._chunks
+            else (one for one in self._records() if isinstance(one, Message))
+        )
         for message in found:
             if message.channel_id in wanted:
                 yield RawMessage(wanted[message.channel_id], message.log_time, message.data)
@@ -190,24 +193,18 @@ class McapFile:
         except BROKEN:
             return
 
-    def _in_file_order(self) -> Iterator[Message]:
-        yield from (record for record in self._records() if isinstance(record, Message))
-
     def _by_index(self, wanted: Collection[int]) -> Iterator[Message]:
         """Yield messages from the chunks that hold some of the wanted ones, by time; chunks may overlap in time."""
-        waiting: list[tuple[int, int, Message]] = []
-        number = count()
+        waiting: list[Message] = []
         for chunk in sorted(self._chunks, key=lambda one: (one.message_start_time, one.chunk_start_offset)):
             held = chunk.message_index_offsets
             if held and not any(key in held for key in wanted):
                 continue
-            while waiting and waiting[0][0] < chunk.message_start_time:
-                yield heapq.heappop(waiting)[2]
-            for record in self._chunk_at(chunk):
-                if isinstance(record, Message) and record.channel_id in wanted:
-                    heapq.heappush(waiting, (record.log_time, next(number), record))
-        while waiting:
-            yield heapq.heappop(waiting)[2]
+            ready = bisect_left(waiting, chunk.message_start_time, key=lambda one: one.log_time)
+            yield from waiting[:ready]
+            found = (one for one in self._chunk_at(chunk) if isinstance(one, Message) and one.channel_id in wanted)
+            waiting = sorted([*waiting[ready:], *found], key=lambda one: one.log_time)
+        yield from waiting
 
     def _chunk_at(self, index: ChunkIndex) -> list[McapRecord]:
         self._file.seek(index.chunk_start_offset)

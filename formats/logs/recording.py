@@ -1,10 +1,9 @@
-"""The common interface of the files of a recording: connections and raw messages."""
+"""Connections and raw messages, as the files of a recording have them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 CDR, ROS1 = "cdr", "ros1"  # the encodings that are read here
 
@@ -42,32 +41,6 @@ class RawMessage(NamedTuple):
     connection: Connection
     received: int  # ns since the epoch, by the clock of the recorder
     data: bytes
-
-
-class RecordedFile(Protocol):
-    """One file of a recording, open."""
-
-    @property
-    def name(self) -> str:
-        """The file's name."""
-
-    @property
-    def connections(self) -> list[Connection]:
-        """All topics of the file."""
-
-    @property
-    def start(self) -> int:
-        """Time of the first message, nanoseconds; 0 where there is none."""
-
-    @property
-    def remarks(self) -> list[tuple[str, str, int]]:
-        """Code, sentence and count of each part of the file that cannot be read; complete after the last message."""
-
-    def messages(self, connections: Collection[Connection]) -> Iterator[RawMessage]:
-        """Yield the messages of some connections of this file, in the order in which they were received."""
-
-    def close(self) -> None:
-        """Close the file."""
 
 
 def ros_type(name: str) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -26,22 +24,6 @@ FAR_SIZES = 10.0  # times the diagonal of the place with most lines; buildings o
 DROPPED_FROM = 1000.0  # m; from there on a few lines are left out
 FEW_LINES = 2  # enclose nothing; and this fraction of all lines:
 FEW_FRACTION = 0.01
-
-
-@dataclass(frozen=True, slots=True)
-class Places:
-    """Groups of lines far from one another.
-
-    Attributes
-    ----------
-    of_line : (n,) int
-        The place of each line; 0 is the one with most lines and what is near it.
-    distances : (k,) float
-        From place 0, metres.
-    """
-
-    of_line: Integers
-    distances: Floats
 
 
 def near_lines(endpoints: Floats, layer_of: Integers, drawing: Drawing) -> Flags:
@@ -67,13 +49,14 @@ def near_lines(endpoints: Floats, layer_of: Integers, drawing: Drawing) -> Flags
     else:
         where = _named(endpoints, layer_of, ~kept, drawing)
         drawing.notes.add_dropped("long_lines", f"lines longer than {MAX_LENGTH:g} m: {where}", int((~kept).sum()))
-    places = _places(endpoints, kept)
-    near: Flags = kept & (places.of_line == 0)
+    apart = _apart(endpoints, kept)
+    near: Flags = kept & (apart == 0.0)
     far = kept & ~near
     if not far.any():
         return kept
-    where = f"{places.distances[1:].min():.0f} m or more from the others: {_named(endpoints, layer_of, far, drawing)}"
-    if far.sum() <= _few(int(kept.sum())) and places.distances[1:].min() >= DROPPED_FROM:
+    least = float(apart[far].min())
+    where = f"{least:.0f} m or more from the others: {_named(endpoints, layer_of, far, drawing)}"
+    if far.sum() <= _few(int(kept.sum())) and least >= DROPPED_FROM:
         drawing.notes.add_dropped("far_lines", f"lines {where}", int(far.sum()))
         return near
     corners = endpoints[kept].reshape(-1, 2)
@@ -93,8 +76,11 @@ def _few(count: int) -> float:
     return max(FEW_LINES if count > 2 * FEW_LINES else 0, FEW_FRACTION * count)
 
 
-def _places(endpoints: Floats, kept: Flags) -> Places:
-    """Group lines by cells that touch; what is near the group with most lines, for its size, belongs to it."""
+def _apart(endpoints: Floats, kept: Flags) -> Floats:
+    """Return how far the place of each line is from the one with most lines, metres; 0 for what is near its size.
+
+    Lines in cells that touch are one place.
+    """
     middles = 0.5 * (endpoints[:, :2] + endpoints[:, 2:])
     cells, cell_of = np.unique(np.floor(middles / APART), axis=0, return_inverse=True)
     cell_of = cell_of.reshape(-1)
@@ -111,9 +97,7 @@ def _places(endpoints: Floats, kept: Flags) -> Places:
     np.minimum.at(nearest, group, apart)
     is_far = nearest > max(APART, FAR_SIZES * float(np.hypot(*(high - low))))
     is_far[first] = False
-    numbers = np.where(is_far, np.cumsum(is_far), 0)
-    distances = np.concatenate([[0.0], nearest[is_far]])
-    return Places(numbers[group], distances)
+    return np.where(is_far, nearest, 0.0)[group]
 
 
 def _named(endpoints: Floats, layer_of: Integers, some: Flags, drawing: Drawing) -> str:
