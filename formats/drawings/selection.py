@@ -52,6 +52,8 @@ NOT_SEEN = {
     "indoor": ("area", *KINDS),
     "natural": ("water", "wood", "grassland", "scrub", "tree_row"),
     "leisure": ("park", "pitch", "garden", "playground"),
+    "linetype": ("*dash*", "*hidden*", "*strichl*", "*verdeckt*", "acad_iso0[234]*"),  # above the head, or covered
+    "stroke-dasharray": "*",
     "feature_type": ("geofence", "section", "venue", "relationship", "occupant", "address", *KINDS),
 }
 SEEN = (*TYPES, "indoor", "barrier", "building", "feature_type")  # name what an entity is

@@ -34,7 +34,10 @@ from .cells import Grid
 from .tuning import UNKNOWN_GREYS
 
 PICTURES = ("PPM", "PNG", "BMP", "JPEG")  # what Pillow may take a picture for
-OTHERS = {b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF"}
+OTHERS = {
+    b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF",
+    b"Pf": "a PFM", b"PF": "a PFM",
+}  # fmt: skip
 NAN = re.compile(r"[-+]?\.?nan(\(ind\)|\(snan\))?", re.IGNORECASE)
 WORDS = {"no": 0, "false": 0, "off": 0, "yes": 1, "true": 1, "on": 1}  # of YAML 1.1, as ROS reads it
 MAX_YAW = 1.01 * math.tau  # rad; a turn that was rounded
@@ -51,6 +54,8 @@ class Description:
     ----------
     image : str
         Name of the picture, without folders.
+    folder : str
+        Of the picture, below that of the YAML; empty for others.
     resolution : float
         Metres.
     origin : RigidTransform
@@ -62,6 +67,7 @@ class Description:
     """
 
     image: str
+    folder: str
     resolution: float
     origin: RigidTransform
     negate: bool
@@ -78,7 +84,7 @@ def read_grid(
     Parameters
     ----------
     path : Path
-        Of the YAML; the picture is expected in the same folder, whatever folder the YAML names.
+        Of the YAML; the picture is expected in the same folder, or in a folder in it that the YAML names.
     options : ImportOptions
         Which grey value unknown cells have.
     notes : Notes
@@ -91,7 +97,7 @@ def read_grid(
         When either file is missing, too large or not what it should be.
     """
     told = read_description(path, notes)
-    picture = path.parent / told.image if pictures is None else pictures.get(told.image)
+    picture = _beside(path, told) if pictures is None else pictures.get(told.image)
     if picture is None:
         raise IncompleteFileError(
             "there is no such file among those of the request; add it", argument=shown(told.image)
@@ -158,7 +164,7 @@ def read_description(path: Path, notes: Notes) -> Description:
     if resolution > COARSE:
         notes.add_assumed("resolution", f"a cell is {resolution:g} m wide; if these are centimetres, divide by 100")
     return Description(
-        _image(values["image"], name),
+        *_image(values["image"], name),
         resolution,
         _origin(values["origin"], name, notes),
         bool(_number(values, "negate", name, 0, 1, 0.0)),
@@ -168,12 +174,19 @@ def read_description(path: Path, notes: Notes) -> Description:
     )
 
 
-def _image(value: Any, name: str) -> str:
-    image = PureWindowsPath(value).name if isinstance(value, str) else ""
+def _beside(path: Path, told: Description) -> Path:
+    named = path.parent / told.folder / told.image
+    return named if named.exists() else path.parent / told.image
+
+
+def _image(value: Any, name: str) -> tuple[str, str]:
+    """Return the name of the picture, and its folder where that is below the folder of the YAML."""
+    whole = PureWindowsPath(value if isinstance(value, str) else "")
+    image = whole.name
     if not image or "\0" in image:
         found = "a name that no file can have" if isinstance(value, str) else kind_of(value)
         raise MalformedFileError(f"expected image to be the name of a file, found {found}", argument=name)
-    return image
+    return image, "" if whole.anchor or ".." in whole.parts else whole.parent.as_posix()
 
 
 def _number(
@@ -239,7 +252,10 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
     """
     name = name_of(path)
     content = read_bounded(path, MAX_MAP_BYTES)
+    kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), None)
     try:
+        if kind is not None:
+            raise UnidentifiedImageError
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
@@ -256,8 +272,7 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
             f"expected at most {MAX_CELLS} pixels, found many more; crop the map", argument=name
         ) from error
     except UnidentifiedImageError as error:
-        kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), "not a picture")
-        said = f"is {kind}; expected PGM, PNG, BMP or JPEG. Save it as PNG"
+        said = f"is {kind or 'not a picture'}; expected PGM, PNG, BMP or JPEG. Save it as PNG"
         raise MalformedFileError(said, argument=name) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(

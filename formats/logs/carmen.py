@@ -33,6 +33,7 @@ FIELDS_OF_VIEW = (
 HALF_TURN = (180, 181, 360, 361, 720, 721)  # beams of a scanner of 180 degrees
 FINEST = 0.05  # degrees between beams; a PARAM below it is in radians
 FEW_BEAMS = 100  # up to which the report has no note
+USED = ("_laser_max", "_laser_resolution", "_laser_fov")  # the ends of the names of PARAM messages that are read
 
 
 Settings = dict[str, str]
@@ -71,9 +72,11 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
     settings: Settings = {}
     for number, words in _messages(path, notes):
         kind = words[0]
-        if kind == "PARAM" and len(words) > 2:
-            settings[words[1]] = words[2]
         seen[kind] += 1
+        if kind == "PARAM" and len(words) > 2 and words[1].endswith(USED):
+            settings[words[1]] = words[2]
+            notes.add_read("settings", "PARAM messages of the laser", 1)
+            continue
         if kind not in KINDS or (wanted is not None and kind != wanted):
             notes.add_dropped(f"message_{kind.lower()}", f"{kind} messages", 1)
             continue
@@ -162,8 +165,13 @@ def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple
     elif step and field is None:
         field = n * step if n % 2 == 0 and n * step in (180.0, 360.0) else (n - 1) * step
     elif not (step or field):
-        known = n in FIELDS_OF_VIEW or n in HALF_TURN
-        why = "by the number of ranges" if known else "which neither a PARAM nor the number of ranges says"
+        why = "by the number of ranges"
+    if not (step or field or n in FIELDS_OF_VIEW or n in HALF_TURN or n <= FEW_BEAMS):
+        raise IncompleteFileError(
+            f"found {n} ranges, whose field of view neither a PARAM nor the number of ranges says, expected a known "
+            f"scanner; put the line `PARAM laser_{side}_laser_fov DEGREES` in front of the scans",
+            argument="ranges",
+        )
     if n not in FIELDS_OF_VIEW and n % 2 == 0 and field in (None, n * step if step else field):
         spaces = n  # the last end is left out: 180 beams are one degree apart, 181 have one at either end
     field = field or FIELDS_OF_VIEW.get(n, 180.0)

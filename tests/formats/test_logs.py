@@ -63,7 +63,7 @@ FIELD, STEP = "PARAM laser_front_laser_fov", "PARAM laser_front_laser_resolution
         ("", 180, -90, 89, None), ("", 361, -90, 90, None), ("", 541, -135, 135, "number of ranges"),
         ("", 1081, -135, 135, "number of ranges"), ("", 381, -95, 95, "number of ranges"),
         ("", 682, -119.71, 119.71, "number of ranges"), ("", 401, -50, 50, "number of ranges"),
-        ("", 500, -90, 89.64, "neither a PARAM"), (f"{STEP} 0.25\n", 1081, -135, 135, "by the PARAM"),
+        (f"{FIELD} 360\n", 1440, -180, 179.75, "by the PARAM"), (f"{STEP} 0.25\n", 1081, -135, 135, "by the PARAM"),
         (f"{FIELD} 190\n", 191, -95, 95, "by the PARAM"), (f"{FIELD} 180\n{STEP} 1.0\n", 180, -90, 89, None),
         (f"{FIELD} 240\n{STEP} 0.36\n", 667, -120, 119.76, "by the PARAM"),
         (f"{FIELD} 180\n{STEP} 0.25\n", 541, -135, 135, "contradict"),
@@ -78,6 +78,21 @@ def test_the_field_of_view_of_flaser(
     np.testing.assert_allclose(np.degrees(scan.laser.angles[[0, -1]]), [first, last], atol=0.01)
     found = [n.message for n in log.report.assumed if n.code == "field_of_view"]
     assert (said is None and not found) or (said is not None and said in found[0])
+
+
+@pytest.mark.parametrize("params", ["", f"{FIELD} 180\n{STEP} 0.25\n"])
+@pytest.mark.parametrize("beams", [500, 1440])
+def test_an_unknown_number_of_beams_needs_a_param(tmp_path: Path, params: str, beams: int) -> None:
+    log = read_log(written(tmp_path, f"{params}FLASER {beams} {'1.0 ' * beams} 0 0 0 0 0 0 1 host 1\n"))
+    with pytest.raises(MalformedFileError, match=f"{beams} ranges.*`PARAM laser_front_laser_fov DEGREES`"):
+        list(log)
+
+
+def test_settings_that_are_used_are_not_dropped(tmp_path: Path) -> None:
+    log = read_log(written(tmp_path, f"{FIELD} 180\nPARAM robot_length 0.5 1 host 1\n{FLASER}"))
+    list(log)
+    assert {n.code: n.count for n in log.report.read} == {"settings": 1, "scans": 1}
+    assert {n.code: n.count for n in log.report.dropped} == {"message_param": 1}
 
 
 def test_a_greatest_range_of_flaser_is_no_return(tmp_path: Path) -> None:

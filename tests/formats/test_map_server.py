@@ -201,6 +201,23 @@ def test_a_picture_is_looked_for_beside_its_description_alone(tmp_path: Path) ->
         read_map(inner / "map.yaml")
 
 
+@pytest.mark.parametrize("image", ["pictures/map.pgm", "./pictures/map.pgm", "pictures\\map.pgm"])
+def test_a_picture_may_be_in_a_folder_below(tmp_path: Path, image: str) -> None:
+    path = write(tmp_path, l_room())
+    expected = walls(read_map(path))
+    path.write_text(path.read_text().replace("map.pgm", image))
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "map.pgm").rename(tmp_path / "pictures" / "map.pgm")
+    assert walls(read_map(path)) == expected
+
+
+def test_a_pfm_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, l_room())
+    (tmp_path / "map.pgm").write_bytes(b"Pf\n8 8\n-1.0\n" + bytes(256))
+    with pytest.raises(MalformedFileError, match=r"is a PFM; expected PGM.* Save it as PNG"):
+        read_map(path)
+
+
 def test_pictures_too_large_or_cut_off_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path, l_room())
     (tmp_path / "map.pgm").write_bytes(b"P5 7000 7000 255\n")

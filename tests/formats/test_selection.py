@@ -226,3 +226,38 @@ def test_an_option_that_says_nothing_of_a_file_is_refused(tmp_path: Path) -> Non
     ):
         with pytest.raises(InvalidOptionError, match="omit it"):
             read_map(file, options)
+
+
+def dashed(tmp_path: Path, kind: str) -> Path:
+    """Three lines, of which two are drawn with dashes: one by itself, one by its layer or group."""
+    if kind == "svg":
+        styled = '<line x1="0" y1="2" x2="5" y2="2" stroke="red" style="stroke-dasharray: 4 2"/>'
+        plain = '<line x1="0" y1="0" x2="5" y2="0" stroke="red" stroke-dasharray="none"/>'
+        inner = '<g stroke-dasharray="3"><line x1="0" y1="4" x2="5" y2="4" stroke="red"/></g>'
+        return svg(tmp_path, plain + styled + inner)
+    document = new(setup=True)
+    document.linetypes.add("HIDDEN", [0.3, 0.2, -0.1])
+    document.layers.add("BEAMS", linetype="HIDDEN")
+    for y, attributes in enumerate(({}, {"linetype": "DASHED2"}, {"layer": "BEAMS"})):
+        document.modelspace().add_line((0.0, 2.0 * y), (5.0, 2.0 * y), dxfattribs=attributes)
+    document.saveas(tmp_path / "plan.dxf")
+    return tmp_path / "plan.dxf"
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "told"),
+    [("dxf", "linetype", ("linetype=DASHED2", "linetype=HIDDEN")), ("svg", "stroke-dasharray", ("=4 2", "=3"))],
+)
+def test_dashed_lines_are_left_out_and_can_be_chosen(
+    tmp_path: Path, kind: str, key: str, told: tuple[str, ...]
+) -> None:
+    path = dashed(tmp_path, kind)
+    found = read_map(path, ImportOptions(units="m"))
+    assert len(found.map.segments) == 1
+    note = next(one for one in found.report.dropped if one.code == "not_seen")
+    assert note.count == 2
+    assert all(one in note.message for one in told)
+    assert "set the option where" in note.message
+    pattern = "*" if kind == "svg" else "D*"
+    chosen = read_map(path, ImportOptions(units="m", where=(f"{key}={pattern}",)))
+    assert len(chosen.map.segments) == (3 if kind == "svg" else 1)

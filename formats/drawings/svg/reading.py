@@ -59,7 +59,7 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 def _read_shapes(root: Element, drawing: Drawing) -> None:
     for element, place in Visible(root, drawing).shapes():
-        if not drawing.takes(place.layers, element.attrib):
+        if not drawing.takes(place.layers, {**element.attrib, "stroke-dasharray": place.dashes}):
             continue
         kind = kind_of(element)
         for points, closed in SHAPES[kind](Measure(element, place.viewport, drawing.name)):

@@ -17,7 +17,7 @@ from .xml import kind_of
 # Those by which it is decided what is drawn, and where.
 PROPERTIES = frozenset((
     "display", "visibility", "opacity", "stroke", "stroke-opacity", "stroke-width", "fill", "fill-opacity",
-    "transform", "transform-origin", "transform-box", "clip-path", "mask",
+    "stroke-dasharray", "transform", "transform-origin", "transform-box", "clip-path", "mask",
 ))  # fmt: skip
 OF_CSS_ALONE = frozenset({"translate", "rotate", "scale"})  # attributes of these names are something else
 SCREEN = re.compile(r"(only )?(screen|all)?")  # the media whose rules hold

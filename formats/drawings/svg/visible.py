@@ -61,6 +61,7 @@ class Place:
     matrix: Matrix = field(default_factory=svgelements.Matrix)
     viewport: Viewport = field(default_factory=Viewport)
     stroke_width: float = 0.0
+    dashes: str = ""
     visible: bool = True
     stroked: bool | None = None
     filled: bool | None = None
@@ -169,6 +170,7 @@ class Visible:
             layers=(*outer.layers, *filter(None, names)),
             groups=(*outer.groups, *filter(None, [group])),
             matrix=outer.matrix if matrix is None else matrix * outer.matrix,
+            dashes=style.get("stroke-dasharray", outer.dashes),
             stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
             visible=visibility == "visible" if visibility else outer.visible,
             stroked=_paints(style.get("stroke"), style.get("stroke-opacity"), outer.stroked),
