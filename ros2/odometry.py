@@ -12,7 +12,7 @@ from registration import IDENTITY, RigidTransform
 from .clock import NS, Clock, nanoseconds
 from .messages import Odometry, Time
 from .transforms import Floats, matrix_in_space, matrix_of, planar
-from .tuning import ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
+from .tuning import CLOCK_BACK_NS, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
@@ -56,6 +56,7 @@ class OdometryHistory:
         self._tracks = 0  # that came before, of other sources
         self._speeds: deque[tuple[int, Speed]] = deque(maxlen=KEPT)
         self._received = 0  # the newest value, by the clock
+        self._held: tuple[int, Floats, int] | None = None  # a value whose stamp the next one has to confirm
 
     def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY, topic: str = "odometry") -> None:
         """Take a message; messages go before transforms.
@@ -94,11 +95,18 @@ class OdometryHistory:
             self._add(stamp, odom_from_base, frame, TRANSFORMS)
 
     def _add(self, stamp: int, odom_from_base: Floats, frame: str, source: str) -> None:
+        """Add a value; a stamp far from the time by odometry counts when the next one confirms its clock."""
+        now, held, self._held = self._clock.steady(), self._held, None
         if (frame, source) != (self.frame, self.source):
             self.frame, self.source, self._track = frame, source, Track(static=False, most=KEPT)
             self._tracks += 1
-        self._received = self._clock.steady()
-        self._track.add(stamp, odom_from_base, received=self._received)
+        elif abs(self._track.newest[0] + now - self._received - stamp) > CLOCK_BACK_NS:
+            if held is None or not 0 < stamp - held[0] <= CLOCK_BACK_NS:
+                self._held = stamp, odom_from_base, now
+                return
+            self._track.add(held[0], held[1], received=held[2])
+        self._received = now
+        self._track.add(stamp, odom_from_base, received=now)
 
     @property
     def newest(self) -> tuple[int, RigidTransform, Known] | None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import linefix
@@ -114,6 +115,38 @@ def test_no_transform_is_published_before_a_scan_confirms_odometry_that_jumped()
     assert current is not None
     assert first.pose is not None
     assert (current.x, current.y) == pytest.approx((first.pose.x, first.pose.y))  # at once, not at 0.2 m/s
+
+
+@pytest.mark.parametrize("ahead", [100, 6, -100])
+@pytest.mark.parametrize("topic", ["odometry", "tf"])
+def test_a_single_stamp_of_odometry_of_another_time_is_left_out(ahead: int, topic: str) -> None:
+    clock = Clock(simulated=True)
+    history, stamps = OdometryHistory(clock), []
+    for k in range(20, 30):
+        clock.take(messages.Clock(time_of(k * SECOND // 10)))
+        stamp = k * SECOND // 10 + (ahead * SECOND if k == 25 else 0)
+        message = messages.Odometry(messages.Header(time_of(stamp), "odom"), "base_link")
+        for _ in range(2):  # transforms are looked up at each message
+            if topic == "tf":
+                history.take_transform(stamp, np.eye(4), "odom")
+            else:
+                history.take(message)
+        newest = history.newest
+        assert newest is not None
+        stamps.append((newest[0], newest[2].part))
+    assert stamps == [(k * SECOND // 10, stamps[0][1]) for k in range(20, 30)]
+
+
+def test_a_clock_of_odometry_that_was_set_counts_from_its_second_stamp() -> None:
+    clock = Clock(simulated=True)
+    history, stamps = OdometryHistory(clock), []
+    for k in range(20, 26):
+        clock.take(messages.Clock(time_of(k * SECOND // 10)))
+        stamp = k * SECOND // 10 + (100 * SECOND if k >= 23 else 0)
+        history.take(messages.Odometry(messages.Header(time_of(stamp), "odom"), "base_link"))
+        assert history.newest is not None
+        stamps.append(history.newest[0] - k * SECOND // 10)
+    assert stamps == [0, 0, 0, 0, 100 * SECOND, 100 * SECOND]
 
 
 def test_ages_are_those_of_a_simulation() -> None:
