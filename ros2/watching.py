@@ -16,11 +16,12 @@ from .clock import nanoseconds
 from .frames import Frames
 from .messages import PoseWithCovarianceStamped
 from .odometry import OdometryHistory
-from .transforms import matrix_of, planar
+from .transforms import FrameError, matrix_of, planar
 
 Floats = NDArray[np.float64]
 
 PLANAR = np.array([0, 1, 5])  # x, y and rotation about z among the six of ROS
+UNKNOWN = np.diag([1.0, 1.0, math.pi])  # covariance of a pose without a valid one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +60,14 @@ class Watch:
         Raises
         ------
         FrameError
-            When it is no pose.
+            When it is no pose, or its covariance is none: the pose then counts with a wide one.
         """
         pose, _, _ = planar(matrix_of(message.pose.pose.position, message.pose.pose.orientation))
         covariance = np.reshape(np.asarray(message.pose.covariance, dtype=np.float64), (6, 6))[np.ix_(PLANAR, PLANAR)]
-        self._amcl = _Estimate(nanoseconds(message.header.stamp), pose, _valid(covariance))
+        valid = bool((np.abs(covariance) <= tuning.MAX_COVARIANCE).all())
+        self._amcl = _Estimate(nanoseconds(message.header.stamp), pose, _positive(covariance) if valid else UNKNOWN)
+        if not valid:
+            raise FrameError(f"found a covariance with {np.abs(covariance).max():g}; 1 m and 102 degrees are assumed")
 
     def compare(
         self, scan: Observation, names: tuple[str, str], frames: Frames, odometry: OdometryHistory
@@ -96,10 +100,8 @@ class Watch:
         return _Estimate(scan.stamp, self._amcl.pose.compose(step), self._amcl.pose.carry(self._amcl.covariance, step))
 
 
-def _valid(covariance: Floats) -> Floats:
-    """Return a covariance without what is none: negative, not finite or too large numbers."""
-    if not (np.isfinite(covariance).all() and (np.abs(covariance) <= tuning.MAX_COVARIANCE).all()):
-        return np.diag([1.0, 1.0, math.pi])
+def _positive(covariance: Floats) -> Floats:
+    """Return a covariance without negative variances."""
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    valid: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    return valid
+    positive: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return positive

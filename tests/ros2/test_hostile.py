@@ -50,6 +50,16 @@ def odometry_at(x: float) -> messages.Odometry:
     return messages.Odometry(pose=messages.PoseWithCovariance(messages.Pose(messages.Point(x))))
 
 
+def twisting(omega: float) -> messages.Odometry:
+    twist = messages.Twist(angular=messages.Vector3(z=omega))
+    return messages.Odometry(messages.Header(frame_id="odom"), twist=messages.TwistWithCovariance(twist))
+
+
+def localizer_at(x: float, variance: float) -> messages.PoseWithCovarianceStamped:
+    pose = messages.PoseWithCovariance(messages.Pose(messages.Point(x)), [variance] * 36)
+    return messages.PoseWithCovarianceStamped(messages.Header(frame_id="map"), pose)
+
+
 LOOP = transform("x", "laser").transforms + transform("laser", "x").transforms
 BROKEN: dict[str, tuple[str, Any]] = {
     "a frame that is not UTF-8": ("tf_static", transform("base_link", BAD)),
@@ -75,6 +85,10 @@ BROKEN: dict[str, tuple[str, Any]] = {
     "a scan of a negative range": ("scan", replace(scan(1), range_max=-1.0)),
     "odometry at 1e308 m": ("odom", odometry_at(1e308)),
     "odometry of NaN": ("odom", odometry_at(math.nan)),
+    "odometry with a twist of NaN": ("odom", twisting(math.nan)),
+    "odometry with an infinite twist": ("odom", twisting(math.inf)),
+    "a localizer at NaN": ("amcl_pose", localizer_at(math.nan, 0.0)),
+    "a localizer of a covariance of NaN": ("amcl_pose", localizer_at(0.0, math.nan)),
     "odometry whose child is not UTF-8": ("odom", messages.Odometry(child_frame_id=BAD)),
 }
 
@@ -88,7 +102,14 @@ def test_the_bridge_goes_on_after_broken_messages(domain: int, room: linefix.Map
         for second, (name, (_, message)) in enumerate(BROKEN.items(), 1):
             found = pose_at(robot, second, lambda name=name, message=message: writers[name].publish(message))  # type: ignore[misc]
             assert is_at_truth(found), name
-        wait_until(lambda: any("cannot be decoded" in line for line in logged), lambda: logged)
+        for expected in (
+            "cannot be decoded",
+            "/odom: found a twist",
+            "/amcl_pose: expected a position",
+            "a covariance",
+        ):
+            wait_until(lambda expected=expected: any(expected in line for line in logged), lambda: logged)  # type: ignore[misc]
+            assert sum(expected in line for line in logged if "decoded" not in line) < 3
     with running(NodeOptions(agree=1, domain=domain), room):
         assert is_at_truth(pose_at(robot, 1))
 
