@@ -27,11 +27,6 @@ class InitialPose:
     _published: bool = False
     _at: float | None = None
 
-    @property
-    def wanted(self) -> bool:
-        """Return whether the next agreed pose is published unless the localizer has it already."""
-        return self._wanted
-
     def want(self) -> None:
         """Publish the next agreed pose, after a request or a new subscription."""
         self._wanted = True
@@ -126,7 +121,3 @@ class MapToOdom:
             )
             self.current = mixed.compose(odometry.inverse())
         return self.current
-
-    def reset(self) -> None:
-        """Forget the pose, as when the map changed or the clock was set back."""
-        self.current, self._target, self._stamp = None, None, 0

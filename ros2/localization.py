@@ -87,7 +87,7 @@ class Localization:
     def begin_again(self) -> None:
         """Forget the pose: the robot was carried, or the map has changed."""
         self._agreement.reset()
-        self._correction.reset()
+        self._correction = MapToOdom()
         self._watch.reset()
         self._initial.want()
         self._pending = None
@@ -122,7 +122,7 @@ class Localization:
         scan = observation_of(answer, self._odometry.known(stamp, received(stamp)), stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
-            self._correction.reset()  # where the clock was set back, the agreement forgets the pose
+            self._correction = MapToOdom()  # where the clock was set back, the agreement forgets the pose
         self._correction.take(event, scan)
         if event is Event.CONTRADICTED:
             self._pending = None

@@ -22,6 +22,7 @@ from .messages import LaserScan, Time
 from .odometry import OdometryHistory, Speed
 from .options import MAX_NAME, NodeOptions, quoted
 from .transforms import FrameError, Mount
+from .tuning import LEVEL_TILT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +103,7 @@ def look_of(
     header, place = message.header, mount.base_from_laser
     look = Look(header.stamp, header.frame_id, laser, increment, place, mount.flipped, base_from_then)
     problems = {note.code: note.message for note in notes.assumed.values()}
-    if not mount.level:
+    if mount.tilt > LEVEL_TILT:
         problems["tilted"] = (
             f"the scan plane is tilted by {math.degrees(mount.tilt):.0f} degrees, "
             "expected a horizontal plane; ranges are used without correction"

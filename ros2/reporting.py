@@ -50,8 +50,7 @@ def at_least(covariance: Floats, sigma: float, sigma_theta: float) -> Floats:
     sigma, sigma_theta : float
         Metres, radians.
     """
-    scale = np.array([1.0, 1.0, 1.0])
-    scale[2] = sigma / sigma_theta if sigma > 0.0 and sigma_theta > 0.0 else 1.0
+    scale = np.array([1.0, 1.0, sigma / sigma_theta if sigma > 0.0 and sigma_theta > 0.0 else 1.0])
     widened = covariance * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(widened)
     floor: Floats = (vectors * np.maximum(values, sigma**2)) @ vectors.T / np.outer(scale, scale)
@@ -60,8 +59,7 @@ def at_least(covariance: Floats, sigma: float, sigma_theta: float) -> Floats:
 
 def transform_of(stamp: ros.Time, frames: tuple[str, str], pose: linefix.RigidTransform) -> ros.TFMessage:
     """Return a transform for ``/tf``; `frames` are the parent and the child, `pose` is parent_from_child."""
-    turn = pose_of(pose).orientation
-    transform = ros.Transform(ros.Vector3(pose.x, pose.y, 0.0), turn)
+    transform = ros.Transform(ros.Vector3(pose.x, pose.y, 0.0), pose_of(pose).orientation)
     return ros.TFMessage([ros.TransformStamped(ros.Header(stamp, frames[0]), frames[1], transform)])
 
 

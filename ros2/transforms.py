@@ -16,7 +16,7 @@ from registration import RigidTransform
 
 from .messages import TransformStamped
 from .options import MAX_NAME, quoted
-from .tuning import LEVEL_TILT, MAX_MOUNT
+from .tuning import MAX_MOUNT
 
 Floats = NDArray[np.float64]
 
@@ -42,11 +42,6 @@ class Mount:
     base_from_laser: RigidTransform
     flipped: bool = False
     tilt: float = 0.0
-
-    @property
-    def level(self) -> bool:
-        """Return whether the tilt is too small to matter."""
-        return self.tilt <= LEVEL_TILT
 
 
 def mount_of(matrix: Floats, base: str, laser: str) -> Mount:

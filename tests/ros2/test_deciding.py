@@ -47,7 +47,7 @@ def test_after_a_restart_a_localizer_that_has_the_pose_is_left_alone() -> None:
     initial = InitialPose()
     assert decide(initial, Event.AGREED, 0.0, agrees=True) is None
     assert decide(initial, Event.CONFIRMED, 1.0, agrees=True) is None
-    assert not initial.wanted
+    assert initial.decide(Event.CONFIRMED, localizer_agrees=None, lost=False, now=0.0) is None
 
 
 def test_a_localizer_with_another_pose_is_set_at_the_start() -> None:
