@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..report import Notes, shown
 from .tracks import NS, Floats, Known, Track
 from .transforms import Transforms, planar
 from .trees import ODOM, OdometryTopic
-from .tuning import MOVED, SAMPLES
+from .tuning import COMPARED_NS, DIFFERENT, JITTER, MOVED, SAMPLES
 
 BASES = ("base_link", "base_footprint")
 
@@ -49,6 +49,7 @@ class Odometry:
     _path: Sequence[str]  # from the frame outwards: to `outer`, or to the frame that the messages are of
     _messages: Track | None = None
     moving: tuple[Track, ...] = field(default=(), repr=False)
+    _contradicted: tuple[tuple[int, int], ...] = ()  # stamps, begin and end
 
     @classmethod
     def of_tree(cls, tree: Transforms, path: Sequence[str]) -> Odometry:
@@ -68,11 +69,38 @@ class Odometry:
 
     def known(self, stamp: int, received: int) -> Known | None:
         """Return outer_from_frame of something with a stamp and a time of reception, nanoseconds; None if unknown."""
-        inner = self._tree.known(self._path, stamp, received)
-        if inner is None or self._messages is None:
-            return inner
-        outer = self._messages.known(stamp, received)
-        return None if outer is None else outer.after(inner)
+        found = self._tree.known(self._path, stamp, received)
+        if found is not None and self._messages is not None:
+            outer = self._messages.known(stamp, received)
+            found = None if outer is None else outer.after(found)
+        if found is None or any(begin <= stamp <= end for begin, end in self._contradicted):
+            return None
+        return replace(found, part=(*found.part, sum(end < stamp for _, end in self._contradicted)))
+
+    def compared(self, other: Odometry, notes: Notes) -> Odometry:
+        """Return this odometry without the times at which the motion by another source contradicts it."""
+        times = list(self.moving[0].times(COMPARED_NS // 4)) if self.moving else []
+        found, worst, told = list(self._contradicted), 0.0, ""
+        for k, (end, received) in enumerate(times):
+            begin, before = times[max(0, k - 4)]
+            steps = [_step(one.known(begin, before), one.known(end, received)) for one in (self, other)]
+            if not 0 < end - begin <= 2 * COMPARED_NS or steps[0] is None or steps[1] is None:
+                continue
+            apart, most = _size(steps[0].inverse().compose(steps[1])), max(_size(steps[0]), _size(steps[1]))
+            if apart > JITTER + DIFFERENT * most:
+                found.append((begin, end))
+                if apart > worst:
+                    worst, told = apart, f"{apart:.2f} (m or rad) within {(end - begin) / NS:.1f} s"
+        if not told:
+            return self
+        notes.add_assumed(
+            "odometry_contradicts",
+            f"odometry of {shown(self.source)} and {shown(other.source)} contradict each other, by up to {told}, the "
+            f"first from stamp {found[len(self._contradicted)][0] / NS:.3f} to {found[-1][1] / NS:.3f}; it is not used "
+            "there. Record the log without the wrong one",
+            len(found) - len(self._contradicted),
+        )
+        return replace(self, _contradicted=_joined(found))
 
     def speed(self, begin: int, end: int, mount: Floats, received: int) -> Speed | None:
         """Return how fast a sensor moved during a scan; None where its poses do not give it.
@@ -123,6 +151,25 @@ class Odometry:
                     f"the stamps of odometry on {topics} jump back; each of {track.part_count} parts has its own "
                     "odometry",
                 )
+
+
+def _step(before: Known | None, after: Known | None) -> RigidTransform | None:
+    if before is None or after is None or before.part != after.part or before.unknown_ns != after.unknown_ns:
+        return None
+    return planar(np.linalg.inv(before.matrix) @ after.matrix)[0]
+
+
+def _size(step: RigidTransform) -> float:
+    return max(math.hypot(step.x, step.y), abs(wrap_angle(step.theta)))
+
+
+def _joined(times: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    joined: list[tuple[int, int]] = []
+    for begin, end in sorted(times):
+        if joined and begin <= joined[-1][1]:
+            begin, end = joined[-1][0], max(end, joined.pop()[1])
+        joined.append((begin, end))
+    return tuple(joined)
 
 
 def _speed(step: RigidTransform, seconds: float) -> Speed:

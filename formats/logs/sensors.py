@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -226,19 +227,24 @@ class Sensors:
             return None if path is None or len(path) < 2 else self._doubted(Odometry.of_tree(tree, path))
         paths = [tree.path(outer, frame) or [frame] for outer in outer_frames(tree, frame)]
         moving = next((path for path in paths if moves(tree, path, self._bases)), None)
-        if moving is not None:
-            return self._doubted(Odometry.of_tree(tree, moving))
         above = tree.above(frame)
         base = base_of(above, self._bases)
         fitting = self._frames.odometry_of(topic, namespace, above, base)
+        others = [
+            Odometry.of_messages(tree, tree.path(one.child or base or frame, frame) or [frame], one) for one in fitting
+        ]
+        if moving is not None:
+            return self._doubted(Odometry.of_tree(tree, moving), others)
         if not fitting:
             self._note_missing(tree, frame, paths)
             return None
-        found = Odometry.of_messages(tree, tree.path(fitting[0].child or base or frame, frame) or [frame], fitting[0])
-        self._note_messages(found, [one.topic for one in fitting[1:]])
-        return self._doubted(found)
+        found, *others = others
+        self._note_messages(found, [one.source for one in others])
+        return self._doubted(found, others)
 
-    def _doubted(self, found: Odometry) -> Odometry:
+    def _doubted(self, found: Odometry, others: Sequence[Odometry] = ()) -> Odometry:
+        for other in others:
+            found = found.compared(other, self._notes)
         found.note_doubts(self._notes)
         return found
 

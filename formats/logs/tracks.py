@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -235,6 +235,15 @@ class Track:
     def stamps(self) -> Sequence[int]:
         """Times of the values, nanoseconds, part by part."""
         return [stamp for part in self._parts for stamp in part.stamps]
+
+    def times(self, step: int) -> Iterator[tuple[int, int]]:
+        """Yield stamps that are at least a step apart, with their times of reception."""
+        for part in self._parts:
+            last = part.stamps[0] - step
+            for stamp, received in zip(part.stamps, part.received, strict=True):
+                if stamp >= last + step:
+                    last = stamp
+                    yield stamp, received
 
     @property
     def unset(self) -> bool:

@@ -4,6 +4,8 @@ import math
 
 MOVED = 0.05  # m and rad; a frame that stays within it does not move: half of what tracking allows at rest
 MOST_GAP_NS = 500_000_000  # between two values of odometry that it is interpolated between, and around jumps of it
+COMPARED_NS = 2_000_000_000  # over which the motions of two sources of odometry are compared
+DIFFERENT = 0.25  # of the motion, by which these may differ in addition to JITTER: wheels slip, gyroscopes do not
 MOST_PERIODS = 3  # the same, in periods of odometry: two messages that are lost
 USUAL_GAP_NS = 200_000_000  # the same, at least: at 2 m/s^2 the middle is 1 cm off
 PART_NS = 300_000_000  # a stamp that is so far before the last one begins a new part; messages out of order are nearer

@@ -191,3 +191,28 @@ def test_a_time_increment_in_another_unit_is_replaced(tmp_path: Path, scan_time:
     (scan,), log = read(bag)
     assert scan.time_increment == pytest.approx(expected)
     assert codes(log)["time_increment"] == 1
+
+
+@pytest.mark.parametrize("by_tf", [False, True])
+@pytest.mark.parametrize(("scale", "shift", "known"), [(1.0, 0.0, True), (0.5, 0.0, False), (1.0, 1.0, False)])
+def test_two_sources_that_contradict_each_other_are_named(
+    tmp_path: Path, by_tf: bool, scale: float, shift: float, known: bool
+) -> None:
+    """The second source has another speed, or is moved by a metre in between."""
+    bag = Robots("mcap", tmp_path)
+    fixed(bag, "base_link", "laser")
+    for k in range(100):
+        ns, x = BEGUN + k * TENTH, 0.1 * k
+        if by_tf:
+            bag.transform("/tf", ns, "odom", "base_link", (x, 0.0, 0.0))
+        else:
+            bag.says(ns, x)
+        bag.says(ns, scale * x + shift * min(1.0, max(0.0, 0.2 * (k - 40))), topic="/wheels")
+    bag.scan(BEGUN + 45 * TENTH)
+    bag.scan(BEGUN + 90 * TENTH)
+    found, log = read(bag)
+    assert (found[0].pose is not None) == known
+    assert (found[1].pose is not None) == (scale == 1.0)
+    told = [note.message for note in log.report.assumed if note.code == "odometry_contradicts"]
+    assert len(told) == (not known)
+    assert known or all(one in told[0] for one in ("tf" if by_tf else "/odom", "/wheels", "within 2.0 s", "stamp 10"))
