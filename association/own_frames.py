@@ -153,11 +153,14 @@ def _of_others(found: Stages) -> tuple[set[int], dict[int, float] | None]:
     if comparison is None:
         return similar, None
     open_still = not result.usable and result.status is not Status.NO_MATCH
+    limit = AS_LIKELY
+    if any(reason.code == "similar_place" for reason in result.reasons):  # which the likeliest place is in any case
+        limit = min(limit, max(comparison.weights.tolist(), default=limit))
     each = probabilities_of_others(found.verdict, comparison.others)
     for one, weight, probability in zip(comparison.others, comparison.weights.tolist(), each, strict=True):
         m = _map_at(context, context.in_map(one.pose))
         likely[m] = likely.get(m, 0.0) + (probability or 0.0)
-        if open_still and weight >= AS_LIKELY:
+        if open_still and weight >= limit:
             similar.add(m)
     return similar, None if result.probability is None else likely
 
@@ -175,8 +178,6 @@ def _named(reason: Reason, result: AssociationResult) -> Reason:
         return reason
     places = [verdict.map_id for verdict in result.maps if verdict.status is Status.AMBIGUOUS]
     others = [name for name in places if name != result.map_id]
-    if not others and result.alternatives and result.alternatives[0].map_id not in (None, result.map_id):
-        others = [str(result.alternatives[0].map_id)]
     if not others:
         return reason
     named = f"A pose on the map {others[0]} fits" if len(others) == 1 else f"Poses on the maps {_some(others)} fit"

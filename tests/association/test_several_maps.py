@@ -144,7 +144,7 @@ def test_another_building_is_on_none_of_them() -> None:
 
 
 def weights() -> list[dict[str, float] | None]:
-    return [None, {"a": 0.1, "b": 0.8, "c": 0.1}, {"a": 0.01, "b": 0.98, "c": 0.01}]
+    return [None, {"a": 0.1, "b": 0.8, "c": 0.1}, {"b": 0.98}, {"b": 0.998}]
 
 
 def similar(seed: int) -> tuple[MapSet, Scan]:
