@@ -22,6 +22,7 @@ FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
 LOST = re.compile(r"A message was lost!!!.*?---\s*\n", re.DOTALL)  # of `ros2 topic echo`
 WORDS = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf, "nan": math.nan, "-nan": math.nan}  # of `rostopic echo`
+WARNINGS = re.compile(r"\A(\s*\[?(WARN|WARNING|INFO)\b.*\n)+")  # of the tools of ROS, before the message
 NEXT = "\n---"  # between the messages of `ros2 topic echo`
 
 
@@ -101,7 +102,10 @@ def read_scan(name: str) -> Json:
     message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
-    inner = message.get("msg", message.get("message"))  # in the envelope of rosbridge, or of Foxglove
+    # The envelope of rosbridge, or of Foxglove.
+    inner = message.get("msg", message.get("message"))
+    if isinstance(inner, str) and inner.lstrip().startswith("{"):
+        inner = read_json(name, inner.encode())
     scan: Json = inner if isinstance(inner, dict) else message
     if {"start_angle", "end_angle"} <= scan.keys():
         raise RefusedError(f"{name}: is a LaserScan of Foxglove, expected one of ROS; export sensor_msgs/LaserScan")
@@ -119,7 +123,9 @@ def _yaml(data: bytes, name: str) -> Any:
     with needing_formats(f"reading {name} as YAML"):
         from formats.yaml import yaml_of
 
-        text = LOST.sub("", data.decode("utf-8", errors="replace")).removeprefix("---\n")
+        if data.startswith(b"%time"):
+            raise RefusedError(f"{name}: is a table of rostopic echo -p, expected one message; print it without -p")
+        text = WARNINGS.sub("", LOST.sub("", data.decode("utf-8", errors="replace")), count=1).removeprefix("---\n")
         return yaml_of(text.partition(NEXT)[0], name)
 
 
@@ -146,7 +152,8 @@ def _finite(laser: Json, name: str) -> Json:
             f"{name}: the ranges end in '...' after {len(ranges) - 1} values; expected all of them: "
             "record the scan with ros2 topic echo --full-length"
         )
-    most = _number(laser.get("range_max"))
+    laser |= {field: _number(value) for field, value in laser.items() if field.startswith(("angle_", "range_"))}
+    most = laser.get("range_max")
     if isinstance(most, float) and not math.isfinite(most):
         most = laser["range_max"] = None
     known = {math.inf: None if most is None else 2.0 * most}
@@ -156,5 +163,8 @@ def _finite(laser: Json, name: str) -> Json:
 
 
 def _number(value: Any) -> Any:
-    """Return the number that a word of `rostopic echo` stands for, anything else as it is."""
-    return WORDS.get(value.lower(), value) if isinstance(value, str) else value
+    """Return the number that a text stands for, as of `rostopic echo` or in quotes; anything else as it is."""
+    try:
+        return WORDS.get(value.lower()) or float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value

@@ -189,12 +189,17 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
     wrapped = json.dumps({"op": "publish", "topic": "/scan", "msg": known})
     for name, content in (
         ("bare.yaml", bare), ("lost.yaml", lost + bare), ("bridge.json", wrapped),
+        ("warned.yaml", "WARNING: topic [/scan] does not appear to be published yet\n" + bare),
+        ("quoted.json", json.dumps(known | {"ranges": list(map(str, message["ranges"])), "range_max": "30.0"})),
+        ("text.json", json.dumps({"op": "publish", "msg": json.dumps(known)})),
         ("panel.json", json.dumps({"topic": "/scan", "message": known})),
     ):  # fmt: skip
         (folder / name).write_text(content)
         assert linefix.done("locate", "room.json", name, "--json").answer["usable"], name
     (folder / "noarr.yaml").write_text(echoed([]).replace("ranges:", "ranges: '<array type: float32>'"))
     assert "without --noarr" in refused(linefix("locate", "room.json", "noarr.yaml"), 3)
+    (folder / "table.csv").write_text("%time,field.header.seq,field.ranges0\n1,2,3.0\n")
+    assert "print it without -p" in refused(linefix("locate", "room.json", "table.csv"), 3)
     (folder / "foxglove.json").write_text(json.dumps({"start_angle": 0.0, "end_angle": 1.0, "ranges": [1.0, 1.0]}))
     assert "export sensor_msgs/LaserScan" in refused(linefix("locate", "room.json", "foxglove.json"), 3)
 
