@@ -180,20 +180,20 @@ class _Update:
         latest = first
         shown: list[tuple[str, tuple[int, ...], int]] = []
         for number in range(tuning.ROUNDS):
-            drafts, evidence = yield from self.draft(chosen)
-            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in drafts)
+            drafts, trial, evidence = yield from self.draft(chosen)
+            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in trial)
             if shown == before or number == tuning.ROUNDS - 1:
                 break
-            latest = yield from self.search_others(drafts, first, latest)
+            latest = yield from self.search_others(trial, first, latest)
             chosen, _ = self.choose_evidence(latest)
         return (yield from self.verify(drafts, evidence, first))
 
-    def draft(self, chosen: Sequence[Localized]) -> Generator[None, None, tuple[Drafts, WallEvidence]]:
-        """Return changes with their evidence, and the evidence about all walls of the map and possible new ones."""
+    def draft(self, chosen: Sequence[Localized]) -> Generator[None, None, tuple[Drafts, Drafts, WallEvidence]]:
+        """Return changes, those of a trial, and the evidence about all walls of the map and possible new ones."""
         known, deadline = self.known, self.deadline
         new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
         evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
-        return draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
+        return *draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
 
     def verify(
         self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]

@@ -73,9 +73,17 @@ def runs(chosen: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def find_cuts(evidence: WallEvidence, judged: Judged, known: Segments, sigma: float, deadline: Deadline) -> list[Draft]:
-    """Return which walls of the map are gone, whole or in part: a draft for each, removed or shortened."""
-    chunks = evidence.chunks
+def find_cuts(
+    evidence: WallEvidence, judged: Judged, known: Segments, sigma: float, deadline: Deadline
+) -> tuple[list[Draft], list[Draft]]:
+    """Return the walls of the map that are gone, whole or in part, and those that may have moved.
+
+    Returns
+    -------
+    a draft for each wall that is gone, removed or shortened
+    a draft for each that beams pass here and there, so that it is gone if a new one like it is near
+    """
+    chunks, passed = evidence.chunks, dict[int, Draft]()
     cuts = {cut.segments[0]: cut for cut in _gone_things(evidence, len(known), deadline)}
     for wall in np.unique(chunks.walls_of(judged.seen[judged.gone])).tolist():
         if wall < len(known) and wall not in cuts:
@@ -83,11 +91,11 @@ def find_cuts(evidence: WallEvidence, judged: Judged, known: Segments, sigma: fl
             gone, _, open_, read = judged.of_wall(wall)
             own = np.arange(chunks.first[wall], chunks.first[wall + 1])
             if _is_gone_whole(evidence, own, tuning.LEAST_GONE):
-                gone[:] = True
+                passed[wall] = Draft("removed", (wall,), gone=own)
             cut = _cut(chunks, wall, gone, read, open_, sigma)
             if cut is not None:
                 cuts[wall] = cut
-    return [cuts[wall] for wall in sorted(cuts)]
+    return [cuts[wall] for wall in sorted(cuts)], [passed[wall] for wall in sorted(passed)]
 
 
 def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iterator[Draft]:

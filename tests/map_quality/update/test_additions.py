@@ -1,4 +1,4 @@
-"""New walls from the lines of several scans."""
+"""New walls from the lines of several scans, and walls of the map that beams pass."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
     chunk, scan = np.divmod(np.arange(6 * len(wall)), 6)
     counts = np.stack([9 * ~on[chunk], 9 * on[chunk], 0 * chunk], axis=1)
     evidence = WallEvidence(chunks, chunk, scan, scan % 2, scan % 3, counts)
-    drafts = draft_changes(evidence, MAP, sigmas, 0.005, ["monday", "tuesday"], Deadline())
+    drafts, _ = draft_changes(evidence, MAP, sigmas, 0.005, ["monday", "tuesday"], Deadline())
     return np.concatenate([one.new for one, _ in drafts if one.code == "added"])
 
 
@@ -62,3 +62,17 @@ def test_a_line_that_beams_pass_through_hides_no_wall_close_to_it() -> None:
 )
 def test_other_lines_are_walls_of_their_own(other: list[float]) -> None:
     assert np.abs(added(WALL, other) - [WALL, other]).max() < 0.06
+
+
+def test_single_beams_do_not_remove_a_wall_whose_rest_nothing_reads() -> None:
+    """Beams of two visits pass one third of it, single beams another third: the first third is gone."""
+    chunks = Chunks.of(MAP)
+    many, single = np.repeat(np.arange(10, 28), 6), np.arange(30, 48)
+    scan = np.concatenate([np.tile(np.arange(6), 18), np.zeros(18, dtype=int)])
+    counts = np.zeros((len(scan), 3), dtype=int)
+    counts[:, 0] = [9] * len(many) + [1] * len(single)
+    evidence = WallEvidence(chunks, np.concatenate([many, single]), scan, scan % 2, scan % 3, counts)
+    drafts, _ = draft_changes(evidence, MAP, np.zeros(0), 0.005, ["monday", "tuesday"], Deadline())
+    ((draft, _),) = drafts
+    assert draft.code == "shortened"
+    assert draft.new == pytest.approx(np.array([[50.0, 50.0, 52.0, 50.0], [55.6, 50.0, 60.0, 50.0]]))
