@@ -30,6 +30,7 @@ from .scan.views import MAX_VIEWS, View, assemble
 from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps
 from .verdict_explanation import (
     AnswerExplanation,
+    Contribution,
     VerdictExplanation,
     explain_verdict,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "Beams",
     "CancelledError",
     "Corrections",
+    "Contribution",
     "Correspondence",
     "CriticalWall",
     "Deadline",
