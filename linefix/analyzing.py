@@ -6,17 +6,15 @@ import multiprocessing
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import islice
-from typing import TypeVar
 
 from association import Deadline
-from map_quality import Analysis, PlaceVerdict
+from map_quality import Analysis, PlaceVerdict, finished
 
 PORTION = 16  # places that a process is given at a time
 ALONE = 64  # places up to which starting others takes longer than it saves
 
 Progress = Callable[[int, int], None]
 Looks = dict[int, PlaceVerdict | None]
-T = TypeVar("T")
 _analysis: Analysis | None = None  # of a process that was started for it
 _deadline = Deadline()
 
@@ -66,16 +64,6 @@ def looks(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Gen
         yield
         found[number] = verdict
     return found
-
-
-def finished(steps: Generator[None, None, T]) -> T:
-    """Take all steps, and return their result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
 
 
 def _begin(analysis: Analysis, ends_at: float | None) -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from association import AssociationOptions, AssociationResult, Deadline, KnownOfMaps, MapIndex, MapSet, Scan
-from map_quality import check_map
+from map_quality import check_map, finished
 
-from .analyzing import Progress, finished, look_on_all_cores
+from .analyzing import Progress, look_on_all_cores
 from .documents import inputs, results
 from .documents.analysis import MapAnalyzeRequest
 from .documents.errors import Fault, InvalidRequestError

@@ -6,10 +6,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex, Scan
-from map_quality import Advice, MapCheck, Sample, SampleReport, check_map, conclude, try_sample
+from map_quality import Advice, MapCheck, Sample, SampleReport, check_map, conclude, finished, try_sample
 from registration import RigidTransform
-
-from .analyzing import finished
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from .update.result import (
 )
 from .update.scans import UpdateError, VisitScan
 from .update.update import update, updating
-from .views import AnalysisError, Robot
+from .views import AnalysisError, Robot, finished
 
 __all__ = [
     "NOT_SHARPENED",
@@ -55,6 +55,7 @@ __all__ = [
     "apply_changes",
     "check_map",
     "conclude",
+    "finished",
     "standing_places",
     "try_sample",
     "update",

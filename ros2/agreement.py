@@ -6,8 +6,8 @@ The state is a list of hypotheses, each a pose of the robot in a map that odomet
 2. A usable scan that disagrees counts against a hypothesis; so does one that is not usable, where the prediction is
    neither its pose nor one of its alternatives although all poses that explain it as well are listed.
 3. A hypothesis is agreed when the scans that support it, less those against it, are as many as needed, and the robot
-   has moved far enough between them, or has rested long enough while nothing spoke against it. Where another pose was
-   likely, twice as many scans over twice the way are needed, and rest is no evidence. Where scans contradict odometry,
+   has moved far enough between them, or has rested long enough while nothing spoke against it. If another pose was
+   likely, twice as many scans over twice the way are needed, and rest is no evidence. If scans contradict odometry,
    only way is evidence: at rest and in a turn, a mount or a scale that is wrong is not seen.
 4. The agreed hypothesis stays until another one is agreed; what speaks against it meanwhile is reported at once. It is
    also supported over a short time in which odometry is not known.

@@ -229,7 +229,7 @@ def test_an_option_that_says_nothing_of_a_file_is_refused(tmp_path: Path) -> Non
 
 
 def dashed(tmp_path: Path, kind: str) -> Path:
-    """Three lines, of which two are drawn with dashes: one by itself, one by its layer or group."""
+    """Return a drawing of three lines. Two have dashes: one has its own style, one that of its layer or group."""
     if kind == "svg":
         styled = '<line x1="0" y1="2" x2="5" y2="2" stroke="red" style="stroke-dasharray: 4 2"/>'
         plain = '<line x1="0" y1="0" x2="5" y2="0" stroke="red" stroke-dasharray="none"/>'
