@@ -121,12 +121,14 @@ def read_scan(name: str) -> Json:
 def _yaml(data: bytes, name: str) -> Any:
     """Return the first message of YAML."""
     with needing_formats(f"reading {name} as YAML"):
+        from formats.errors import naming
         from formats.yaml import yaml_of
 
         if data.startswith(b"%time"):
             raise RefusedError(f"{name}: is a table of rostopic echo -p, expected one message; print it without -p")
         text = WARNINGS.sub("", LOST.sub("", data.decode("utf-8", errors="replace")), count=1).removeprefix("---\n")
-        return yaml_of(text.partition(NEXT)[0], name)
+        with naming(name):
+            return yaml_of(text.partition(NEXT)[0])
 
 
 def _finite(laser: Json, name: str) -> Json:

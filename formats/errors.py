@@ -11,11 +11,19 @@
     └── InvalidOptionError       an option out of its range
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from registration import InputError
 
 
 class FormatError(InputError):
     """Root of this package's errors; `argument` is the file's name, or the option's."""
+
+    def __init__(self, message: str, *, argument: str = "", index: int | None = None) -> None:
+        super().__init__(message, argument=argument, index=index)
 
 
 class UnsupportedFormatError(FormatError):
@@ -40,3 +48,14 @@ class UprightFrameError(FormatError):
 
 class InvalidOptionError(FormatError):
     """An option is out of its range."""
+
+
+@contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Name the file that is read in the errors that name neither a file nor an option."""
+    try:
+        yield
+    except FormatError as error:
+        if error.argument:
+            raise
+        raise type(error)(error.message, argument=name) from error.__cause__

@@ -70,19 +70,15 @@ def read_bounded(path: Path, limit: int) -> bytes:
             content = file.read(limit + 1)
             size = max(len(content), os.fstat(file.fileno()).st_size)
     except FileNotFoundError as error:
-        raise IncompleteFileError(
-            "there is no such file; check the path and the working folder", argument=name_of(path)
-        ) from error
+        raise IncompleteFileError("there is no such file; check the path and the working folder") from error
     except OSError as error:
-        raise MalformedFileError(f"cannot be read: {error.strerror}", argument=name_of(path)) from error
+        raise MalformedFileError(f"cannot be read: {error.strerror}") from error
     if len(content) > limit:
-        raise TooLargeError(
-            f"expected at most {limit} bytes, found {size}; simplify the file, or divide it", argument=name_of(path)
-        )
+        raise TooLargeError(f"expected at most {limit} bytes, found {size}; simplify the file, or divide it")
     return content
 
 
-def text_of(content: bytes, name: str) -> str:
+def text_of(content: bytes) -> str:
     """Decode UTF-8, with or without a byte-order mark.
 
     Raises
@@ -91,14 +87,14 @@ def text_of(content: bytes, name: str) -> str:
         When it is something else.
     """
     if content.startswith(WIDE):
-        raise MalformedFileError("is text in UTF-16; save it as UTF-8", argument=name)
+        raise MalformedFileError("is text in UTF-16; save it as UTF-8")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise MalformedFileError("expected text in UTF-8; save it as UTF-8", argument=name) from error
+        raise MalformedFileError("expected text in UTF-8; save it as UTF-8") from error
 
 
-def load_json(content: bytes, name: str) -> Any:
+def load_json(content: bytes) -> Any:
     """Parse JSON, with or without a byte-order mark.
 
     Raises
@@ -111,12 +107,11 @@ def load_json(content: bytes, name: str) -> Any:
     count = sum(content.count(sign) for sign in (b",", b"[", b"{"))
     if count > MAX_JSON_VALUES:
         raise TooLargeError(
-            f"expected at most {MAX_JSON_VALUES} values, lists and objects, found {count}; divide the file",
-            argument=name,
+            f"expected at most {MAX_JSON_VALUES} values, lists and objects, found {count}; divide the file"
         )
     try:
-        return orjson.loads(text_of(content, name))
+        return orjson.loads(text_of(content))
     except orjson.JSONDecodeError as error:
         raise MalformedFileError(
-            f"is not JSON: line {error.lineno}, column {error.colno} cannot be read; export it again", argument=name
+            f"is not JSON: line {error.lineno}, column {error.colno} cannot be read; export it again"
         ) from error

@@ -14,7 +14,7 @@ from .drawings.geojson import read_geojson
 from .drawings.own_json import read_json
 from .drawings.svg import read_svg
 from .drawings.walls.to_map import to_map
-from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError
+from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError, naming
 from .files import ending_of, name_of
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
@@ -73,19 +73,20 @@ def read_map(
     FormatError
         When the file cannot be read, in one line that names it.
     """
-    file = Path(path)
+    file, notes = Path(path), Notes()
     suffix = file.suffix.lower()
-    _require_use(options, suffix)
-    if suffix in (".yaml", ".yml"):
-        return _read_map_server(file, options, pictures)
-    if is_bag(file):
-        return _read_bag(file, options)
-    if suffix in DRAWINGS:
-        notes = Notes()
-        drawing = DRAWINGS[suffix](file, options, notes)
-        line_map = to_map(drawing, options)
-        return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
-    raise _unsupported(file, "a file", MAP_SUFFIXES)
+    with naming(name_of(file)):
+        _require_use(options, suffix)
+        if suffix in (".yaml", ".yml"):
+            grid, files = read_grid(file, options, notes, pictures)
+            return _imported(grid, "map", options.surface, notes, "map_server", files)
+        if is_bag(file):
+            return _read_bag(file, options, notes)
+        if suffix in DRAWINGS:
+            drawing = DRAWINGS[suffix](file, options, notes)
+            line_map = to_map(drawing, options)
+            return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
+        raise _unsupported(file, "a file", MAP_SUFFIXES)
 
 
 def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPTIONS) -> Log:
@@ -108,22 +109,19 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPT
         When the file cannot be read, in one line that names it; while iterating, too.
     """
     file = Path(path)
-    if is_bag(file):
-        return read_bag(file, options)
-    if file.suffix.lower() in TEXTS:
-        return read_carmen(file, options)
-    raise _unsupported(file, "the folder of a bag, or a file", LOG_SUFFIXES)
+    with naming(name_of(file)):
+        if is_bag(file):
+            return read_bag(file, options)
+        if file.suffix.lower() in TEXTS:
+            return read_carmen(file, options)
+        raise _unsupported(file, "the folder of a bag, or a file", LOG_SUFFIXES)
 
 
 def _unsupported(file: Path, what: str, suffixes: tuple[str, ...]) -> UnsupportedFormatError:
     if file.suffix.lower() in PICTURES:
-        return UnsupportedFormatError(
-            "is a picture, which has no scale of its own; give the YAML file of the map", argument=name_of(file)
-        )
+        return UnsupportedFormatError("is a picture, which has no scale of its own; give the YAML file of the map")
     known = ", ".join(suffixes)
-    return UnsupportedFormatError(
-        f"expected {what} that ends in one of {known}, found {ending_of(file)}", argument=name_of(file)
-    )
+    return UnsupportedFormatError(f"expected {what} that ends in one of {known}, found {ending_of(file)}")
 
 
 def _require_use(options: ImportOptions, suffix: str) -> None:
@@ -138,26 +136,16 @@ def _require_use(options: ImportOptions, suffix: str) -> None:
             )
 
 
-def _read_map_server(file: Path, options: ImportOptions, pictures: Mapping[str, Path] | None) -> ImportedMap:
-    notes = Notes()
-    grid, files = read_grid(file, options, notes, pictures)
-    line_map = _from_grid(grid, notes, files[0], "map", options.surface)
-    return ImportedMap(line_map, notes.report("map_server", files), picture_of(grid))
-
-
-def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
-    notes, name = Notes(), name_of(file)
+def _read_bag(file: Path, options: ImportOptions, notes: Notes) -> ImportedMap:
     found = read_bag_grid(file, options.topic, notes)
     try:
-        line_map = _from_grid(found.grid, notes, name, found.frame, options.surface)
+        return _imported(found.grid, found.frame, options.surface, notes, found.format, (name_of(file),))
     except MalformedFileError as error:
         if not found.costmap:
             raise
         raise MalformedFileError(
-            f"{error.message}; {found.topic} is a costmap, in which obstacles are inflated: name the topic of the map",
-            argument=name,
+            f"{error.message}; {found.topic} is a costmap, in which obstacles are inflated: name the topic of the map"
         ) from error
-    return ImportedMap(line_map, notes.report(found.format, (name,)), picture_of(found.grid))
 
 
 def map_of_grid(message: Any, name: str = "OccupancyGrid", surface: float | None = None) -> ImportedMap:
@@ -178,16 +166,19 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid", surface: float | None
         When its fields do not fit each other, or it is too large.
     """
     notes = Notes()
-    grid, frame = grid_of(message, name, notes)
-    return ImportedMap(
-        _from_grid(grid, notes, name, frame, surface), notes.report("occupancy_grid", (name,)), picture_of(grid)
-    )
+    with naming(name):
+        grid, frame = grid_of(message, notes)
+        return _imported(grid, frame, surface, notes, "occupancy_grid", (name,))
 
 
-def _from_grid(grid: Grid, notes: Notes, name: str, frame: str, surface: float | None = None) -> LineMap:
-    faces = find_faces(grid, notes, name, surface)
+def _imported(
+    grid: Grid, frame: str, surface: float | None, notes: Notes, format: str, files: tuple[str, ...]
+) -> ImportedMap:
+    """Return the faces of a grid as a map, with the report of its files."""
+    faces = find_faces(grid, notes, surface)
     notes.add_read("segments", "faces of walls", len(faces.segments))
     sigma = SURFACE_SIGMA * grid.resolution
     notes.add_assumed("sigma", f"sigma of the walls is assumed to be {sigma:g} m, half a cell")
-    meta = {"source": name, "resolution": f"{grid.resolution:g}", "surface": f"{faces.depth:.2f}"}
-    return LineMap(faces.segments, sigma, True, frame, meta, faces.points, sigma)
+    meta = {"source": files[0], "resolution": f"{grid.resolution:g}", "surface": f"{faces.depth:.2f}"}
+    line_map = LineMap(faces.segments, sigma, True, frame, meta, faces.points, sigma)
+    return ImportedMap(line_map, notes.report(format, files), picture_of(grid))

@@ -11,16 +11,10 @@ from .limits import MAX_YAML_VALUES
 from .report import shown
 
 
-def yaml_of(text: str, name: str) -> object:
+def yaml_of(text: str) -> object:
     """Return what a text in YAML holds.
 
     Aliases and merge keys let a few lines stand for any number of values; these are counted before any is built.
-
-    Parameters
-    ----------
-    text : str
-    name : str
-        Of the file, for errors.
 
     Raises
     ------
@@ -33,7 +27,7 @@ def yaml_of(text: str, name: str) -> object:
     try:
         root = YAML(typ="safe", pure=True).compose(text)
         if root is not None and _values(root, {}) > MAX_YAML_VALUES:
-            raise TooLargeError(f"expected at most {MAX_YAML_VALUES} values, aliases counted each time", argument=name)
+            raise TooLargeError(f"expected at most {MAX_YAML_VALUES} values, aliases counted each time")
         return YAML(typ="safe", pure=True).load(text)
     except (YAMLError, RecursionError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         if isinstance(error, TooLargeError):
@@ -42,7 +36,7 @@ def yaml_of(text: str, name: str) -> object:
         if isinstance(error, MarkedYAMLError) and error.problem_mark is not None:
             problem = (error.problem or "it cannot be read").partition(" with value")[0]
             where = f": line {error.problem_mark.line + 1}: {shown(problem)}; correct it"
-        raise MalformedFileError(f"is not YAML{where}", argument=name) from error
+        raise MalformedFileError(f"is not YAML{where}") from error
 
 
 def _values(node: Node, known: dict[int, int]) -> int:

@@ -56,7 +56,7 @@ def require_lengths(told: Any, drawing: Drawing) -> None:
     if units is None or small or (isinstance(units, str) and code in MERCATOR):
         why = _why_not(name, code, (x, y), extent, drawing.options.local_metres)
     if why is not None:
-        raise IncompleteFileError(why, argument=drawing.name)
+        raise IncompleteFileError(why)
     if name and not (units is None and _within(code, METRIC)):
         drawing.notes.add_assumed("crs", f"the unit is that of an option; the file has the crs {name}")
 

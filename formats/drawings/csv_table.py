@@ -67,21 +67,19 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     FormatError
         When a row has no four numbers, or it is not clear which columns are the coordinates.
     """
-    name = name_of(path)
-    text = text_of(read_bounded(path, MAX_MAP_BYTES), name)
+    text = text_of(read_bounded(path, MAX_MAP_BYTES))
     ends = sum(text.count(end) for end in ("\n", "\r"))
     if ends > 2 * MAX_LINES:
-        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends", argument=name)
+        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends")
     lines = list(io.StringIO(text, newline=None))
     longest = max(map(len, lines), default=0)
     if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
         raise TooLargeError(
-            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}",
-            argument=name,
+            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}"
         )
     comments = {line[1:].strip() for line in lines if line.startswith("#")}
-    table = _table(lines, name)
-    drawing = Drawing(name, "csv", notes, options, table.metres, "oriented=true" in comments)
+    table = _table(lines)
+    drawing = Drawing(name_of(path), "csv", notes, options, table.metres, "oriented=true" in comments)
     others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
     commas, loose = 0, []
     for row, line in zip(table.rows, table.lines, strict=True):
@@ -90,9 +88,9 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         if len(numbers) < len(COLUMNS):
             wrong = next(k for k in table.wanted if k >= len(row) or _number(row[k]) is None)
             found = f"'{shown(row[wrong])}' in column {wrong + 1}" if wrong < len(row) else f"{len(row)} cells"
-            raise MalformedFileError(f"line {line}: expected rows of x1, y1, x2, y2, found {found}", argument=name)
+            raise MalformedFileError(f"line {line}: expected rows of x1, y1, x2, y2, found {found}")
         if not table.names and sum(_number(cell) is not None for cell in row) > len(COLUMNS):
-            raise _unclear(row, line, name)
+            raise _unclear(row, line)
         commas += any("," in row[k] for k in table.wanted)
         properties = {table.names[k]: row[k] for k in others if k < len(row)}
         layer = properties.get("layer", texts[0] if texts and not table.names else None)
@@ -109,7 +107,7 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     return drawing
 
 
-def _table(lines: list[str], name: str) -> Table:
+def _table(lines: list[str]) -> Table:
     """Return the table by the delimiter that gives four numbers, or a header; else by the most frequent one."""
     kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip(" \t\r\n,;|") and not line.startswith(COMMENTS)]
     told = re.fullmatch(r"\"?sep=(.)\"?\s*", kept[0][1]) if kept else None
@@ -122,7 +120,7 @@ def _table(lines: list[str], name: str) -> Table:
         if names or sum(_number(cell) is not None for cell in header) >= len(COLUMNS):
             break
     else:
-        raise _no_columns(header, kept[0][0] if kept else 1, name)
+        raise _no_columns(header, kept[0][0] if kept else 1)
     kept = kept[1:] if names else kept
     try:
         reader = csv.reader((line for _, line in kept), delimiter=delimiter)
@@ -132,7 +130,7 @@ def _table(lines: list[str], name: str) -> Table:
             at.append(kept[reader.line_num - 1][0])
     except csv.Error as error:
         raise MalformedFileError(
-            "expected rows of x1, y1, x2, y2, found cells that cannot be divided: check the quotes", argument=name
+            "expected rows of x1, y1, x2, y2, found cells that cannot be divided: check the quotes"
         ) from error
     return Table(rows, at, columns, names, metres)
 
@@ -169,17 +167,15 @@ def _number(cell: str) -> float | None:
     return float(cell) if NUMBER.fullmatch(cell) else None
 
 
-def _unclear(row: list[str], line: int, name: str) -> IncompleteFileError:
+def _unclear(row: list[str], line: int) -> IncompleteFileError:
     numbers = sum(_number(cell) is not None for cell in row)
     return IncompleteFileError(
         f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected four: x1, y1, x2, y2. An index, z, "
-        "or decimal commas make more. Delete the others, or name the columns in a first row: x1,y1,x2,y2 among others",
-        argument=name,
+        "or decimal commas make more. Delete the others, or name the columns in a first row: x1,y1,x2,y2 among others"
     )
 
 
-def _no_columns(cells: list[str], line: int, name: str) -> MalformedFileError:
+def _no_columns(cells: list[str], line: int) -> MalformedFileError:
     return MalformedFileError(
-        f"line {line}: expected rows of x1, y1, x2, y2, or a row of these names, found {first_of(cells) or 'none'}",
-        argument=name,
+        f"line {line}: expected rows of x1, y1, x2, y2, or a row of these names, found {first_of(cells) or 'none'}"
     )

@@ -179,9 +179,7 @@ class Drawing:
     def _keep(self, polyline: Polyline) -> None:
         self._count += len(polyline.ends)
         if self._count > MAX_SEGMENTS:
-            raise TooLargeError(
-                f"expected at most {MAX_SEGMENTS} lines, found {self._count} or more; select layers", argument=self.name
-            )
+            raise TooLargeError(f"expected at most {MAX_SEGMENTS} lines, found {self._count} or more; select layers")
         if len(polyline.ends):
             self.polylines.append(polyline)
 
@@ -190,13 +188,13 @@ class Drawing:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise MalformedFileError(
-                f"has a coordinate that is not a number up to {MAX_UNITS:g}: found text or a list", argument=self.name
+                f"has a coordinate that is not a number up to {MAX_UNITS:g}: found text or a list"
             ) from error
         columns = columns or (2, 3)
         if array.size == 0:
             return np.zeros((0, columns[0]))
         if array.ndim != 2 or array.shape[1] not in columns or not (np.abs(array) <= MAX_UNITS).all():
-            raise MalformedFileError(f"has a coordinate that is not a number up to {MAX_UNITS:g}", argument=self.name)
+            raise MalformedFileError(f"has a coordinate that is not a number up to {MAX_UNITS:g}")
         return array
 
     @property
@@ -216,8 +214,7 @@ class Drawing:
         if min(width, depth) <= FLAT * max(width, depth) and height > STEEP * max(width, depth):
             raise MalformedFileError(
                 f"is no plan: its lines extend {width:g} by {depth:g} units in x and y, and {height:g} in z, as a "
-                "section or an elevation; expected walls in the x-y plane. Rotate the drawing",
-                argument=self.name,
+                "section or an elevation; expected walls in the x-y plane. Rotate the drawing"
             )
 
     def drop(self, kind: str, *, hint: str = "") -> None:
@@ -230,4 +227,4 @@ class Drawing:
         """Return the error for a drawing without lines: it names what is there instead."""
         found = [f"{note.message} ({note.count})" for note in self.notes.dropped.values()]
         what = f"; the file has: {'; '.join(found)}" if found else ""
-        return MalformedFileError(f"has no lines that could be walls{what}", argument=self.name)
+        return MalformedFileError(f"has no lines that could be walls{what}")

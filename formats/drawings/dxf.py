@@ -65,9 +65,8 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     FormatError
         When it is no DXF, or expands to too much.
     """
-    name = name_of(path)
     document = _document(path, notes)
-    drawing = Drawing(name, "dxf", notes, options, _metres(document, notes))
+    drawing = Drawing(name_of(path), "dxf", notes, options, _metres(document, notes))
     expansion = Expansion.of(document, drawing)
     metres = options.metres or drawing.metres or 1.0
     directed = 0
@@ -84,7 +83,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         raise
     except BROKEN as error:
         raise MalformedFileError(
-            "has a block that cannot be read; expected valid entities. Repair the drawing (AUDIT)", argument=name
+            "has a block that cannot be read; expected valid entities. Repair the drawing (AUDIT)"
         ) from error
     _note_paper_space(document, drawing)
     drawing.oriented = 0 < directed == len(drawing.polylines)
@@ -92,20 +91,19 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 
 def _document(path: Path, notes: Notes) -> Document:
-    name, content = name_of(path), read_bounded(path, MAX_MAP_BYTES)
+    content = read_bounded(path, MAX_MAP_BYTES)
     if content[:4] == b"AC10":
-        raise UnsupportedFormatError("is a DWG, which is not supported; save it as DXF", argument=name)
+        raise UnsupportedFormatError("is a DWG, which is not supported; save it as DXF")
     if not content.strip():
-        raise MalformedFileError("is empty, expected a DXF", argument=name)
+        raise MalformedFileError("is empty, expected a DXF")
     if sum(1 for _ in islice(_OBJECT.finditer(content), MAX_DXF_OBJECTS + 1)) > MAX_DXF_OBJECTS:
         raise TooLargeError(
-            f"expected at most {MAX_DXF_OBJECTS} entities and objects, found more; delete those that are no walls",
-            argument=name,
+            f"expected at most {MAX_DXF_OBJECTS} entities and objects, found more; delete those that are no walls"
         )
     try:
         document, auditor = _parsed(path, content)
     except (OSError, *BROKEN) as error:
-        raise MalformedFileError("is not a DXF", argument=name) from error
+        raise MalformedFileError("is not a DXF") from error
     if auditor.fixes or auditor.errors:
         notes.add_assumed("repairs", "errors of the file that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
@@ -163,18 +161,14 @@ def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
         width = max(0.0, _width(entity))
         parts = shown_parts(points, placed.clips) if len(points) <= MAX_CURVE_POINTS else []
     except BROKEN as error:
-        raise MalformedFileError(
-            f"has a broken {_named(placed)}; delete it, or repair the drawing (AUDIT)", argument=drawing.name
-        ) from error
+        raise MalformedFileError(f"has a broken {_named(placed)}; delete it, or repair the drawing (AUDIT)") from error
     if not near:
         raise TooLargeError(
-            f"has coordinates beyond {MAX_COORDINATE:g} m: {_named(placed)}; delete it, or set the option units",
-            argument=drawing.name,
+            f"has coordinates beyond {MAX_COORDINATE:g} m: {_named(placed)}; delete it, or set the option units"
         )
     if len(points) > MAX_CURVE_POINTS:
         raise TooLargeError(
-            f"expected at most {MAX_CURVE_POINTS} points of a curve, found more; simplify the {_named(placed)}",
-            argument=drawing.name,
+            f"expected at most {MAX_CURVE_POINTS} points of a curve, found more; simplify the {_named(placed)}"
         )
     if placed.clips and (len(parts) != 1 or len(parts[0]) < len(points)):
         drawing.notes.add_dropped("clipped", "lines that the clipping of a block (XCLIP) hides, or divides", 1)

@@ -180,7 +180,7 @@ class Expansion:
             notes.add_dropped("missing_block", what, self._missing.total())
 
     def _refuse(self, why: str) -> None:
-        raise TooLargeError(why, argument=self.drawing.name)
+        raise TooLargeError(why)
 
 
 def _layers_of(entity: DXFEntity, outer: tuple[str, ...]) -> tuple[str, ...]:

@@ -42,36 +42,33 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     FormatError
         When it is no GeoJSON, or its coordinates are degrees or of an unknown unit.
     """
-    name = name_of(path)
-    root = _loaded(read_bounded(path, MAX_MAP_BYTES), name)
+    root = _loaded(read_bounded(path, MAX_MAP_BYTES))
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
         found = "an object without it" if isinstance(root, dict) else kind_of(root)
-        raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}", argument=name)
+        raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}")
     own = root.get(OWN)
     told = own if isinstance(own, dict) else {}
-    drawing = Drawing(name, "geojson", notes, options, 1.0, told.get("oriented") is True)
+    drawing = Drawing(name_of(path), "geojson", notes, options, 1.0, told.get("oriented") is True)
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
-        raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}", argument=name)
+        raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}")
     if len(features) > MAX_ENTITIES:
-        raise TooLargeError(f"expected at most {MAX_ENTITIES} features, found {len(features)}", argument=name)
+        raise TooLargeError(f"expected at most {MAX_ENTITIES} features, found {len(features)}")
     for k, feature in enumerate(features):
         if not isinstance(feature, dict):
-            raise MalformedFileError(
-                f"expected every feature to be an object, found {kind_of(feature)} as feature {k}", argument=name
-            )
+            raise MalformedFileError(f"expected every feature to be an object, found {kind_of(feature)} as feature {k}")
         _read_feature(feature, drawing, k)
     if told.get("metres") is not True:
         require_lengths(root.get("crs", root.get("coordRefSys")), drawing)
     return drawing
 
 
-def _loaded(content: bytes, name: str) -> Any:
+def _loaded(content: bytes) -> Any:
     """Return the object of a file, or the collection of those on its lines (RFC 8142, and without its separators)."""
     lines = [line for one in content.split(b"\n") if (line := one.strip(b"\x1e \r\t"))]
     if len(lines) < 2 or not all(line.startswith(b"{") and line.endswith(b"}") for line in lines):
-        return load_json(content, name)
-    return load_json(b'{"type": "FeatureCollection", "features": [' + b",".join(lines) + b"]}", name)
+        return load_json(content)
+    return load_json(b'{"type": "FeatureCollection", "features": [' + b",".join(lines) + b"]}")
 
 
 def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> None:
@@ -91,14 +88,12 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> Non
             places = [(p[0], p[1], p[2] if len(p) > 2 else height) for p in points]
         except (TypeError, LookupError) as error:
             raise MalformedFileError(
-                f"has a position that is not [x, y] in feature {number}: check the nesting of lists",
-                argument=drawing.name,
+                f"has a position that is not [x, y] in feature {number}: check the nesting of lists"
             ) from error
         wrong = next((c for place in places for c in place if type(c) not in (int, float)), 0)
         if wrong != 0:
             raise MalformedFileError(
-                f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)} in feature {number}",
-                argument=drawing.name,
+                f"has a coordinate that is not a number: expected metres, found {kind_of(wrong)} in feature {number}"
             )
         drawing.add(
             places, closed=closed, width=width, layers=layers[:1], properties=named, groups=layers[: "layer" in named]
@@ -125,14 +120,9 @@ def _width(value: Any) -> float | None:
 def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
     """Yield the polylines of a geometry, and whether each is closed."""
     if not isinstance(geometry, dict):
-        raise MalformedFileError(
-            f"expected a geometry to be an object, found {kind_of(geometry)}", argument=drawing.name
-        )
+        raise MalformedFileError(f"expected a geometry to be an object, found {kind_of(geometry)}")
     if depth > MAX_COLLECTIONS:
-        raise MalformedFileError(
-            f"expected at most {MAX_COLLECTIONS} nested collections, found more; flatten them",
-            argument=drawing.name,
-        )
+        raise MalformedFileError(f"expected at most {MAX_COLLECTIONS} nested collections, found more; flatten them")
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind == "GeometryCollection":
         for inner in _listed(geometry.get("geometries"), drawing):
@@ -152,5 +142,5 @@ def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
 
 def _listed(value: Any, drawing: Drawing) -> list[Any]:
     if not isinstance(value, list):
-        raise MalformedFileError(f"expected coordinates in lists, found {kind_of(value)}", argument=drawing.name)
+        raise MalformedFileError(f"expected coordinates in lists, found {kind_of(value)}")
     return value

@@ -26,19 +26,18 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     MalformedFileError
         When it is something else.
     """
-    name = name_of(path)
-    root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
+    root = load_json(read_bounded(path, MAX_MAP_BYTES))
     told = {"segments": root} if isinstance(root, list) else root
     if not isinstance(told, dict) or not isinstance(told.get("segments"), list):
         found = f"segments that are {kind_of(told.get('segments'))}" if isinstance(told, dict) else kind_of(told)
         if isinstance(told, dict) and "features" in told:
             found += ", as in GeoJSON: rename the file to .geojson" if "type" in told else "; convert it to GeoJSON"
-        raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}', argument=name)
+        raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}')
     rows = told["segments"]
     wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, 4, f"segment {k}"))), None)
     if wrong is not None:
-        raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}", argument=name)
-    drawing = Drawing(name, "json", notes, options, 1.0)
+        raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}")
+    drawing = Drawing(name_of(path), "json", notes, options, 1.0)
     _take_properties(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
         notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
@@ -73,13 +72,13 @@ def _take_properties(told: dict[str, Any], drawing: Drawing) -> None:
     for key, is_good, what in CHECKS:
         if not is_good(values.get(key)):
             found = kind_of(values[key])
-            raise MalformedFileError(f"expected {key} to be {what}, found {found}", argument=drawing.name)
+            raise MalformedFileError(f"expected {key} to be {what}, found {found}")
     points, sigma, points_sigma = values["points"], values["sigma"], values["points_sigma"]
     wrong = next((fault for k, row in enumerate(points) if (fault := _fault_of_row(row, 2, f"point {k}"))), None)
     if wrong is not None:
-        raise MalformedFileError(f"expected every point to be [x, y], found {wrong}", argument=drawing.name)
+        raise MalformedFileError(f"expected every point to be [x, y], found {wrong}")
     if len(points) > MAX_POINTS:
-        raise TooLargeError(f"expected at most {MAX_POINTS} points, found {len(points)}", argument=drawing.name)
+        raise TooLargeError(f"expected at most {MAX_POINTS} points, found {len(points)}")
     drawing.oriented, drawing.sigma = values["oriented"], None if sigma is None else float(sigma)
     drawing.frame_id = shown(values["frame_id"])
     drawing.meta = {shown(str(k)): shown(v) for k, v in (values.get("meta") or {}).items() if isinstance(v, str)}

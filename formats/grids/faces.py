@@ -49,7 +49,7 @@ class Faces:
     depth: float
 
 
-def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None) -> Faces:
+def find_faces(grid: Grid, notes: Notes, surface: float | None = None) -> Faces:
     """Find the faces of the walls in a grid, and what is too small for one.
 
     Contours of the free space have it on their left. A border with unknown cells is no wall. The
@@ -59,8 +59,6 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     ----------
     grid : Grid
     notes : Notes
-    name : str
-        Of the file, for errors.
     surface : float or None
         Depth of the walls' surface behind the front, cells; None: estimated from the grid.
 
@@ -86,13 +84,12 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     for word, count in counts.items():
         notes.add_read(f"{word}_cells", f"{word} cells" if count else f"no {word} cell", count)
     depth, drawn = surface_depth(cells) if surface is None else (surface, False)
-    fronts, normals = _fronts(cells, grid, name)
+    fronts, normals = _fronts(cells, grid)
     if not len(fronts):
         told = ", ".join(f"{count} {word}" for word, count in counts.items())
         said = "".join(f"; {note.message}" for code, note in notes.assumed.items() if code in DECIDED)
         raise MalformedFileError(
-            f"no wall found: expected a straight border between free and occupied cells, found {told} cells{said}",
-            argument=name,
+            f"no wall found: expected a straight border between free and occupied cells, found {told} cells{said}"
         )
     why = "as an option states" if surface is not None else WHY_DRAWN if drawn else WHY_MAPPED
     notes.add_assumed(
@@ -104,7 +101,7 @@ def find_faces(grid: Grid, notes: Notes, name: str, surface: float | None = None
     return Faces(Segments.from_array(placed.reshape(-1, 4)), grid.origin.apply(points * grid.resolution), depth)
 
 
-def _fronts(cells: Cells, grid: Grid, name: str) -> tuple[Floats, Floats]:
+def _fronts(cells: Cells, grid: Grid) -> tuple[Floats, Floats]:
     """Return the lines along the fronts of the occupied cells, (n, 4), metres, and their normals, (n, 2)."""
     size = grid.resolution
     options = VectorizationOptions(sigma=tuning.CONTOUR_SIGMA * size, min_length=max(1e-3, tuning.LEAST_LENGTH * size))
@@ -116,8 +113,7 @@ def _fronts(cells: Cells, grid: Grid, name: str) -> tuple[Floats, Floats]:
         count += len(lines)
         if count > MAX_SEGMENTS:
             raise TooLargeError(
-                f"expected a grid of at most {MAX_SEGMENTS} segments, found more; crop it, or remove noise",
-                argument=name,
+                f"expected a grid of at most {MAX_SEGMENTS} segments, found more; crop it, or remove noise"
             )
     return np.concatenate(fronts), np.concatenate(normals)
 

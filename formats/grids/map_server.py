@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 
 from registration import RigidTransform
 
-from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError
+from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError, naming
 from ..files import kind_of, name_of, read_bounded, text_of
 from ..limits import (
     MAX_CELLS,
@@ -104,10 +104,10 @@ def read_grid(
         )
     if not picture.exists():
         raise IncompleteFileError(
-            f"names the picture {shown(told.image)}, but there is no such file beside it; copy it there",
-            argument=name_of(path),
+            f"names the picture {shown(told.image)}, but there is no such file beside it; copy it there"
         )
-    pixels, alpha = read_picture(picture)
+    with naming(name_of(picture)):
+        pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
         told.resolution,
@@ -131,22 +131,19 @@ def read_description(path: Path, notes: Notes) -> Description:
     IncompleteFileError
         When `image`, `resolution` or `origin` is missing.
     """
-    name = name_of(path)
-    text = text_of(read_bounded(path, MAX_YAML_BYTES), name)
-    values = yaml_of(text, name)
+    values = yaml_of(text_of(read_bounded(path, MAX_YAML_BYTES)))
     if not isinstance(values, dict):
         raise MalformedFileError(
             f"expected a YAML mapping with image, resolution and origin, a space after each colon, found "
-            f"{kind_of(values)}",
-            argument=name,
+            f"{kind_of(values)}"
         )
     missing = [key for key in ("image", "resolution", "origin") if key not in values]
     if missing:
-        raise IncompleteFileError(f"has no {' and no '.join(missing)}; add it", argument=name)
+        raise IncompleteFileError(f"has no {' and no '.join(missing)}; add it")
     mode = str(values.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise UnsupportedFormatError(
-            f"has an unknown mode; expected one of {', '.join(MODES)}, found {shown(str(mode))}", argument=name
+            f"has an unknown mode; expected one of {', '.join(MODES)}, found {shown(str(mode))}"
         )
     for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
         if key not in values:
@@ -154,20 +151,20 @@ def read_description(path: Path, notes: Notes) -> Description:
     if mode == "raw":
         notes.add_assumed("mode", "in mode raw grey values up to 100 are an occupancy in percent, others are unknown")
     free, occupied = (
-        _number(values, f"{key}_thresh", name, 0.0, 1.0, usual) for key, usual in (("free", 0.196), ("occupied", 0.65))
+        _number(values, f"{key}_thresh", 0.0, 1.0, usual) for key, usual in (("free", 0.196), ("occupied", 0.65))
     )
     if free > occupied:
         raise MalformedFileError(
-            f"expected free_thresh below occupied_thresh, found {free:g} and {occupied:g}; exchange them", argument=name
+            f"expected free_thresh below occupied_thresh, found {free:g} and {occupied:g}; exchange them"
         )
-    resolution = _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION)
+    resolution = _number(values, "resolution", MIN_RESOLUTION, MAX_RESOLUTION)
     if resolution > COARSE:
         notes.add_assumed("resolution", f"a cell is {resolution:g} m wide; if these are centimetres, divide by 100")
     return Description(
-        *_image(values["image"], name),
+        *_image(values["image"]),
         resolution,
-        _origin(values["origin"], name, notes),
-        bool(_number(values, "negate", name, 0, 1, 0.0)),
+        _origin(values["origin"], notes),
+        bool(_number(values, "negate", 0, 1, 0.0)),
         occupied,
         free,
         mode,
@@ -179,25 +176,21 @@ def _beside(path: Path, told: Description) -> Path:
     return named if named.exists() else path.parent / told.image
 
 
-def _image(value: Any, name: str) -> tuple[str, str]:
+def _image(value: Any) -> tuple[str, str]:
     """Return the name of the picture, and its folder where that is below the folder of the YAML."""
     whole = PureWindowsPath(value if isinstance(value, str) else "")
     image = whole.name
     if not image or "\0" in image:
         found = "a name that no file can have" if isinstance(value, str) else kind_of(value)
-        raise MalformedFileError(f"expected image to be the name of a file, found {found}", argument=name)
+        raise MalformedFileError(f"expected image to be the name of a file, found {found}")
     return image, "" if whole.anchor or ".." in whole.parts else whole.parent.as_posix()
 
 
-def _number(
-    values: dict[Any, Any], key: str, name: str, low: float, high: float, default: float | None = None
-) -> float:
+def _number(values: dict[Any, Any], key: str, low: float, high: float, default: float | None = None) -> float:
     value = values.get(key, default)
     value = _numeric(WORDS.get(value.lower(), value) if isinstance(value, str) else value)
     if not isinstance(value, int | float) or not low <= value <= high:
-        raise MalformedFileError(
-            f"expected {key} to be a number from {low:g} to {high:g}, found {_found(value)}", argument=name
-        )
+        raise MalformedFileError(f"expected {key} to be a number from {low:g} to {high:g}, found {_found(value)}")
     return float(value)
 
 
@@ -213,22 +206,19 @@ def _found(value: Any) -> str:
     return f"'{shown(value)}'" if isinstance(value, str) else kind_of(value)
 
 
-def _origin(value: Any, name: str, notes: Notes) -> RigidTransform:
+def _origin(value: Any, notes: Notes) -> RigidTransform:
     told = [v if isinstance(v, bool) else _numeric(v) for v in value] if isinstance(value, list) else []
     numbers = len(told) == 3 and all(type(v) is float for v in told)
     if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in told[:2]) or math.isinf(told[2]):
         found = ", ".join(map(_found, told[:4])) if told else _found(value)
-        raise MalformedFileError(
-            f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}, found {found}", argument=name
-        )
+        raise MalformedFileError(f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}, found {found}")
     if math.isnan(told[2]):
         notes.add_assumed("orientation", "the yaw of the origin is not a number, as map_saver writes it; 0 is assumed")
         told[2] = 0.0
     if abs(told[2]) > MAX_YAW:
         raise MalformedFileError(
             f"expected the yaw of the origin in radians, at most {math.tau:.4g}, found {told[2]:g}; if these are "
-            f"degrees, write {math.radians(told[2]):.6g}",
-            argument=name,
+            f"degrees, write {math.radians(told[2]):.6g}"
         )
     return RigidTransform(*map(float, told))
 
@@ -250,7 +240,6 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
     TooLargeError
         When it has too many pixels.
     """
-    name = name_of(path)
     content = read_bounded(path, MAX_MAP_BYTES)
     kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), None)
     try:
@@ -261,23 +250,19 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
                 if picture.width * picture.height > MAX_CELLS:
                     raise TooLargeError(
-                        f"expected at most {MAX_CELLS} pixels, found {picture.width} x {picture.height}; crop the map",
-                        argument=name,
+                        f"expected at most {MAX_CELLS} pixels, found {picture.width} x {picture.height}; crop the map"
                     )
                 return _pixels(picture)
     except FormatError:
         raise
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        raise TooLargeError(
-            f"expected at most {MAX_CELLS} pixels, found many more; crop the map", argument=name
-        ) from error
+        raise TooLargeError(f"expected at most {MAX_CELLS} pixels, found many more; crop the map") from error
     except UnidentifiedImageError as error:
         said = f"is {kind or 'not a picture'}; expected PGM, PNG, BMP or JPEG. Save it as PNG"
-        raise MalformedFileError(said, argument=name) from error
+        raise MalformedFileError(said) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(
-            f"is a broken picture: {shown(str(error))}; expected a whole PGM, PNG, BMP or JPEG. Save it again",
-            argument=name,
+            f"is a broken picture: {shown(str(error))}; expected a whole PGM, PNG, BMP or JPEG. Save it again"
         ) from error
 
 

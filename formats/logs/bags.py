@@ -23,7 +23,7 @@ from rosbags.rosbag2 import ReaderError as ReaderError2
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from ..errors import FormatError, MalformedFileError
+from ..errors import FormatError, MalformedFileError, naming
 from ..files import name_of
 from ..limits import MAX_MESSAGE_BYTES
 from ..report import Notes, shown
@@ -215,7 +215,8 @@ def _mended_by(name: str) -> str:
 def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iterator[None]:
     """Turn what a broken bag brings about into an error of this package; the `folder` that it is in is left out."""
     try:
-        yield
+        with naming(name):
+            yield
     except FormatError:
         raise
     except BROKEN as error:

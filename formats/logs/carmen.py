@@ -58,14 +58,11 @@ def read_carmen(path: Path, options: LogOptions) -> Log:
         While iterating, when a line is too long.
     """
     if not path.is_file():
-        raise IncompleteFileError(
-            "there is no such file; check the path and the working folder", argument=name_of(path)
-        )
+        raise IncompleteFileError("there is no such file; check the path and the working folder")
     return Log("carmen", name_of(path), partial(_scans, path, options))
 
 
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
-    name = name_of(path)
     wanted, stamps, first = options.topic, Stamps(notes), ""
     moves: bool | None = None
     seen: Counter[str] = Counter()
@@ -102,10 +99,10 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             scan = replace(scan, pose=None, pose_frame="")
         yield stamps.placed(scan)
     if "scans" not in notes.read and first:
-        raise none_usable(name, notes, first)
+        raise none_usable(notes, first)
     if "scans" not in notes.read:
         there = ", ".join(f"{count} {kind}" for kind, count in sorted(seen.items())) or "no message of CARMEN"
-        raise IncompleteFileError(f"has no {wanted or 'scan'}; it has {there}", argument=name)
+        raise IncompleteFileError(f"has no {wanted or 'scan'}; it has {there}")
 
 
 def _moves(path: Path, kind: str) -> bool:
@@ -128,9 +125,9 @@ def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
         while line := file.readline(MAX_LINE_BYTES + 1):
             number += 1
             if len(line) > MAX_LINE_BYTES:
-                raise TooLargeError(f"line {number}: expected at most {MAX_LINE_BYTES} bytes", argument=name_of(path))
+                raise TooLargeError(f"line {number}: expected at most {MAX_LINE_BYTES} bytes")
             if number == 1 and line.startswith(WIDE):
-                raise MalformedFileError("is text in UTF-16; save it as UTF-8", argument=name_of(path))
+                raise MalformedFileError("is text in UTF-16; save it as UTF-8")
             words = line.removeprefix(BYTE_ORDER_MARK if number == 1 else b"").decode("ascii", "replace").split()
             if not words or words[0].startswith("#"):
                 continue

@@ -6,7 +6,7 @@ import re
 from pathlib import Path, PureWindowsPath
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, UnsupportedFormatError
-from ..files import name_of, read_bounded, text_of
+from ..files import read_bounded, text_of
 from ..limits import MAX_METADATA_BYTES, MAX_RECORDED_FILES
 from ..report import Notes, first_of
 from ..yaml import yaml_of
@@ -40,13 +40,12 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     FormatError
         When there is none that can be read.
     """
-    name = name_of(path)
     if not path.exists():
-        raise IncompleteFileError("there is no such file; check the path and the working folder", argument=name)
+        raise IncompleteFileError("there is no such file; check the path and the working folder")
     if not path.is_dir():
         hint = _hint(path)
         if hint is not None:
-            raise UnsupportedFormatError(hint, argument=name)
+            raise UnsupportedFormatError(hint)
         return [path]
     listed = _listed(path, notes) if (path / METADATA).is_file() else None
     if listed is None:
@@ -55,7 +54,7 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     missing = [file.name for file in listed if _unpacked(file) not in found]
     if not found:
         _refuse_packed(path)
-        raise MalformedFileError(f"is missing the files that {METADATA} lists: {first_of(missing)}", argument=name)
+        raise MalformedFileError(f"is missing the files that {METADATA} lists: {first_of(missing)}")
     if missing:
         notes.add_dropped(
             "missing_files", f"files that {METADATA} lists and that are missing: {first_of(missing)}", len(missing)
@@ -66,7 +65,7 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
 def _listed(folder: Path, notes: Notes) -> list[Path] | None:
     """Return the files that the description of a bag lists; None where it cannot be used."""
     try:
-        told = yaml_of(text_of(read_bounded(folder / METADATA, MAX_METADATA_BYTES), METADATA), METADATA)
+        told = yaml_of(text_of(read_bounded(folder / METADATA, MAX_METADATA_BYTES)))
         listed = told["rosbag2_bagfile_information"]["relative_file_paths"]  # type: ignore[index]
         if not (isinstance(listed, list) and listed and all(isinstance(one, str) for one in listed)):
             raise TypeError
@@ -83,15 +82,13 @@ def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     if not found:
         _refuse_packed(folder)
         raise IncompleteFileError(
-            f"is a folder without a bag: expected {METADATA}, or files that end in {' or '.join(FOLDER_SUFFIXES)}",
-            argument=name_of(folder),
+            f"is a folder without a bag: expected {METADATA}, or files that end in {' or '.join(FOLDER_SUFFIXES)}"
         )
     stems = sorted({_NUMBER.sub("", file.stem) for file in found})
     if len(stems) > 1 or len({file.suffix.lower() for file in found}) > 1:
         raise IncompleteFileError(
             f"has no {METADATA}, and files of several recordings: {first_of([f.name for f in found])}; choose one of "
-            "them",
-            argument=name_of(folder),
+            "them"
         )
     if not (folder / METADATA).is_file():
         notes.add_assumed(
@@ -125,14 +122,11 @@ def _refuse_packed(folder: Path) -> None:
     packed, active = _packed(folder), _active(folder)
     if packed:
         raise UnsupportedFormatError(
-            f"is compressed file by file ({first_of([file.name for file in packed])}); decompress it first with "
-            "zstd -d",
-            argument=name_of(folder),
+            f"is compressed file by file ({first_of([file.name for file in packed])}); decompress it first with zstd -d"
         )
     if active:
         raise UnsupportedFormatError(
-            f"is not a bag of ROS 2, and has {first_of([file.name for file in active])}; choose one file",
-            argument=name_of(folder),
+            f"is not a bag of ROS 2, and has {first_of([file.name for file in active])}; choose one file"
         )
 
 

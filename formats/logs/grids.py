@@ -62,11 +62,11 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
         elif any(counts.values()):
             wanted = {one for one in counts if counts[one]}
         else:
-            raise IncompleteFileError(f"has no messages of OccupancyGrid; {bag.topics()}", argument=bag.name)
+            raise IncompleteFileError(f"has no messages of OccupancyGrid; {bag.topics()}")
         grids = _last_grids(bag, wanted)
         if not grids:
-            raise MalformedFileError(f"has no grid with cells on {_listed(wanted)}", argument=bag.name)
-        chosen = next(iter(grids)) if len(wanted) == 1 else _map_among(grids, bag.name, notes)
+            raise MalformedFileError(f"has no grid with cells on {_listed(wanted)}")
+        chosen = next(iter(grids)) if len(wanted) == 1 else _map_among(grids, notes)
         notes.add_read("grids", f"grids of {shown(chosen)}, of which the last is used", counts[chosen])
         costmap = is_costmap(chosen, grids[chosen])
         if costmap:
@@ -74,7 +74,7 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
                 f"{shown(chosen)} is a costmap with inflated obstacles; walls may lie in front of their true positions"
             )
             notes.add_assumed("costmap", said)
-        grid, frame = grid_of(grids[chosen], bag.name, notes)
+        grid, frame = grid_of(grids[chosen], notes)
         return BagGrid(grid, frame, bag.format, shown(chosen), costmap)
 
 
@@ -87,7 +87,7 @@ def _last_grids(bag: Bag, topics: Collection[str]) -> dict[str, Any]:
     return {topic: found[topic] for topic in sorted(found)}
 
 
-def _map_among(grids: dict[str, Any], name: str, notes: Notes) -> str:
+def _map_among(grids: dict[str, Any], notes: Notes) -> str:
     """Return the topic that is the map.
 
     Raises
@@ -105,8 +105,7 @@ def _map_among(grids: dict[str, Any], name: str, notes: Notes) -> str:
         sizes = [f"{shown(topic)} ({_size(grids[topic])})" for topic in grids][:NAMED]
         raise IncompleteFileError(
             f"has several grids, and none is clearly the map: {', '.join(sizes)}; choose one with the option topic "
-            "(--topic)",
-            argument=name,
+            "(--topic)"
         )
     others = [f"{shown(topic)} ({_size(grids[topic])})" for topic in grids if topic != chosen][:NAMED]
     notes.add_assumed(
@@ -150,15 +149,13 @@ def _cells(message: Any) -> NDArray[np.int8] | None:
     return cells.reshape(height, width) if cells.size and width * height == cells.size else None
 
 
-def grid_of(message: Any, name: str, notes: Notes) -> tuple[Grid, str]:
+def grid_of(message: Any, notes: Notes) -> tuple[Grid, str]:
     """Return the cells of a message, and the frame that they are in.
 
     Parameters
     ----------
     message : object
         With the fields of ``nav_msgs/OccupancyGrid``.
-    name : str
-        Name of the file, for errors.
     notes : Notes
         Takes an orientation that was never set.
 
@@ -171,23 +168,21 @@ def grid_of(message: Any, name: str, notes: Notes) -> tuple[Grid, str]:
     resolution = float(np.float32(message.info.resolution))
     if width * height > MAX_CELLS:
         raise TooLargeError(
-            f"expected at most {MAX_CELLS} cells, found {width} x {height}; crop the map, or make its cells larger",
-            argument=name,
+            f"expected at most {MAX_CELLS} cells, found {width} x {height}; crop the map, or make its cells larger"
         )
     cells = _cells(message)
     if cells is None or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
         raise MalformedFileError(
             f"has a grid whose cells do not fit its size or resolution: {len(message.data)} cells for {width} x "
-            f"{height}, resolution {resolution:g} m, expected {MIN_RESOLUTION:g} to {MAX_RESOLUTION:g} m",
-            argument=name,
+            f"{height}, resolution {resolution:g} m, expected {MIN_RESOLUTION:g} to {MAX_RESOLUTION:g} m"
         )
     values = cells.astype(np.float32)
     occupancy = np.where((values >= 0) & (values <= 100), values / np.float32(100), np.float32(np.nan))
-    origin = _origin(message.info.origin, name, notes)
+    origin = _origin(message.info.origin, notes)
     return Grid(occupancy, round(resolution, 7), origin), shown(str(message.header.frame_id)) or "map"
 
 
-def _origin(pose: Any, name: str, notes: Notes) -> RigidTransform:
+def _origin(pose: Any, notes: Notes) -> RigidTransform:
     """Return where a grid lies in its frame.
 
     Raises
@@ -199,8 +194,7 @@ def _origin(pose: Any, name: str, notes: Notes) -> RigidTransform:
     turn = [float(getattr(pose.orientation, k)) for k in "xyzw"]
     if not all(map(math.isfinite, (*place, *turn))):
         raise MalformedFileError(
-            f"has a grid whose info.origin is not finite: position {_told(place)}, orientation {_told(turn)}",
-            argument=name,
+            f"has a grid whose info.origin is not finite: position {_told(place)}, orientation {_told(turn)}"
         )
     if max(map(abs, turn)) < ZERO:
         notes.add_assumed("orientation", "the grid's orientation is not set (all 0); no rotation is assumed")
@@ -209,8 +203,7 @@ def _origin(pose: Any, name: str, notes: Notes) -> RigidTransform:
     x, y, z, w = (value / length for value in turn)
     if 1.0 - 2.0 * (x * x + y * y) < UPRIGHT:
         raise MalformedFileError(
-            f"has a grid that is not horizontal: info.origin.orientation is {_told(turn)}, expected a rotation about z",
-            argument=name,
+            f"has a grid that is not horizontal: info.origin.orientation is {_told(turn)}, expected a rotation about z"
         )
     return RigidTransform(place[0], place[1], math.atan2(2.0 * (x * y + z * w), 1.0 - 2.0 * (y * y + z * z)))
 

@@ -115,19 +115,16 @@ class McapFile:
         except EndOfFile:
             magic = b""
         if magic.startswith(ZSTD):
-            raise UnsupportedFormatError(
-                "is compressed as a whole; decompress it first with zstd -d", argument=self.name
-            )
+            raise UnsupportedFormatError("is compressed as a whole; decompress it first with zstd -d")
         if magic != MAGIC:
-            raise MalformedFileError("is not an mcap: its first bytes are not those of the format", argument=self.name)
+            raise MalformedFileError("is not an mcap: its first bytes are not those of the format")
 
     def _refuse_empty(self) -> None:
         """Refuse a file that ends before the first message that can be read."""
         if self._cut and not any(one.msgcount for one in self.connections):
             raise MalformedFileError(
                 "is a broken bag: it ends before the first readable message; if it was cut off, "
-                "`mcap recover` repairs it",
-                argument=self.name,
+                "`mcap recover` repairs it"
             )
 
     def _summary(self) -> Summary | None:

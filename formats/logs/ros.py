@@ -67,7 +67,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
         if "scans" not in notes.read:
-            raise none_usable(bag.name, notes, first)
+            raise none_usable(notes, first)
 
 
 def _note_place(sensor: Sensor, place: Place, stamp: int, received: int, notes: Notes) -> None:

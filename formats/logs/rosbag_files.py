@@ -37,8 +37,7 @@ class RosbagFile:
         first = path.suffix.lower() == ".bag"
         if not first and any(letter in str(path) for letter in IN_A_URI):
             raise UnsupportedFormatError(
-                f"has one of the characters {' '.join(IN_A_URI)} in its path, which SQLite does not accept; rename it",
-                argument=self.name,
+                f"has one of the characters {' '.join(IN_A_URI)} in its path, which SQLite does not accept; rename it"
             )
         self._log = path.with_name(path.name + "-wal")
         self._reader: Any = Reader1(path) if first else Reader2(path)

@@ -10,7 +10,7 @@ from typing import Any
 from registration import IDENTITY, RigidTransform
 from vectorization import LaserScan
 
-from ..errors import MalformedFileError
+from ..errors import MalformedFileError, naming
 from ..report import ImportReport, Notes
 
 UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan", "upright_frame")
@@ -116,7 +116,8 @@ class Log:
 
     def __iter__(self) -> Iterator[LoggedScan]:
         self._notes = Notes()
-        return self._scans(self._notes)
+        with naming(self.name):
+            yield from self._scans(self._notes)
 
     @property
     def report(self) -> ImportReport:
@@ -124,13 +125,11 @@ class Log:
         return self._notes.report(self.format, (self.name,))
 
 
-def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
+def none_usable(notes: Notes, reason: str) -> MalformedFileError:
     """Return the error of a log of whose scans none can be used.
 
     Parameters
     ----------
-    name : str
-        Of the log.
     notes : Notes
         With what was left out.
     reason : str
@@ -138,7 +137,7 @@ def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
     """
     count = sum(notes.dropped[code].count for code in UNUSABLE if code in notes.dropped)
     why = f"; the first of them: {reason}" if reason else ", because none can be decoded"
-    return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)
+    return MalformedFileError(f"none of its {count} scans can be used{why}")
 
 
 def scan_json(one: LoggedScan) -> dict[str, Any]:

@@ -205,8 +205,7 @@ class Sensors:
         if self._options.base and not base:
             raise IncompleteFileError(
                 f"no transform from {shown(frame) or NAMELESS} to the base frame {shown(self._options.base)}: expected "
-                f"one of {', '.join(map(shown, above))}; correct the option base (--base)",
-                argument=self._frames.name,
+                f"one of {', '.join(map(shown, above))}; correct the option base (--base)"
             )
         mounting = tuple(tree.path(base or above[-1], frame) or (frame,))
         mount = self._options.mount

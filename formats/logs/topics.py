@@ -34,7 +34,7 @@ def scan_connections(bag: Bag, topic: str | None, notes: Notes) -> list[Connecti
     else:
         hints = [hint for kind, hint in CONVERTED.items() if any(one.msgtype == kind for one in bag.connections())]
         what = "".join(f"; {hint}" for hint in hints)
-        raise IncompleteFileError(f"has no messages of LaserScan{what}; {bag.topics()}", argument=bag.name)
+        raise IncompleteFileError(f"has no messages of LaserScan{what}; {bag.topics()}")
     others = [one for one in sorted(counts) if one != chosen]
     if topic is None and others:
         told = ", ".join(map(shown, others))
@@ -70,4 +70,4 @@ def named_topic(bag: Bag, kind: str, topic: str, counts: Mapping[str, int]) -> s
         wrong = f"has no {short} on {shown(topic)}, which is {shown(other.msgtype) or 'of no type'}{code}"
     else:
         wrong = f"has no {short} on {shown(topic)}"
-    raise IncompleteFileError(f"{wrong}; {bag.topics()}", argument=bag.name)
+    raise IncompleteFileError(f"{wrong}; {bag.topics()}")

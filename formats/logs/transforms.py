@@ -71,16 +71,9 @@ def matrix_of(position: Any, orientation: Any) -> Floats:
 
 
 class Transforms:
-    """The frames of one tree, and where they are in one another. A frame may have several parents.
+    """The frames of one tree, and where they are in one another. A frame may have several parents."""
 
-    Parameters
-    ----------
-    name : str
-        Of the file or topic, for errors.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self) -> None:
         self._parents: dict[str, dict[str, Track]] = {}
         self._count = 0
 
@@ -107,19 +100,15 @@ class Transforms:
         parent, child = parent.strip("/"), child.strip("/")
         if not parent or not child:
             raise MalformedFileError(
-                f"a frame has no name: expected two names, found {shown(parent)!r} and {shown(child)!r}",
-                argument=self._name,
+                f"a frame has no name: expected two names, found {shown(parent)!r} and {shown(child)!r}"
             )
         if parent == child:
-            raise MalformedFileError(
-                f"the frame {shown(child)!r} is its own parent: expected two different frames", argument=self._name
-            )
+            raise MalformedFileError(f"the frame {shown(child)!r} is its own parent: expected two different frames")
         self._count += 1
         if self._count > MAX_TRANSFORMS or len(self._parents) > MAX_FRAMES:
             raise TooLargeError(
                 f"expected at most {MAX_TRANSFORMS} transforms of {MAX_FRAMES} frames, found {self._count} of "
-                f"{len(self._parents)} or more; record fewer topics",
-                argument=self._name,
+                f"{len(self._parents)} or more; record fewer topics"
             )
         tracks = self._parents.setdefault(child, {})
         track = tracks.pop(parent) if parent in tracks else Track(static)

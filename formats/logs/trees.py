@@ -54,8 +54,6 @@ class BagFrames:
 
     Attributes
     ----------
-    name : str
-        Of the bag, for errors.
     scans : tuple of str
         All topics of scans.
     trees : dict
@@ -63,7 +61,6 @@ class BagFrames:
     odometry : list of OdometryTopic
     """
 
-    name: str
     scans: tuple[str, ...]
     trees: dict[str, Transforms] = field(default_factory=dict)
     odometry: list[OdometryTopic] = field(default_factory=list)
@@ -92,13 +89,12 @@ class BagFrames:
         # The tree of another robot is not used where the topic has one of its own.
         if holding or (own and (own[0] or not others)) or not others:
             chosen = (holding or own or [""])[0]
-            return chosen, self.trees.get(chosen) or Transforms(self.name)
+            return chosen, self.trees.get(chosen) or Transforms()
         if len(others) > 1 or namespace_of(topic):
             raise IncompleteFileError(
                 f"the namespace of the transforms is ambiguous for {shown(topic)}, with its frame {shown(frame)}: "
                 f"those in {_listed(others)}; choose one with the option tf_namespace (--tf-namespace "
-                f"{shown(others[0])})",
-                argument=self.name,
+                f"{shown(others[0])})"
             )
         notes.add_assumed("tf_namespace", f"the transforms of {shown(others[0])} hold for {shown(topic)}")
         return others[0], self.trees[others[0]]
@@ -109,7 +105,7 @@ class BagFrames:
             if chosen in self.trees:
                 return chosen, self.trees[chosen]
         raise IncompleteFileError(
-            f"has no transforms in {shown(named or '/')}, only in {_listed(self.trees) or 'none'}", argument=self.name
+            f"has no transforms in {shown(named or '/')}, only in {_listed(self.trees) or 'none'}"
         )
 
     def odometry_of(self, topic: str, namespace: str, frames: Collection[str], base: str | None) -> list[OdometryTopic]:
@@ -147,7 +143,7 @@ def read_frames(bag: Bag, notes: Notes) -> BagFrames:
         When the bag is broken, or has too many transforms.
     """
     scans = tuple(sorted({one.topic for one in bag.connections(SCAN)}))
-    frames = BagFrames(bag.name, scans)
+    frames = BagFrames(scans)
     namespaces = _namespaces(bag)
     # Global transforms are of the same robot if all scans lie in one namespace.
     single = {one for one in namespaces.values() if one}
@@ -155,7 +151,7 @@ def read_frames(bag: Bag, notes: Notes) -> BagFrames:
     wanted = [one for one in bag.connections(TRANSFORMS, OLD_TRANSFORMS) if one.topic in namespaces]
     for connection, received, message in bag.received(wanted):
         namespace = next(iter(single)) if merged else namespaces[connection.topic]
-        tree = frames.trees.setdefault(namespace, Transforms(bag.name))
+        tree = frames.trees.setdefault(namespace, Transforms())
         for one in message.transforms:
             _add(tree, connection.topic, received, one, notes)
         notes.add_read("transforms", "messages of tf", 1)

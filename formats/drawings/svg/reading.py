@@ -38,11 +38,10 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     FormatError
         When it is no SVG, or too deep or too large.
     """
-    name = name_of(path)
-    root = parse_xml(read_bounded(path, MAX_MAP_BYTES), name)
+    root = parse_xml(read_bounded(path, MAX_MAP_BYTES))
     if kind_of(root) != "svg":
-        raise MalformedFileError("expected an svg element", argument=name)
-    drawing = Drawing(name, "svg", notes, options)
+        raise MalformedFileError("expected an svg element")
+    drawing = Drawing(name_of(path), "svg", notes, options)
     drawing.oriented = root.get(ORIENTED) == "true"
     try:
         drawing.metres = float(root.attrib[METRES]) if METRES in root.attrib else None
@@ -52,7 +51,7 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         raise
     except (ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         raise MalformedFileError(
-            "has an element that cannot be read; expected SVG 1.1. Save it as plain SVG", argument=name
+            "has an element that cannot be read; expected SVG 1.1. Save it as plain SVG"
         ) from error
     return drawing
 
@@ -62,7 +61,7 @@ def _read_shapes(root: Element, drawing: Drawing) -> None:
         if not drawing.takes(place.layers, {**element.attrib, "stroke-dasharray": place.dashes}):
             continue
         kind = kind_of(element)
-        for points, closed in SHAPES[kind](Measure(element, place.viewport, drawing.name)):
+        for points, closed in SHAPES[kind](Measure(element, place.viewport)):
             lines = _placed(points, place.matrix)
             drawing.add(lines, closed=closed, width=place.width, layers=place.layers, groups=place.groups)
         drawing.notes.add_read(f"element_{kind}", f"{kind} elements", 1)

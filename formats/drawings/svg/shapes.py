@@ -53,13 +53,10 @@ class Measure:
     ----------
     element : Element
     viewport : Viewport
-    name : str
-        Of the file, for errors.
     """
 
     element: Element
     viewport: Viewport
-    name: str
 
     def length(self, key: str, axis: str, default: str = "0") -> float:
         """Return an attribute in user units.
@@ -103,8 +100,7 @@ class Measure:
         """Return the error for an attribute, which says where it is."""
         line = self.element.line if isinstance(self.element, Node) else 0
         return MalformedFileError(
-            f"line {line}: {key} of a {shown(kind_of(self.element))} element is '{shown(found)}', expected {expected}",
-            argument=self.name,
+            f"line {line}: {key} of a {shown(kind_of(self.element))} element is '{shown(found)}', expected {expected}"
         )
 
 

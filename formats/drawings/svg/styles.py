@@ -28,16 +28,9 @@ Declared = tuple[tuple[str, str, bool], ...]
 
 
 class Styles:
-    """The styles of a document's elements.
+    """The styles of a document's elements."""
 
-    Parameters
-    ----------
-    root : Element
-    name : str
-        Of the file, for errors.
-    """
-
-    def __init__(self, root: Element, name: str) -> None:
+    def __init__(self, root: Element) -> None:
         self._matched: dict[Element, list[Declared]] = {}
         self._inline: dict[str, Declared] = {}
         sheets = [element.text for element in root.iter() if kind_of(element) == "style" and element.text]
@@ -48,8 +41,7 @@ class Styles:
                 count += 1
                 if count > MAX_STYLE_RULES:
                     raise TooLargeError(
-                        f"expected at most {MAX_STYLE_RULES} rules of style, found {count} or more; save plain SVG",
-                        argument=name,
+                        f"expected at most {MAX_STYLE_RULES} rules of style, found {count} or more; save plain SVG"
                     )
         if count:
             for wrapper in cssselect2.ElementWrapper.from_xml_root(root).iter_subtree():

@@ -52,8 +52,7 @@ def matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) ->
         told = "; ".join(f"{key}: {style[key]}" for key in WHERE if key in style)
         raise MalformedFileError(
             f"has a transform that cannot be read, '{shown(told)}'; expected numbers. Apply the transforms, or save it "
-            "as plain SVG",
-            argument=drawing.name,
+            "as plain SVG"
         ) from error
 
 

@@ -79,7 +79,7 @@ class Visible:
 
     def __init__(self, root: Element, drawing: Drawing) -> None:
         self._root, self._drawing = root, drawing
-        self._styles = Styles(root, drawing.name)
+        self._styles = Styles(root)
         self._by_id: dict[str, Element] = {}
         for element in root.iter():
             self._by_id.setdefault(element.get("id", ""), element)
@@ -133,14 +133,12 @@ class Visible:
         if self._count > MAX_ENTITIES or depth > MAX_DEPTH:
             raise TooLargeError(
                 f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another, found "
-                f"{self._count}, {depth} in one another, or more",
-                argument=self._drawing.name,
+                f"{self._count}, {depth} in one another, or more"
             )
         if self._path_bytes > MAX_PATH_BYTES:
             raise TooLargeError(
                 f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included, found "
-                f"{self._path_bytes} or more; simplify the paths",
-                argument=self._drawing.name,
+                f"{self._path_bytes} or more; simplify the paths"
             )
 
     def _displayed(self, element: Element, style: Mapping[str, str]) -> bool:
@@ -195,7 +193,7 @@ class Visible:
             return True
         if math.isnan(self._whole.width + self._whole.height):
             return False
-        (points, _), *_ = [*SHAPES["rect"](Measure(element, place.viewport, self._drawing.name)), ([(0.0, 0.0)], False)]
+        (points, _), *_ = [*SHAPES["rect"](Measure(element, place.viewport)), ([(0.0, 0.0)], False)]
         corners = np.array([tuple(place.matrix.point_in_matrix_space(point)) for point in points], dtype=np.float64)
         low, size = np.array([self._whole.x, self._whole.y]), np.array([self._whole.width, self._whole.height])
         slack = WHOLE * size.max()
@@ -203,7 +201,7 @@ class Visible:
         return bool(begins.all() and ends.all())
 
     def _viewport_of_root(self) -> Viewport:
-        measure = Measure(self._root, Viewport(), self._drawing.name)
+        measure = Measure(self._root, Viewport())
         box = _view_box(measure)
         if box is not None:
             return box
@@ -213,8 +211,8 @@ class Visible:
 
     def _nested(self, element: Element, sized: Element, outer: Place, depth: int) -> Iterator[tuple[Element, Place]]:
         """Yield the shapes of an svg or a symbol; its size may be that of the use."""
-        own, name = Measure(element, outer.viewport, self._drawing.name), self._drawing.name
-        size = Measure(sized if sized.attrib.keys() & {"width", "height"} else element, outer.viewport, name)
+        own = Measure(element, outer.viewport)
+        size = Measure(sized if sized.attrib.keys() & {"width", "height"} else element, outer.viewport)
         box = _view_box(own)
         matrix = outer.matrix
         if kind_of(element) == "svg":
@@ -244,7 +242,7 @@ class Visible:
                 f"use_{'itself' if target is not None else 'nothing'}", f"use that {why}", 1
             )
             return
-        measure = Measure(element, outer.viewport, self._drawing.name)
+        measure = Measure(element, outer.viewport)
         moved = svgelements.Matrix.translate(measure.length("x", "x"), measure.length("y", "y")) * outer.matrix
         place = replace(outer, matrix=moved, copied=(*outer.copied, target))
         if kind_of(target) not in ("symbol", "svg"):

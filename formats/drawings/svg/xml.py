@@ -23,10 +23,9 @@ class Node(Element):
 class _Builder:
     """Builds the tree of elements, with the text of style elements alone."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self) -> None:
         self.tree = TreeBuilder(element_factory=Node)
         self.parser = expat.ParserCreate(namespace_separator="}")
-        self.name = name
         self.depth = self.count = self.path_bytes = self.style_bytes = 0
         self.in_style = False
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
@@ -39,14 +38,12 @@ class _Builder:
         if self.path_bytes > MAX_PATH_BYTES:
             raise TooLargeError(
                 f"expected at most {MAX_PATH_BYTES} characters of paths, found {self.path_bytes} or more; simplify the "
-                "paths",
-                argument=self.name,
+                "paths"
             )
         if self.depth > MAX_DEPTH or self.count > MAX_ENTITIES:
             raise TooLargeError(
                 f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another, found {self.count}, "
-                f"{self.depth} in one another, or more",
-                argument=self.name,
+                f"{self.depth} in one another, or more"
             )
         node = self.tree.start("{" + tag if "}" in tag else tag, attributes)
         assert isinstance(node, Node)
@@ -64,16 +61,15 @@ class _Builder:
         self.style_bytes += len(data)
         if self.style_bytes > MAX_STYLE_BYTES:
             raise TooLargeError(
-                f"expected at most {MAX_STYLE_BYTES} characters of style elements, found {self.style_bytes} or more",
-                argument=self.name,
+                f"expected at most {MAX_STYLE_BYTES} characters of style elements, found {self.style_bytes} or more"
             )
         self.tree.data(data)
 
     def refuse(self, *_declared: Any) -> None:
-        raise MalformedFileError("declares XML entities, which are not read; save it as plain SVG", argument=self.name)
+        raise MalformedFileError("declares XML entities, which are not read; save it as plain SVG")
 
 
-def parse_xml(content: bytes, name: str) -> Element:
+def parse_xml(content: bytes) -> Element:
     """Parse XML without entities of its own, within bounds of depth and number.
 
     Raises
@@ -83,26 +79,22 @@ def parse_xml(content: bytes, name: str) -> Element:
     TooLargeError
         When elements lie too deep, are too many, or one is too long.
     """
-    builder = _Builder(name)
+    builder = _Builder()
     try:
         for begin in range(0, len(content), CHUNK):
             builder.parser.Parse(content[begin : begin + CHUNK], False)
             size = begin - builder.parser.CurrentByteIndex
             if size > MAX_TOKEN_BYTES:
-                raise TooLargeError(
-                    f"expected elements of at most {MAX_TOKEN_BYTES} bytes, found {size} or more", argument=name
-                )
+                raise TooLargeError(f"expected elements of at most {MAX_TOKEN_BYTES} bytes, found {size} or more")
         builder.parser.Parse(b"", True)
         return builder.tree.close()
     except FormatError:
         raise
     except LookupError as error:
-        raise MalformedFileError("has an unknown encoding; save it in UTF-8", argument=name) from error
+        raise MalformedFileError("has an unknown encoding; save it in UTF-8") from error
     except (expat.ExpatError, ParseError, AssertionError, ValueError) as error:
         line = builder.parser.CurrentLineNumber
-        raise MalformedFileError(
-            f"is not XML from line {line} on; check whether the file is cut off", argument=name
-        ) from error
+        raise MalformedFileError(f"is not XML from line {line} on; check whether the file is cut off") from error
 
 
 def kind_of(element: Element) -> str:

@@ -65,8 +65,7 @@ def near_lines(endpoints: Floats, layer_of: Integers, drawing: Drawing) -> Flags
         raise MalformedFileError(
             f"its lines lie {extent:.0f} m apart, expected at most {MAX_EXTENT:g} m: "
             f"{_named(endpoints, layer_of, near, drawing)}; and {where}; delete those that are not walls, or set "
-            "the option layers",
-            argument=drawing.name,
+            "the option layers"
         )
     drawing.notes.add_assumed("far_lines", f"lines are part of the map, but lie {where}", int(far.sum()))
     return kept

@@ -46,8 +46,7 @@ def on_level(drawing: Drawing, metres: float) -> list[Polyline]:
         if len(counts) > 1 and _differ(lines, counts, metres, named=any(one.levels for one in drawing.polylines)):
             raise IncompleteFileError(
                 f"has {len(counts)} levels, with lines: {listed_counts(counts)}; choose one with the option level "
-                f"(--level '{next(iter(counts))}'; '*' is all)",
-                argument=drawing.name,
+                f"(--level '{next(iter(counts))}'; '*' is all)"
             )
         loose = sum(len(one.ends) for one in lines if not one.levels)
         if len(counts) == 1 and loose and any(one.levels for one in drawing.polylines):

@@ -53,9 +53,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if metres is None:
         doubt = drawing.notes.assumed.get("unknown_unit")
         why = f": {doubt.message}" if doubt is not None else ""
-        raise IncompleteFileError(
-            f"does not state its unit{why}; set the option units, for example to mm or m", argument=drawing.name
-        )
+        raise IncompleteFileError(f"does not state its unit{why}; set the option units, for example to mm or m")
     if not drawing.polylines:
         raise drawing.without_lines()
     drawing.require_plan()
@@ -103,7 +101,7 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
     if len(endpoints) == 0:
         doubt = drawing.notes.assumed.get("unlikely_unit")
         why = doubt.message if doubt is not None else "check the unit"
-        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}", argument=drawing.name)
+        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}")
     keys = np.rint(endpoints / SAME) if oriented else undirected(endpoints / SAME)
     _, first = np.unique(keys, axis=0, return_index=True)
     if len(first) < len(endpoints):
@@ -145,7 +143,7 @@ def _segments(endpoints: Floats, drawing: Drawing) -> Segments:
     try:
         return Segments.from_array(endpoints, argument="line")
     except InputError as error:
-        raise MalformedFileError(f"a line {error.message}; check the unit", argument=drawing.name) from error
+        raise MalformedFileError(f"a line {error.message}; check the unit") from error
 
 
 def _note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: ImportOptions) -> None:
