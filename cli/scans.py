@@ -122,13 +122,13 @@ def _yaml(data: bytes, name: str) -> Any:
     """Return the first message of YAML."""
     with needing_formats(f"reading {name} as YAML"):
         from formats.errors import naming
-        from formats.yaml import yaml_of
+        from formats.files import load_yaml
 
         if data.startswith(b"%time"):
             raise RefusedError(f"{name}: is a table of rostopic echo -p, expected one message; print it without -p")
         text = WARNINGS.sub("", LOST.sub("", data.decode("utf-8", errors="replace")), count=1).removeprefix("---\n")
         with naming(name):
-            return yaml_of(text.partition(NEXT)[0])
+            return load_yaml(text.partition(NEXT)[0])
 
 
 def _finite(laser: Json, name: str) -> Json:

@@ -128,6 +128,14 @@ class Segments:
         aside = self.normals * np.broadcast_to(np.asarray(by, dtype=np.float64), len(self))[:, None]
         return Segments.derived(self.endpoints + np.tile(aside, 2))
 
+    def points(self, step: float) -> Floats:
+        """Return points along all segments, (m, 2), ends included, at most `step` metres from one to the next."""
+        counts = np.ceil(self.lengths / step).astype(np.intp) + 1
+        which = np.repeat(np.arange(len(self)), counts)
+        along = (np.arange(len(which)) - (np.cumsum(counts) - counts)[which]) / (counts[which] - 1)
+        begins, ends = self.endpoints[which, :2], self.endpoints[which, 2:]
+        return np.asarray(begins + along[:, None] * (ends - begins))
+
     def shifted(self, by: ArrayLike) -> Segments:
         """Return the segments moved by a vector of 2 metres, to work near the origin."""
         offset = np.asarray(by, dtype=np.float64)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import linefix
@@ -57,15 +56,5 @@ class Maps:
             or list(self.frames.values()) != list(before.frames.values())
         ):
             return 0.0
-        mine, theirs = (_points_of(one.walls_of(None)) for one in (self, before))
+        mine, theirs = (one.walls_of(None).points(SAME) for one in (self, before))
         return float(min(np.mean(cKDTree(b).query(a)[0] <= SAME) for a, b in ((mine, theirs), (theirs, mine))))
-
-
-def _points_of(walls: linefix.Segments) -> NDArray[np.float64]:
-    """Return points on walls, `SAME` apart."""
-    begins, ends = walls.endpoints[:, :2], walls.endpoints[:, 2:]
-    counts = np.ceil(np.linalg.norm(ends - begins, axis=1) / SAME).astype(int) + 1
-    which = np.repeat(np.arange(len(counts)), counts)
-    along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[which]
-    points: NDArray[np.float64] = begins[which] + along[:, None] * (ends - begins)[which]
-    return points

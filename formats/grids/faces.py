@@ -141,12 +141,7 @@ def _outside_of(fronts: Floats, cells: Cells) -> Floats:
     beside_free = ndimage.binary_dilation(cells == FREE)
     row, column = np.nonzero((cells == OCCUPIED) & beside_free)
     middles = np.column_stack([column + 0.5, row + 0.5])
-    lengths = np.hypot(*(fronts[:, 2:] - fronts[:, :2]).T)
-    counts = np.ceil(2.0 * lengths).astype(np.intp) + 1  # two on the length of a cell
-    of_front = np.repeat(np.arange(len(fronts)), counts)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    along = ((np.arange(len(of_front)) - first) / (counts[of_front] - 1))[:, None]
-    on_fronts = (1.0 - along) * fronts[of_front, :2] + along * fronts[of_front, 2:]
+    on_fronts = Segments.derived(fronts).points(0.5)
     away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
     return np.asarray(middles[np.isinf(away)])
 

@@ -18,7 +18,7 @@ from PIL import Image, UnidentifiedImageError
 from registration import RigidTransform
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError, naming
-from ..files import kind_of, name_of, read_bounded, text_of
+from ..files import kind_of, load_yaml, name_of, read_bounded, text_of
 from ..limits import (
     MAX_CELLS,
     MAX_MAP_BYTES,
@@ -29,7 +29,6 @@ from ..limits import (
 )
 from ..options import ImportOptions
 from ..report import Notes, shown
-from ..yaml import yaml_of
 from .cells import Grid
 from .tuning import UNKNOWN_GREYS
 
@@ -131,7 +130,7 @@ def read_description(path: Path, notes: Notes) -> Description:
     IncompleteFileError
         When `image`, `resolution` or `origin` is missing.
     """
-    values = yaml_of(text_of(read_bounded(path, MAX_YAML_BYTES)))
+    values = load_yaml(text_of(read_bounded(path, MAX_YAML_BYTES)))
     if not isinstance(values, dict):
         raise MalformedFileError(
             f"expected a YAML mapping with image, resolution and origin, a space after each colon, found "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,8 @@ from ..report import Notes
 from .scan import Log, LoggedScan, LogOptions, none_usable
 from .stamps import Stamps
 
-KINDS = ("FLASER", "RLASER", "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")
+SIMPLE = ("FLASER", "RLASER")
+KINDS = (*SIMPLE, "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")
 MESSAGES = {"ODOM", "TRUEPOS", "PARAM", "SYNC", "NMEAGGA", "NMEARMC", *KINDS}
 NO_RETURN = 80.0  # m; what the range finders of these logs read, or more, where nothing came back
 
@@ -82,7 +83,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             wanted = kind
             notes.add_assumed("topic", f"scans are those of {kind}, the first kind in the log")
         try:
-            scan = READERS[kind](words, kind, settings, notes)
+            scan = _scan_of(words, settings, notes)
         except InputError as error:
             first = first or error.message
             notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
@@ -111,7 +112,7 @@ def _moves(path: Path, kind: str) -> bool:
         if words[0] != kind:
             continue
         try:
-            scan = READERS[kind](words, kind, {}, Notes())
+            scan = _scan_of(words, {}, Notes())
         except (InputError, ValueError, LookupError, OverflowError):
             continue
         if scan.pose is None or scan.pose != scan.mount:
@@ -137,16 +138,20 @@ def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
                 notes.add_dropped("other_lines", "lines that are not messages of CARMEN", 1)
 
 
-def _simple(words: list[str], kind: str, settings: Settings, notes: Notes) -> LoggedScan:
+def _scan_of(words: list[str], settings: Settings, notes: Notes) -> LoggedScan:
+    return _simple(words, settings, notes) if words[0] in SIMPLE else _full(words)
+
+
+def _simple(words: list[str], settings: Settings, notes: Notes) -> LoggedScan:
     """``FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host logger_time``, ahead in the middle."""
     n = _count(words[1])
     ranges = [float(w) for w in words[2 : 2 + n]]
     rest = words[2 + n :]
     laser, robot = _pose(rest[0:3]), _pose(rest[3:6])
-    side = "rear" if kind == "RLASER" else "front"
+    side = "rear" if words[0] == "RLASER" else "front"
     most = _setting(settings, f"robot_{side}_laser_max") or NO_RETURN
     first, step = _field_of_view(n, settings, side, notes)
-    return _logged(kind, rest[6], ranges, _Angles(first, step, min(most, NO_RETURN)), laser, robot)
+    return _logged(words[0], rest[6], ranges, _Angles(first, step, min(most, NO_RETURN)), laser, robot)
 
 
 def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple[float, float]:
@@ -185,16 +190,16 @@ def _setting(settings: Settings, name: str) -> float | None:
     return value if 0.0 < value <= 360.0 else None
 
 
-def _full(words: list[str], kind: str, settings: Settings, notes: Notes) -> LoggedScan:
+def _full(words: list[str]) -> LoggedScan:
     """``ROBOTLASER1 type start fov step max accuracy mode n r.. m remission.. laser(3) robot(3) (5) time ..``."""
     angles = _Angles(float(words[2]), float(words[4]), float(words[5]))
     n = _count(words[8])
     ranges = [float(w) for w in words[9 : 9 + n]]
     rest = words[9 + n :]
     rest = rest[1 + _count(rest[0]) :]
-    if kind.startswith("RAW"):
-        return _logged(kind, rest[0], ranges, angles, None, None)
-    return _logged(kind, rest[11], ranges, angles, _pose(rest[0:3]), _pose(rest[3:6]))
+    if words[0].startswith("RAW"):
+        return _logged(words[0], rest[0], ranges, angles, None, None)
+    return _logged(words[0], rest[11], ranges, angles, _pose(rest[0:3]), _pose(rest[3:6]))
 
 
 def _logged(
@@ -224,13 +229,3 @@ def _count(word: str) -> int:
 def _pose(words: list[str]) -> RigidTransform:
     x, y, theta = (float(w) for w in words)
     return RigidTransform(x, y, math.remainder(theta, math.tau))  # odometry counts turns
-
-
-READERS: dict[str, Callable[[list[str], str, Settings, Notes], LoggedScan]] = {
-    "FLASER": _simple,
-    "RLASER": _simple,
-    "ROBOTLASER1": _full,
-    "ROBOTLASER2": _full,
-    "RAWLASER1": _full,
-    "RAWLASER2": _full,
-}

@@ -6,10 +6,9 @@ import re
 from pathlib import Path, PureWindowsPath
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, UnsupportedFormatError
-from ..files import read_bounded, text_of
+from ..files import load_yaml, read_bounded, text_of
 from ..limits import MAX_METADATA_BYTES, MAX_RECORDED_FILES
 from ..report import Notes, first_of
-from ..yaml import yaml_of
 
 FOLDER_SUFFIXES = (".mcap", ".db3")  # of files in the folder of a bag of ROS 2
 SUFFIXES = (".bag", *FOLDER_SUFFIXES)
@@ -65,7 +64,7 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
 def _listed(folder: Path, notes: Notes) -> list[Path] | None:
     """Return the files that the description of a bag lists; None where it cannot be used."""
     try:
-        told = yaml_of(text_of(read_bounded(folder / METADATA, MAX_METADATA_BYTES)))
+        told = load_yaml(text_of(read_bounded(folder / METADATA, MAX_METADATA_BYTES)))
         listed = told["rosbag2_bagfile_information"]["relative_file_paths"]  # type: ignore[index]
         if not (isinstance(listed, list) and listed and all(isinstance(one, str) for one in listed)):
             raise TypeError

@@ -95,7 +95,7 @@ def standing_places(
     )
     places = np.stack(np.meshgrid(xs, ys, indexing="xy"), axis=-1).reshape(-1, 2)
     if point is not None:
-        places = places[Reach.from_point(segments, point).includes(places)]
+        places = places[reached(segments, point, places)]
     poses = np.column_stack([np.repeat(places, len(headings), axis=0), np.tile(headings, len(places))])
     return Standing(spacing, poses, np.random.default_rng(ORDER).permutation(len(poses)))
 
@@ -120,70 +120,40 @@ def is_free(segments: Segments, pose: RigidTransform, reach: float, *, oriented:
     return not oriented or bool(seen.facing[met].mean() >= FREE_SIDES)
 
 
-@dataclass(frozen=True, slots=True)
-class Reach:
-    """The cells of a raster that hang together with that of a point.
+def reached(segments: Segments, point: Sequence[float], places: Floats) -> NDArray[np.bool_]:
+    """Return which of ``(n, 2)`` places on a map are reached from a point, ``(x, y)`` metres, without crossing a wall.
 
-    Attributes
-    ----------
-    low : (2,) metres; the raster's lower left corner
-    cell : float
-        Metres.
-    inside : (columns, rows) bool
+    Raises
+    ------
+    AnalysisError
+        When the point lies outside the box around the map, or on a wall, or the map has too much wall for it.
     """
+    from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
 
-    low: Floats
-    cell: float
-    inside: NDArray[np.bool_]
+    corners = segments.endpoints.reshape(-1, 2)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+    steps = int(np.ceil(segments.lengths / (0.5 * cell)).sum())
+    if steps > MOST_STEPS:
+        raise AnalysisError(
+            f"expected a smaller map for an analysis from a point: its walls cover {steps} cells of at most "
+            f"{MOST_STEPS}; omit the point, or cut the map",
+            argument="point",
+        )
+    start = np.asarray(point, dtype=np.float64)
+    away = float(np.linalg.norm(np.maximum(0.0, np.maximum(low - cell - start, start - high))))
+    if not away <= 0.0:
+        raise AnalysisError(f"expected a place on the map, found one {away:.2f} m outside", argument="point")
 
-    @classmethod
-    def from_point(cls, segments: Segments, point: Sequence[float]) -> Reach:
-        """Flood a map from a point, ``(x, y)`` metres.
+    def cells(points: Floats) -> tuple[NDArray[np.int64], ...]:
+        return tuple(np.floor((points - low) / cell).astype(np.int64).T + 1)
 
-        Raises
-        ------
-        AnalysisError
-            When the point lies outside the box around the map, or on a wall, or the map has too much wall for it.
-        """
-        corners = segments.endpoints.reshape(-1, 2)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
-        low = low - cell
-        shape = np.ceil((high - low) / cell).astype(int) + 2
-        walls = np.zeros(shape, dtype=bool)
-        counts = np.ceil(segments.lengths / (0.5 * cell)).astype(np.int64) + 1
-        if counts.sum() > MOST_STEPS:
-            raise AnalysisError(
-                f"expected a smaller map for an analysis from a point: its walls cover {counts.sum()} cells of at most "
-                f"{MOST_STEPS}; omit the point, or cut the map",
-                argument="point",
-            )
-        which = np.repeat(np.arange(len(segments)), counts)
-        first = np.cumsum(counts) - counts
-        share = (np.arange(len(which)) - first[which]) / np.maximum(counts[which] - 1, 1)
-        begin, end = segments.endpoints[which, :2], segments.endpoints[which, 2:]
-        columns, rows = _cells(begin + share[:, None] * (end - begin), low, cell).T
-        walls[columns, rows] = True
-        start = np.asarray(point, dtype=np.float64)
-        if not ((start >= low) & (start <= high)).all():
-            away = float(np.linalg.norm(np.maximum(0.0, np.maximum(low - start, start - high))))
-            raise AnalysisError(f"expected a place on the map, found one {away:.2f} m outside", argument="point")
-        from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
-
-        labels, _ = ndimage.label(~walls)
-        label = labels[tuple(_cells(start[None], low, cell)[0])]
-        if label == 0:
-            raise AnalysisError(
-                f"expected a free place, found one on a wall; choose one {cell:.2f} m away", argument="point"
-            )
-        return cls(low, cell, labels == label)
-
-    def includes(self, places: Floats) -> NDArray[np.bool_]:
-        """Return which of ``(n, 2)`` places on the map can be reached."""
-        columns, rows = _cells(places, self.low, self.cell).T
-        found: NDArray[np.bool_] = self.inside[columns, rows]
-        return found
-
-
-def _cells(places: Floats, low: Floats, cell: float) -> NDArray[np.int64]:
-    return np.floor((places - low) / cell).astype(np.int64)
+    walls = np.zeros(np.ceil((high - low) / cell).astype(int) + 3, dtype=bool)
+    walls[cells(segments.points(0.5 * cell))] = True
+    labels, _ = ndimage.label(~walls)
+    label = labels[cells(start)]
+    if label == 0:
+        raise AnalysisError(
+            f"expected a free place, found one on a wall; choose one {cell:.2f} m away", argument="point"
+        )
+    return np.asarray(labels[cells(places)] == label)

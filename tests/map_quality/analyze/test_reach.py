@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from map_quality import AnalysisError
-from map_quality.analyze.standing import Reach
+from map_quality.analyze import standing
 from registration import Segments
 from registration.layout import Floats
 
@@ -30,12 +30,9 @@ def two_rooms(door: float) -> Floats:
     )  # fmt: skip
 
 
-def reach_of(ends: Floats, point: tuple[float, float]) -> Reach:
-    return Reach.from_point(Segments.from_array(ends), (AT + np.array(point)).tolist())
-
-
 def reached(ends: Floats, places: Floats, point: tuple[float, float] = (1.0, 1.0)) -> list[bool]:
-    found: list[bool] = reach_of(ends, point).includes(places + AT).tolist()
+    start = (AT + np.array(point)).tolist()
+    found: list[bool] = standing.reached(Segments.from_array(ends), start, places + AT).tolist()
     return found
 
 
@@ -66,12 +63,13 @@ def test_a_map_with_too_much_wall_is_refused() -> None:
     y = np.linspace(0.0, 1.0, 101)
     ends = np.stack([np.zeros(101), y, np.full(101, 9.95e3), y], axis=1)
     with pytest.raises(AnalysisError, match="a smaller map"):
-        Reach.from_point(Segments.from_array(np.vstack([ends, ends])), (5.0, 0.505))
+        standing.reached(Segments.from_array(np.vstack([ends, ends])), (5.0, 0.505), np.zeros((0, 2)))
 
 
 def test_a_point_has_to_be_on_the_map_and_on_no_wall() -> None:
     for point, what in (((-1.0, 1.0), "on the map"), ((1.0, 5.0), "on the map"), ((10.0, 2.0), "on a wall")):
         with pytest.raises(AnalysisError, match=what) as caught:
-            reach_of(two_rooms(0.0), point)
+            reached(two_rooms(0.0), np.zeros((0, 2)), point)
         assert caught.value.argument == "point"
-    assert math.isclose(reach_of(two_rooms(0.0), (1.0, 1.0)).inside.sum() * 0.01, 4.8 * 4.0, rel_tol=0.06)
+    places = np.stack(np.meshgrid(np.arange(0.05, 10.0, 0.1), np.arange(0.05, 4.0, 0.1)), axis=-1).reshape(-1, 2)
+    assert math.isclose(sum(reached(two_rooms(0.0), places)) * 0.01, 4.8 * 4.0, rel_tol=0.06)
