@@ -102,9 +102,8 @@ def first_of(names: Sequence[str]) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Return names of a file in one line, the first few of many."""
-    first, *others = dict.fromkeys(names)
-    named = [shown(name) for name in (first, *others[: MAX_NAMED - 1])]
-    return ", ".join(named) + (" ..." if len(others) >= MAX_NAMED else "")
+    every = list(dict.fromkeys(names))
+    return ", ".join(map(shown, every[:MAX_NAMED])) + (" ..." if len(every) > MAX_NAMED else "")
 
 
 def listed_counts(counts: Counter[str]) -> str:
@@ -114,5 +113,4 @@ def listed_counts(counts: Counter[str]) -> str:
     """
     if len(counts) == 1:
         return shown(next(iter(counts)))
-    named = [f"{shown(name)} ({count})" for name, count in counts.most_common(MAX_NAMED)]
-    return ", ".join(named) + (" ..." if len(counts) > MAX_NAMED else "")
+    return listed(f"{shown(name)} ({count})" for name, count in counts.most_common())

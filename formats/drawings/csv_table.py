@@ -120,7 +120,10 @@ def _table(lines: list[str]) -> Table:
         if names or sum(_number(cell) is not None for cell in header) >= len(COLUMNS):
             break
     else:
-        raise _no_columns(header, kept[0][0] if kept else 1)
+        found = first_of(header) or "none"
+        raise MalformedFileError(
+            f"line {kept[0][0] if kept else 1}: expected rows of x1, y1, x2, y2, or a row of these names, found {found}"
+        )
     kept = kept[1:] if names else kept
     try:
         reader = csv.reader((line for _, line in kept), delimiter=delimiter)
@@ -172,10 +175,4 @@ def _unclear(row: list[str], line: int) -> IncompleteFileError:
     return IncompleteFileError(
         f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected four: x1, y1, x2, y2. An index, z, "
         "or decimal commas make more. Delete the others, or name the columns in a first row: x1,y1,x2,y2 among others"
-    )
-
-
-def _no_columns(cells: list[str], line: int) -> MalformedFileError:
-    return MalformedFileError(
-        f"line {line}: expected rows of x1, y1, x2, y2, or a row of these names, found {first_of(cells) or 'none'}"
     )

@@ -29,7 +29,6 @@ from .dxf_blocks import Expansion, Placed, shown_parts
 from .selection import walls_among
 
 if TYPE_CHECKING:
-    from ezdxf.audit import Auditor
     from ezdxf.document import Drawing as Document
 
 # It would print every repair of a broken file; they are counted in the report.
@@ -101,19 +100,16 @@ def _document(path: Path, notes: Notes) -> Document:
             f"expected at most {MAX_DXF_OBJECTS} entities and objects, found more; delete those that are no walls"
         )
     try:
-        document, auditor = _parsed(path, content)
+        if content.startswith(BINARY):
+            document = readfile(path)  # the recovering reader knows text alone
+            auditor = document.audit()
+        else:
+            document, auditor = recover.read(io.BytesIO(content))
     except (OSError, *BROKEN) as error:
         raise MalformedFileError("is not a DXF") from error
     if auditor.fixes or auditor.errors:
         notes.add_assumed("repairs", "errors of the file that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
-
-
-def _parsed(path: Path, content: bytes) -> tuple[Document, Auditor]:
-    if content.startswith(BINARY):
-        document = readfile(path)  # the recovering reader knows text alone
-        return document, document.audit()
-    return recover.read(io.BytesIO(content))
 
 
 def _metres(document: Document, notes: Notes) -> float | None:
@@ -151,7 +147,8 @@ def _add(placed: Placed, drawing: Drawing, sagitta: float) -> None:
     entity, kind = placed.entity, placed.entity.dxftype()
     mesh = isinstance(entity, Polyline) and not (entity.is_2d_polyline or entity.is_3d_polyline)
     if kind not in LINES or mesh:
-        drawing.drop("POLYLINE of a mesh" if mesh else kind, hint=_hint(kind))
+        proxy = "is an object of another program; export the drawing with standard objects (EXPORTTOAUTOCAD)"
+        drawing.drop("POLYLINE of a mesh" if mesh else kind, hint=proxy if kind.startswith(PROXIES) else "")
         return
     try:
         curve = ezpath.make_path(_without_frame(entity))
@@ -189,13 +186,6 @@ def _without_frame(entity: DXFEntity) -> DXFEntity:
     if isinstance(entity, Polyline) and any(vertex.dxf.flags & CURVE for vertex in entity.vertices):
         entity.vertices[:] = [vertex for vertex in entity.vertices if not vertex.dxf.flags & FRAME]
     return entity
-
-
-def _hint(kind: str) -> str:
-    """Return what to do about entities of a kind that is not read."""
-    if kind.startswith(PROXIES):
-        return "is an object of another program; export the drawing with standard objects (EXPORTTOAUTOCAD)"
-    return ""
 
 
 def _note_paper_space(document: Document, drawing: Drawing) -> None:

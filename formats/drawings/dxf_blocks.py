@@ -156,13 +156,10 @@ class Expansion:
         self.drawing.notes.add_merged("blocks", "blocks taken apart", reference.mcount)
         for one in reference.multi_insert() if reference.mcount > 1 else (reference,):
             self._count += 1  # so that empty blocks cannot be repeated without end
-            inner = one.virtual_entities(skipped_entity_callback=self._skipped)
+            inner = one.virtual_entities(skipped_entity_callback=lambda entity, _: self.drawing.drop(entity.dxftype()))
             clip = clip_of(reference, one)
             clips = placed.clips if clip is None else (*placed.clips, clip)
             yield from self._visible(inner, placed._replace(clips=clips, blocks=(*placed.blocks, name)), depth + 1)
-
-    def _skipped(self, entity: DXFEntity, _reason: str) -> None:
-        self.drawing.drop(entity.dxftype())
 
     def _note(self, notes: Notes) -> None:
         if self._hidden:

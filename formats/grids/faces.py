@@ -119,8 +119,18 @@ def _fronts(cells: Cells, grid: Grid) -> tuple[Floats, Floats]:
 
 
 def _points(fronts: Floats, cells: Cells, notes: Notes) -> Floats:
-    """Return the occupied cells that are on no wall, (n, 2), in cells; none of more than a map may have."""
-    points = _outside_of(fronts, cells)
+    """Return the middles of the occupied cells next to free ones that lie on no front, (n, 2); none of too many.
+
+    Parameters
+    ----------
+    fronts : (m, 4)
+        The lines along the fronts of the occupied cells, in cells, as the result.
+    """
+    row, column = np.nonzero((cells == OCCUPIED) & ndimage.binary_dilation(cells == FREE))
+    middles = np.column_stack([column + 0.5, row + 0.5])
+    on_fronts = Segments.derived(fronts).points(0.5)
+    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
+    points = np.asarray(middles[np.isinf(away)])
     if len(points) > MAX_POINTS:
         what = f"cells that are on no wall, more than the {MAX_POINTS} points of a map"
         notes.add_dropped("points", what, len(points))
@@ -128,22 +138,6 @@ def _points(fronts: Floats, cells: Cells, notes: Notes) -> Floats:
     if len(points):
         notes.add_read("points", "occupied cells that are on no wall", len(points))
     return points
-
-
-def _outside_of(fronts: Floats, cells: Cells) -> Floats:
-    """Return the middles of the occupied cells that border on a free one and lie on no front, (n, 2), in cells.
-
-    Parameters
-    ----------
-    fronts : (m, 4)
-        The lines along the fronts of the occupied cells, in cells.
-    """
-    beside_free = ndimage.binary_dilation(cells == FREE)
-    row, column = np.nonzero((cells == OCCUPIED) & beside_free)
-    middles = np.column_stack([column + 0.5, row + 0.5])
-    on_fronts = Segments.derived(fronts).points(0.5)
-    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
-    return np.asarray(middles[np.isinf(away)])
 
 
 def surface_depth(cells: Cells) -> tuple[float, bool]:
@@ -212,7 +206,9 @@ def wall_contours(cells: Cells) -> Iterator[Floats]:
     )
     for line in generator.lines(0.5):
         contour = np.asarray(line, dtype=np.float64)
-        wall = _borders_on_wall(contour, padded)
+        # Each point is halfway between two cells.
+        sides = (np.floor(contour).astype(np.intp), np.ceil(contour).astype(np.intp))
+        wall = np.any([padded[side[:, 1], side[:, 0]] == OCCUPIED for side in sides], axis=0)
         if np.array_equal(contour[0], contour[-1]):
             contour, wall = contour[:-1], wall[:-1]
             start = sharpest_corner(contour) if wall.all() else int(np.argmin(wall))
@@ -238,10 +234,3 @@ def sharpest_corner(contour: Floats) -> int:
     products = np.einsum("ij,ij->i", before, after)
     scale = np.hypot(*before.T) * np.hypot(*after.T)
     return int(np.argmin(np.divide(products, scale, out=np.ones(len(contour)), where=scale > 0.0)))
-
-
-def _borders_on_wall(contour: Floats, padded: Cells) -> Flags:
-    """Tell which points of a contour, each halfway between two cells, border on an occupied one."""
-    low, high = np.floor(contour).astype(np.intp), np.ceil(contour).astype(np.intp)
-    wall: Flags = (padded[low[:, 1], low[:, 0]] == OCCUPIED) | (padded[high[:, 1], high[:, 0]] == OCCUPIED)
-    return wall

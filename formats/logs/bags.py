@@ -38,6 +38,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 OLD_TRANSFORMS = "tf/msg/tfMessage"  # of ROS 1, laid out alike
 
+FORMATS = {".bag": "rosbag1", ".mcap": "mcap"}  # of files alone
 NAMED = 20  # topics that an error lists at most
 ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a message that rosbag2 has compressed; no encoding begins so
 
@@ -161,16 +162,17 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
                 notes.add_dropped("broken_files", f"files that cannot be read, such as {error}", 1)
                 continue
             stack.callback(files[-1].close)
-        bag = Bag(name, _format_of(path), tuple(sorted(files, key=lambda file: file.start)), notes, paths[0].parent)
+        bag = Bag(
+            name,
+            FORMATS.get(path.suffix.lower(), "rosbag2"),
+            tuple(sorted(files, key=lambda file: file.start)),
+            notes,
+            paths[0].parent,
+        )
         _note_left_out(bag, notes)
         yield bag
         for code, said, count in (remark for file in files for remark in file.remarks):
             notes.add_dropped(code, said, count)
-
-
-def _format_of(path: Path) -> str:
-    alone = {".bag": "rosbag1", ".mcap": "mcap"}
-    return "rosbag2" if path.is_dir() else alone.get(path.suffix.lower(), "rosbag2")
 
 
 def _note_left_out(bag: Bag, notes: Notes) -> None:

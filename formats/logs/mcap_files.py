@@ -76,7 +76,11 @@ class McapFile:
             summary = self._summary()
             self._chunks: list[ChunkIndex] = []
             self.connections = self._scanned() if summary is None else self._from_summary(summary)
-            self._refuse_empty()
+            if self._cut and not any(one.msgcount for one in self.connections):
+                raise MalformedFileError(
+                    "is a broken bag: it ends before the first readable message; if it was cut off, "
+                    "`mcap recover` repairs it"
+                )
         except BaseException:
             self.close()
             raise
@@ -118,14 +122,6 @@ class McapFile:
             raise UnsupportedFormatError("is compressed as a whole; decompress it first with zstd -d")
         if magic != MAGIC:
             raise MalformedFileError("is not an mcap: its first bytes are not those of the format")
-
-    def _refuse_empty(self) -> None:
-        """Refuse a file that ends before the first message that can be read."""
-        if self._cut and not any(one.msgcount for one in self.connections):
-            raise MalformedFileError(
-                "is a broken bag: it ends before the first readable message; if it was cut off, "
-                "`mcap recover` repairs it"
-            )
 
     def _summary(self) -> Summary | None:
         """Return the summary; None where it does not name all that has to be known of the messages."""

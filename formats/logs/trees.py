@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -211,17 +211,11 @@ def _note_doubts(tree: Transforms, notes: Notes) -> None:
     if several:
         told = "; ".join(f"{shown(one)} in {_listed(tree.parents(one))}" for one in several[:3])
         notes.add_assumed("several_parents", f"frames with several parents, of which one is used: {told}")
-    for parent, child in _refixed(tree):
+    ways = [(parent, child) for child in tree.frames() for parent in tree.parents(child)]
+    for parent, child in (way for way in ways if tree.track(*way).refixed):
         notes.add_assumed(
             "fixed_again", f"{shown(child)} is fixed in {shown(parent)} at different places; the last one is used"
         )
-
-
-def _refixed(tree: Transforms) -> Iterator[tuple[str, str]]:
-    for child in tree.frames():
-        for parent in tree.parents(child):
-            if tree.track(parent, child).refixed:
-                yield parent, child
 
 
 def _first(topic: str) -> str:

@@ -61,7 +61,9 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     endpoints = np.vstack([one.ends for one in drawing.polylines]) * metres
     lengths = [len(one.ends) for one in drawing.polylines]
     widths = np.repeat([one.width for one in drawing.polylines], lengths) * metres
-    oriented = _means_directions(drawing, options)
+    oriented = drawing.oriented and not options.point
+    if options.directions is not None:
+        oriented = options.directions == "drawn"
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
         endpoints, widths = endpoints[near], widths[near]
@@ -84,12 +86,6 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if len(points):
         drawing.notes.add_read("points", "points", len(points))
     return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta, points, sigma)
-
-
-def _means_directions(drawing: Drawing, options: ImportOptions) -> bool:
-    if options.directions is not None:
-        return options.directions == "drawn"
-    return drawing.oriented and not options.point
 
 
 def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing: Drawing) -> tuple[Floats, Floats]:
@@ -172,7 +168,8 @@ def _note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: Impo
     plausible = [name for name, length in likely.items() if LEAST_USUAL <= length <= GREATEST_USUAL]
     plausible.sort(key=lambda name: abs(math.log(likely[name] / USUAL)))
     others = "; ".join(
-        f"in {name} it is {likely[name]:.3g} m (a factor of {_factor(UNITS[name], metres)})" for name in plausible
+        f"in {name} it is {likely[name]:.3g} m (a factor of {max(UNITS[name] / metres, metres / UNITS[name]):.6g})"
+        for name in plausible
     )
     drawing.notes.add_assumed(
         "unlikely_unit",
@@ -185,7 +182,3 @@ def _note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: Impo
 def _named(metres: float) -> str:
     name = next((name for name, value in UNITS.items() if math.isclose(value, metres, rel_tol=1e-6)), None)
     return f"{metres:g} m" + (f" ({name})" if name is not None and name != "m" else "")
-
-
-def _factor(one: float, other: float) -> str:
-    return f"{max(one, other) / min(one, other):.6g}"
