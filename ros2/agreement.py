@@ -168,6 +168,7 @@ class Agreement:
     _held: Observation | None = None  # whose stamp fits that of no other scan yet
     _contradicted: bool = False
     _unexplained: int = 0  # scans since the last agreement that contradict odometry
+    _contradiction: int | None = None  # the stamp of the last of all such scans
 
     @property
     def latest(self) -> Observation | None:
@@ -184,6 +185,10 @@ class Agreement:
         """Return whether so many scans contradict the agreed hypothesis that it is not to be used any more."""
         return self._agreed is not None and self._agreed.against >= tuning.LOST_SCANS
 
+    def doubts_odometry(self, stamp: int) -> bool:
+        """Return whether a scan contradicts odometry not long before a time, nanoseconds."""
+        return self._contradiction is not None and stamp - self._contradiction <= tuning.FORGOTTEN_NS
+
     @property
     def progress(self) -> tuple[int, float, float]:
         """Scans for the best hypothesis less those against it, metres and radians that the robot has moved."""
@@ -193,7 +198,7 @@ class Agreement:
     def reset(self) -> None:
         """Forget everything, as when the robot was carried, or the map changed."""
         self._hypotheses, self._agreed, self._newest, self._contradicted = [], None, None, False
-        self._held, self._unexplained = None, 0
+        self._held, self._unexplained, self._contradiction = None, 0, None
 
     def take(self, scan: Observation) -> Event:
         """Take the next scan.
@@ -229,7 +234,8 @@ class Agreement:
             one.support(scan)
         if scan.usable and not supported:
             supported = [self._begin(scan)]
-            self._unexplained += scan.odometry is not None and bool(against)
+            if scan.odometry is not None and against:
+                self._unexplained, self._contradiction = self._unexplained + 1, scan.stamp
         if self._agreed is not None and self._agreed in supported:
             self._agreed.against, self._contradicted = 0, False
             return Event.CONFIRMED

@@ -200,12 +200,7 @@ class Inputs:
     @property
     def _clocks(self) -> str:
         now = self._clock.steady()
-        offset = self._odometry.clock_offset(now - (self._latency or 0), now)
-        return (
-            f"the stamps of scans are {abs(offset):.1f} s {'behind' if offset > 0.0 else 'ahead of'} those of odometry "
-            f"on {self._odometry.source}; expected at most {CLOCKS_APART:g} s. Synchronize the clocks; odometry is not "
-            "used until then"
-        )
+        return self._odometry.clocks(now - (self._latency or 0), now)
 
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._options.domain

@@ -119,7 +119,11 @@ class Localization:
         `received` returns when a scan with a stamp was received.
         """
         stamp = nanoseconds(stamped) or nanoseconds(self._clock.now())
-        scan = observation_of(answer, self._odometry.known(stamp, received(stamp)), stamp)
+        got, doubted = received(stamp), self._agreement.doubts_odometry(stamp)
+        known = self._odometry.known(stamp, got, doubted=doubted)
+        if known is None and doubted and got is not None and not self._odometry.same_place(stamp, got):
+            self._health.warn(self._odometry.clocks(stamp, got), stamped, "clocks")
+        scan = observation_of(answer, known, stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
             self._correction = MapToOdom()  # where the clock was set back, the agreement forgets the pose

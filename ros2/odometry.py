@@ -12,7 +12,7 @@ from registration import IDENTITY, RigidTransform
 from .clock import NS, Clock, nanoseconds
 from .messages import Odometry, Time
 from .transforms import Floats, matrix_in_space, matrix_of, planar
-from .tuning import CLOCK_BACK_NS, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
+from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, SAME_PLACE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
@@ -131,6 +131,15 @@ class OdometryHistory:
         """Return how many seconds longer after its stamp a scan was received than odometry was; 0 without odometry."""
         return (received - stamp - self._track.latency(stamp, received)) / NS if len(self._track) else 0.0
 
+    def clocks(self, stamp: int, received: int) -> str:
+        """Return by how much the clock of a scan differs from that of odometry, with the remedy."""
+        offset = self.clock_offset(stamp, received)
+        return (
+            f"the stamps of scans are {abs(offset):.1f} s {'behind' if offset > 0.0 else 'ahead of'} those of odometry "
+            f"on {self.source}; expected at most {CLOCKS_AGREE:g} s. Synchronize the clocks; until then, odometry is "
+            "not used while the robot moves"
+        )
+
     def awaited(self, stamp: Time) -> bool:
         """Return whether odometry arrives, but has not reached a stamp."""
         return bool(len(self._track)) and 0 < nanoseconds(stamp) - self._track.newest[0] <= STALE_NS
@@ -154,7 +163,20 @@ class OdometryHistory:
         """Return `between` of two stamps of messages."""
         return self.between(nanoseconds(begin), nanoseconds(end))
 
-    def known(self, stamp: int, received: int | None = None) -> Known | None:
-        """Return odom_from_base of something with a stamp and a time of reception; None where it is not known."""
+    def known(self, stamp: int, received: int | None = None, *, doubted: bool = False) -> Known | None:
+        """Return odom_from_base of something with a stamp and a time of reception; None where it is not known.
+
+        Where scans contradict it (`doubted`), it is known only if `same_place`.
+        """
         known = self._track.known(stamp, received) if len(self._track) else None
-        return None if known is None else replace(known, part=(self._tracks, *known.part))
+        if known is None or (doubted and received is not None and not self.same_place(stamp, received)):
+            return None
+        return replace(known, part=(self._tracks, *known.part))
+
+    def same_place(self, stamp: int, received: int) -> bool:
+        """Return whether the clocks of a scan and of odometry agree, or the robot hardly moves between their times."""
+        offset = self.clock_offset(stamp, received)
+        if abs(offset) <= CLOCKS_AGREE:
+            return True
+        step = self.between(stamp, stamp + round(offset * NS))
+        return step is not None and max(math.hypot(step.x, step.y), abs(step.theta)) <= SAME_PLACE

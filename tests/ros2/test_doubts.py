@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 
@@ -10,8 +11,11 @@ import pytest
 
 import linefix
 from ros2 import Maps, NodeOptions, messages
+from ros2.agreement import Agreement, Observation
+from ros2.clock import Clock
+from ros2.deciding import MapToOdom
 from ros2.odometry import OdometryHistory
-from ros2.transforms import matrix_in_space
+from ros2.transforms import matrix_in_space, planar
 
 from .robot import ROOM, grid_of_room, is_at_truth, mount, quaternion, running, scan, wait_until
 from .test_agreement import STRAIGHT, drive, first_agreed
@@ -178,3 +182,39 @@ def test_the_same_problem_with_other_numbers_is_logged_once(domain: int, room: l
         wait_until(lambda: any("expected a position" in line for line in logged), lambda: logged)
         time.sleep(0.3)
     assert len([line for line in logged if "/odom" in line]) == 1
+
+
+@pytest.mark.parametrize("late", [-0.4, 0.0, 0.4])
+def test_scans_of_another_clock_do_not_turn_the_pose(late: float) -> None:
+    """A robot drives, turns by 180 degrees and drives back; scans have late stamps, and are searched after 0.6 s."""
+
+    def at(tick: int) -> linefix.RigidTransform:
+        second = 0.05 * (tick - 1000)
+        turned = min(max(second - 4.0, 0.0), math.pi)  # rad, at 1 rad/s
+        return linefix.RigidTransform(0.4 * (min(second, 4.0) - max(second - 4.0 - math.pi, 0.0)), 0.0, turned)
+
+    clock = Clock(simulated=True)
+    odometry, agreement, correction = OdometryHistory(clock), Agreement(), MapToOdom()
+    transforms, doubts = [], set()
+    for tick in range(1000, 1250):
+        clock.take(messages.Clock(messages.Time(*divmod(tick * TENTH // 2, 10 * TENTH))))
+        message = told(tick * TENTH // 2, at(tick).x)
+        message.pose.pose.orientation = quaternion(at(tick).theta)
+        odometry.take(message)
+        received = (tick - 12) * TENTH // 2
+        stamp, doubted = received + round(late * 10 * TENTH), agreement.doubts_odometry(received)
+        known = odometry.known(stamp, received, doubted=doubted)
+        scan = Observation(stamp, at(tick - 12), np.diag([1e-5, 1e-5, 4e-6]), True)
+        if known is not None:
+            scan = replace(scan, odometry=planar(known.matrix)[0], part=known.part)
+        elif doubted:
+            doubts.add(odometry.clocks(stamp, received).partition(" on ")[0])
+        correction.take(agreement.take(scan), scan)
+        newest = odometry.newest
+        assert newest is not None
+        transforms.append(correction.advance(newest[0], newest[1], newest[2].part))
+    turned = [abs(one.theta) for one in transforms if one is not None]
+    assert len(turned) > 50
+    assert max(turned) < math.radians(5.0)
+    apart = "ahead of" if late > 0.0 else "behind"
+    assert doubts == ({f"the stamps of scans are 0.4 s {apart} those of odometry"} if late else set())
