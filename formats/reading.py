@@ -9,7 +9,6 @@ from typing import Any
 
 from .drawings.csv_table import read_csv
 from .drawings.drawing import Drawing
-from .drawings.dxf import read_dxf
 from .drawings.geojson import read_geojson
 from .drawings.own_json import read_json
 from .drawings.svg import read_svg
@@ -30,8 +29,15 @@ from .logs.scan import Log, LogOptions
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
+
+def _read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+    from .drawings.dxf import read_dxf  # takes as long to load as all other readers, and only this needs it
+
+    return read_dxf(path, options, notes)
+
+
 DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
-    ".dxf": read_dxf,
+    ".dxf": _read_dxf,
     ".svg": read_svg,
     ".geojson": read_geojson,
     ".json": read_json,

@@ -12,13 +12,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import orjson
-from ezdxf import units
-from ezdxf.filemanagement import new
 
 from registration import RigidTransform
 
 from .drawings.csv_table import COLUMNS
-from .drawings.dxf import FREE_LEFT
 from .drawings.geojson import OWN
 from .drawings.svg import METRES, NAMESPACE, ORIENTED
 from .errors import UnsupportedFormatError
@@ -89,6 +86,11 @@ def _csv(map: LineMap) -> bytes:
 
 
 def _dxf(map: LineMap) -> bytes:
+    from ezdxf import units
+    from ezdxf.filemanagement import new
+
+    from .drawings.dxf import FREE_LEFT
+
     document = new("R2010", units=units.M)
     layer = FREE_LEFT if map.oriented else UNDIRECTED
     document.layers.add(layer)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from registration import RigidTransform
 
@@ -173,7 +173,7 @@ def _edges_decided(cells: Cells, kept: Flags, grid: Grid) -> Cells:
     beside = np.ones((3, 3), dtype=np.bool_)
     for kind in (FREE, OCCUPIED):  # through other such cells, not through a wall
         own = cells == kind
-        edge &= ndimage.binary_dilation(own, beside, tuning.EDGE_REACH, mask=between | own)
+        edge &= scipy.ndimage.binary_dilation(own, beside, tuning.EDGE_REACH, mask=between | own)
     middle = np.float32(0.5 * (grid.free_below + grid.occupied_above))
     decided = np.where(grid.occupancy > middle, OCCUPIED, FREE)
     return np.where(edge, decided, cells).astype(np.int8)

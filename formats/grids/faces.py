@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import contourpy
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from registration import Segments
 from vectorization import VectorizationOptions, vectorize
@@ -126,10 +125,10 @@ def _points(fronts: Floats, cells: Cells, notes: Notes) -> Floats:
     fronts : (m, 4)
         The lines along the fronts of the occupied cells, in cells, as the result.
     """
-    row, column = np.nonzero((cells == OCCUPIED) & ndimage.binary_dilation(cells == FREE))
+    row, column = np.nonzero((cells == OCCUPIED) & scipy.ndimage.binary_dilation(cells == FREE))
     middles = np.column_stack([column + 0.5, row + 0.5])
     on_fronts = Segments.derived(fronts).points(0.5)
-    away, _ = cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
+    away, _ = scipy.spatial.cKDTree(on_fronts).query(middles, distance_upper_bound=tuning.COVERED)
     points = np.asarray(middles[np.isinf(away)])
     if len(points) > MAX_POINTS:
         what = f"cells that are on no wall, more than the {MAX_POINTS} points of a map"

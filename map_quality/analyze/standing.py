@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
@@ -128,8 +129,6 @@ def reached(segments: Segments, point: Sequence[float], places: Floats) -> NDArr
     AnalysisError
         When the point lies outside the box around the map, or on a wall, or the map has too much wall for it.
     """
-    from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
-
     corners = segments.endpoints.reshape(-1, 2)
     low, high = corners.min(axis=0), corners.max(axis=0)
     cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
@@ -150,7 +149,7 @@ def reached(segments: Segments, point: Sequence[float], places: Floats) -> NDArr
 
     walls = np.zeros(np.ceil((high - low) / cell).astype(int) + 3, dtype=bool)
     walls[cells(segments.points(0.5 * cell))] = True
-    labels, _ = ndimage.label(~walls)
+    labels, _ = scipy.ndimage.label(~walls)
     label = labels[cells(start)]
     if label == 0:
         raise AnalysisError(

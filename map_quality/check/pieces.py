@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
@@ -177,9 +178,7 @@ def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline)
 
     An end within `least` metres touches. It is infinitely far where none is within `GREATEST_GAP`.
     """
-    from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
-
-    tree, left = cKDTree(ends), tuning.MOST_ENDS
+    tree, left = scipy.spatial.cKDTree(ends), tuning.MOST_ENDS
     for begin in range(0, len(chosen), tuning.ENDS_AT_A_TIME):
         some = chosen[begin : begin + tuning.ENDS_AT_A_TIME]
         if left <= 0 or deadline.passed:

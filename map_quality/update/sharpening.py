@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array
+import scipy
 
 from association import Deadline, MapIndex
 from registration import Segments
@@ -159,8 +159,8 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
     blocks_of = np.zeros((len(prior), 2, 2))
     np.add.at(blocks_of, pairs.wall, (weight[:, None] * pairs.of_wall)[:, :, None] * pairs.of_wall[:, None, :])
     own = np.linalg.inv(blocks_of + np.square(1.0 / prior)[:, :, None] * np.eye(2))
-    inverse = bsr_array((own, np.arange(len(own)), np.arange(len(own) + 1)))
-    weighted = diags_array(weight) @ of_pose
+    inverse = scipy.sparse.bsr_array((own, np.arange(len(own)), np.arange(len(own) + 1)))
+    weighted = scipy.sparse.diags_array(weight) @ of_pose
     both = (of_wall.T @ weighted).tocsr()
     gain = (inverse @ both).tocsr()
     x, y = tuning.FREE_POSE
@@ -175,11 +175,11 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
     return np.asarray(shift).reshape(-1, 2), covariance
 
 
-def _sparse(rows: Floats, block: Indices, columns: int) -> csr_array:
+def _sparse(rows: Floats, block: Indices, columns: int) -> scipy.sparse.csr_array:
     """Return a sparse matrix whose rows have their values in one block of columns each."""
     count, width = rows.shape
     at = width * block[:, None] + np.arange(width)
-    return csr_array((rows.ravel(), at.ravel(), width * np.arange(count + 1)), shape=(count, columns))
+    return scipy.sparse.csr_array((rows.ravel(), at.ravel(), width * np.arange(count + 1)), shape=(count, columns))
 
 
 def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: Floats) -> Floats:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from association import Deadline
 from registration import Segments
@@ -108,8 +107,8 @@ def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iter
     _, corner = np.unique(corners, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 2)
     at = np.bincount(corner.ravel())
-    joined = coo_array((np.ones(walls), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
-    _, label = connected_components(joined, directed=False)
+    joined = scipy.sparse.coo_array((np.ones(walls), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
+    _, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
     loop_of = label[corner[:, 0]]
     order = np.argsort(loop_of, kind="stable")
     passed = chunks.walls_of(evidence.chunk[evidence.counts[:, 0] > 0])

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from registration.limits import MAX_LENGTH
 
@@ -83,9 +81,9 @@ def _apart(endpoints: Floats, kept: Flags) -> Floats:
     middles = 0.5 * (endpoints[:, :2] + endpoints[:, 2:])
     cells, cell_of = np.unique(np.floor(middles / APART), axis=0, return_inverse=True)
     cell_of = cell_of.reshape(-1)
-    pairs = cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
-    _, group_of_cell = connected_components(graph, directed=False)
+    pairs = scipy.spatial.cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray")
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    _, group_of_cell = scipy.sparse.csgraph.connected_components(graph, directed=False)
     group = group_of_cell[cell_of]
     counts = np.bincount(group[kept], minlength=int(group.max()) + 1)
     first = int(np.argmax(counts))

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from scipy import ndimage
 
 from ...errors import InvalidOptionError
 
@@ -72,7 +72,7 @@ def _filled(
         draw.line([(math.floor(x1), math.floor(y1)), (math.floor(x2), math.floor(y2))], fill=1)
     free = ~np.asarray(picture)
     # Lines of neighbouring and diagonal cells hold where only neighbours are connected.
-    labels, _ = ndimage.label(free)
+    labels, _ = scipy.ndimage.label(free)
     wanted = []
     for k, place in enumerate(places):
         column, row = np.floor((np.asarray(place) - low) / cell + MARGIN).astype(int)
