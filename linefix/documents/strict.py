@@ -61,7 +61,7 @@ class Described(BaseModel):
 class Strict(Described):
     """Takes numbers for numbers only, and no field that it does not know."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
