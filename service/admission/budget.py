@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from types import TracebackType
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from ..errors import ShareHeldError, TooMuchHeldError
 from .keys import Holder
@@ -24,9 +25,14 @@ class ByteBudget:
         self.held_by: Counter[Holder] = Counter()
         self.held = 0
 
-    def account(self, holder: Holder = None) -> ByteAccount:
-        """Return the account of one request, a context manager; its bytes are given back when the block ends."""
-        return ByteAccount(self, holder)
+    @contextmanager
+    def account(self, holder: Holder = None) -> Iterator[ByteAccount]:
+        """Give the account of one request; its bytes are given back when the block ends."""
+        account = ByteAccount(self, holder)
+        try:
+            yield account
+        finally:
+            account.take(-account.taken)
 
 
 class ByteAccount:
@@ -58,9 +64,3 @@ class ByteAccount:
             self.taken += count
             if not budget.held_by[self._holder]:
                 del budget.held_by[self._holder]
-
-    def __enter__(self) -> ByteAccount:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self.take(-self.taken)

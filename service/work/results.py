@@ -1,4 +1,4 @@
-"""Results of requests: associations, batches, registrations, vectorizations, applied changes, imports of files."""
+"""Results of requests that need maps of the store or files: associations, batches, imports."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from dataclasses import dataclass
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
-from linefix.documents.encoding import encode, encode_list
+from linefix.documents.encoding import encode
 from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap, SearchOptions, is_oriented
-from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
+from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest
 from linefix.documents.results import check_json
-from linefix.documents.updates import ApplyRequest
-from linefix.operations import Json, Stopwatch, Target, applied, find, registered, vectorized
+from linefix.operations import Json, Stopwatch, Target, find
 from map_quality import check_map
 
 from ..importing.bounded import ReadFiles
@@ -112,22 +111,6 @@ def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResul
     reference = target.references.get(None)
     answer = {"results": items, "map": reference, "client_ref": asked.client_ref}
     return job.done(answer, map=reference, verdicts=noted)
-
-
-def answer_registration(asked: RegisterRequest, job: Job) -> Done:
-    """Find the pose from known correspondences; raises `InputError`."""
-    return job.done(registered(asked, job.watch, encode_list))
-
-
-def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
-    """Cut a scan into directed segments; raises `InvalidRequestError` where the library refuses it."""
-    return job.done(vectorized(asked, job.watch))
-
-
-def answer_apply(asked: ApplyRequest, job: Job) -> Done:
-    """Return a map with the changes that are accepted; raises `InputError` where it could not be put."""
-    accepted = sum(one.accepted for one in asked.changes)
-    return job.done({**applied(asked, job.watch), "client_ref": asked.client_ref}, changes=accepted)
 
 
 def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> MapIndex:

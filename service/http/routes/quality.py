@@ -17,12 +17,11 @@ from linefix.documents.checks import CheckAnswer
 from linefix.documents.parts import InlineMap, StoredMap, is_oriented
 from linefix.documents.requests import CheckRequest
 from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
-from linefix.operations import Json, Steps, analysis_steps, check_steps, update_steps
+from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps
 
 from ...maps.lookup import FoundMaps
 from ...telemetry.traces import queued
 from ...work.job import Done, Job, Operation, begin
-from ...work.results import answer_apply
 from ..bodies import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import looking_up_map
@@ -144,7 +143,12 @@ async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
 async def apply_changes(exchange: Searching) -> Response:
     """Return a map with those changes of an update that are accepted; nothing is searched or stored."""
     asked = await read_request(exchange, ApplyRequest)
-    return await answer_in_slot(exchange, partial(answer_apply, asked))
+    accepted = sum(one.accepted for one in asked.changes)
+
+    def work(job: Job) -> Done:
+        return job.done({**applied(asked, job.watch), "client_ref": asked.client_ref}, changes=accepted)
+
+    return await answer_in_slot(exchange, work)
 
 
 async def _in_turns(

@@ -7,11 +7,12 @@ from functools import partial
 from fastapi import APIRouter, Response
 
 from linefix.documents import examples
+from linefix.documents.encoding import encode_list
 from linefix.documents.replies import AssociateAnswer, RegisterAnswer, VectorizeAnswer
 from linefix.documents.requests import AssociateRequest, RegisterRequest, VectorizeRequest
+from linefix.operations import registered, vectorized
 
 from ...work.job import Done, Job
-from ...work.results import answer_registration, answer_vectorization
 from ..bodies import read_request
 from ..exchange import Exchange, Searching
 from ..map_stage import index_map, looking_up_maps
@@ -60,7 +61,7 @@ async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
 async def register(exchange: Searching) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
     asked = await read_request(exchange, RegisterRequest)
-    return await answer_in_slot(exchange, partial(answer_registration, asked))
+    return await answer_in_slot(exchange, lambda job: job.done(registered(asked, job.watch, encode_list)))
 
 
 @router.post(
@@ -73,4 +74,4 @@ async def register(exchange: Searching) -> Response:
 async def vectorize(exchange: Searching) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
     asked = await read_request(exchange, VectorizeRequest)
-    return await answer_in_slot(exchange, partial(answer_vectorization, asked))
+    return await answer_in_slot(exchange, lambda job: job.done(vectorized(asked, job.watch)))
