@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 from .asking import Where, setting
-from .errors import Names, WrongUseError
+from .errors import Names, WrongUseError, flags_of
 from .inputs import draw_picture, read_map_file, read_map_or_id
 from .options import File, MapArgument, Number, Text, grouped, option
 from .printing import Json, Output, rows, write_json
@@ -57,8 +57,7 @@ def analyze(
     if places.deadline_ms is not None and not places.deadline_ms >= 0.0:
         raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {places.deadline_ms:g}")
     target = read_map_or_id(on)
-    names = {f"/laser/{name}": f"--{name.replace('_', '-')}" for name in asdict(scanner)}
-    names |= {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(places)} | {"/map": on}
+    names = flags_of(scanner, "/laser") | flags_of(places) | {"/map": on}
     body = {"map": target, "laser": asdict(scanner), **asdict(places), "point": places.point and list(places.point)}
     body["landmark"] = [] if places.landmark is None else read_map_file(places.landmark).get("segments", [])
     answer = _analyzed(body, names, where)

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
+from typing import Any
 
 MOST_NAMED = 4  # wrong places in one line
 
@@ -72,6 +74,11 @@ Names = Mapping[str, str]
 """Names that the user has for places in a request: of a file or an option, by the beginning of a JSON pointer."""
 
 NO_NAMES: Names = {}
+
+
+def flags_of(group: Any, place: str = "") -> dict[str, str]:
+    """Return the names of options that belong together, by the places of their values in a request."""
+    return {f"{place}/{one.name}": f"--{one.name.replace('_', '-')}" for one in fields(group)}
 
 
 def place_of(pointer: str, names: Names) -> str:

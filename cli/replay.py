@@ -87,6 +87,14 @@ class ScanOptions:
     every: Annotated[int, option("Use each Nth scan.", "N", min=1)] = 1
 
 
+@dataclass(frozen=True, slots=True)
+class ResultFiles:
+    """The files to write, as options."""
+
+    out: Annotated[File, option("Write the usable poses to this file in the TUM format.", "FILE")] = None
+    picture: Annotated[File, option("Draw map and poses to this PNG file; usable poses are green.", "FILE")] = None
+
+
 @grouped
 def replay(
     log: Annotated[Path, argument("A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.", "LOG")],
@@ -96,8 +104,7 @@ def replay(
     usable: UsableOptions,
     where: Where,
     output: Output,
-    out: Annotated[File, option("Write the usable poses to this file in the TUM format.", "FILE")] = None,
-    picture: Annotated[File, option("Draw map and poses to this PNG file; usable poses are green.", "FILE")] = None,
+    files: ResultFiles,
 ) -> None:
     """Localize the scans of a log one after the other. With --json, print one line per scan.
 
@@ -120,10 +127,10 @@ def replay(
             if not tally.count:
                 raise
             broken = error
-    if out is not None:
-        _write_poses(tally, out, output.notes)
-    if picture is not None:
-        _draw(maps, where, tally, picture)
+    if files.out is not None:
+        _write_poses(tally, files.out, output.notes)
+    if files.picture is not None:
+        _draw(maps, where, tally, files.picture)
     print_notes(opened_log, output.notes)
     print_lines(_log_lines(opened_log, frames), output.notes)
     if not output.as_json:

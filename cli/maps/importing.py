@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..asking import Where, answering
-from ..errors import WrongUseError
+from ..errors import WrongUseError, flags_of
 from ..inputs import draw_picture, existing, write_document
 from ..logs import some_scans
 from ..options import File, Number, OutMap, Picture, Text, Texts, TopicOptions, argument, flag, grouped, option
@@ -84,8 +84,8 @@ def import_map(
 def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
     """Return what ``/v1/maps:import`` answers to a file; raises `WrongUseError` when there is no such file."""
     files = [existing(file)] if where.server is None else _with_what_it_names(existing(file))
-    names = {f"/{name}": f"--{name.replace('_', '-')}" for name in asdict(said)}
-    names |= {"": file.name, "/files": file.name} | {f"/files/{number}": one.name for number, one in enumerate(files)}
+    names = flags_of(said) | {"": file.name, "/files": file.name}
+    names |= {f"/files/{number}": one.name for number, one in enumerate(files)}
     if where.server is not None:
         sent = [(one.name, one.read_bytes()) for one in files]
         return where.ask("import_map", sent, said.fields, names=names)

@@ -11,7 +11,7 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, Annotated
 
 from ..asking import Where
-from ..errors import WrongUseError
+from ..errors import WrongUseError, flags_of
 from ..inputs import draw_picture, line_map_of, read_map_or_id, write_document
 from ..logs import some_scans
 from ..options import MapArgument, Number, OutMap, Picture, TopicOptions, argument, grouped, option
@@ -48,8 +48,8 @@ def update(
     """Propose changes of a map that the scans of several visits show, and write the new map."""
     target = read_map_or_id(on)
     visits = dict(zip(visit_names(logs), (_scans(log, scans, source) for log in logs), strict=True))
-    names = {f"/visits/{number}": name for number, name in enumerate(visits)} | {"": on, "/map": on}
-    names |= {"/refuse": "--refuse", "/accept": "--accept"}
+    names = flags_of(changes) | {"": on, "/map": on}
+    names |= {f"/visits/{number}": name for number, name in enumerate(visits)}
     answer = where.ask("update_map", target, _request_of(visits, changes), names=names)
     if out is not None:
         write_document(answer["map"], out)
