@@ -79,10 +79,9 @@ def _svg(map: LineMap) -> bytes:
 
 
 def _csv(map: LineMap) -> bytes:
-    rows = "".join(
-        ",".join(map_repr) + "\n" for map_repr in ([repr(c) for c in r] for r in map.segments.endpoints.tolist())
-    )
-    return f"# oriented={str(map.oriented).lower()}\n{','.join(COLUMNS)}\n{rows}".encode()
+    lines = [f"# oriented={str(map.oriented).lower()}", ",".join(COLUMNS)]
+    lines += [",".join(repr(c) for c in row) for row in map.segments.endpoints.tolist()]
+    return "\n".join([*lines, ""]).encode()
 
 
 def _dxf(map: LineMap) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ ALL_ROUND = math.tau - 0.01  # rad; a full turn, and what people write for one
 HEADINGS = 4  # of a scanner that does not see all round, from each place
 SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; a pose that is nearer to another one is the same
 T = TypeVar("T")
+# One search at each step; between steps others may have their turn.
+Steps: TypeAlias = Generator[None, None, T]
 
 
 class AnalysisError(InputError):
@@ -125,7 +127,7 @@ def is_same(found: RigidTransform, pose: RigidTransform) -> bool:
     return away < SAME_PLACE and abs(wrap_angle(found.theta - pose.theta)) < SAME_HEADING
 
 
-def finished(steps: Generator[None, None, T]) -> T:
+def finished(steps: Steps[T]) -> T:
     """Take all steps, and return their result."""
     while True:
         try:

@@ -86,9 +86,11 @@ class Health:
         self, part: str, stamp: Time, verdict: tuple[int, str], values: Mapping[str, str] | None = None
     ) -> None:
         """Publish diagnostics of a part of the node."""
+        self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [self._status(part, verdict, values)]))
+
+    def _status(self, part: str, verdict: tuple[int, str], values: Mapping[str, str] | None) -> DiagnosticStatus:
         prefix, hardware_id = self.names
-        status = status_of(f"{prefix}linefix: {part}", hardware_id, verdict, values)
-        self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [status]))
+        return status_of(f"{prefix}linefix: {part}", hardware_id, verdict, values)
 
     def beat(self, state: State, stamp: Time, values: Mapping[str, str], doubt: str = "") -> None:
         """Publish the state, with why it is no better: at once where it or the map has changed, else once a second."""
@@ -101,8 +103,7 @@ class Health:
         level, message = STATES[state]
         verdict = level, f"{message}: {doubt}" if doubt and level != OK else message
         self.publish("localization", stamp, verdict, values)
-        prefix, hardware_id = self.names
-        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, verdict, values))
+        self.status.publish(self._status("localization", verdict, values))
         if changed:
             self._state = state
             self.log(f"state {state.value}: {verdict[1]}")

@@ -193,12 +193,13 @@ def digest_of(serialized: bytes) -> bytes:
 def _serve(connection: Connection[Any, Any], surface: float | None) -> None:
     """Convert grids until the other process has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt at a terminal goes to all processes there
-    _limit_memory()
+    _limit("RLIMIT_AS", CONVERSION_BYTES)
     convert(_small_grid())  # loads the compiled code
     with contextlib.suppress(EOFError, OSError):
         while True:
             grid = connection.recv_bytes(MAX_GRID_BYTES)
-            _limit_time()
+            used = os.times()
+            _limit("RLIMIT_CPU", int(used.user + used.system + CONVERSION_SECONDS) + 1)
             connection.send_bytes(pickle.dumps(convert(grid, surface) if grid else Converted()))
 
 
@@ -210,18 +211,8 @@ def _small_grid() -> bytes:
     return bytes(OccupancyGrid(Header(frame_id="map"), info, cells.ravel().tolist()).serialize())
 
 
-def _limit_memory() -> None:
+def _limit(what: Literal["RLIMIT_AS", "RLIMIT_CPU"], most: int) -> None:
     with contextlib.suppress(ImportError, ValueError, OSError):  # not on every system
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (CONVERSION_BYTES, resource.RLIM_INFINITY))
-
-
-def _limit_time() -> None:
-    """Have the process ended after so much time of a core from now on."""
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        used = os.times()
-        end = int(used.user + used.system + CONVERSION_SECONDS) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
+        resource.setrlimit(getattr(resource, what), (most, resource.RLIM_INFINITY))

@@ -49,12 +49,7 @@ class Maps:
 
     def similarity(self, before: Maps | None) -> float:
         """Return which fraction of the walls is where walls were before, or the other way round; the lesser one."""
-        if (
-            before is None
-            or self.several
-            or before.several
-            or list(self.frames.values()) != list(before.frames.values())
-        ):
+        if before is None or self.several or before.several or [*self.frames.values()] != [*before.frames.values()]:
             return 0.0
         mine, theirs = (one.walls_of(None).points(SAME) for one in (self, before))
         return float(min(np.mean(cKDTree(b).query(a)[0] <= SAME) for a, b in ((mine, theirs), (theirs, mine))))

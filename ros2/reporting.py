@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 import linefix
+from registration.layout import Floats
 
 from . import messages as ros
 
@@ -18,8 +18,6 @@ ADD, DELETE = 0, 2
 GREEN, AMBER = ros.ColorRGBA(0.1, 0.7, 0.2, 1.0), ros.ColorRGBA(0.9, 0.6, 0.0, 1.0)
 GREY = ros.ColorRGBA(0.5, 0.5, 0.5, 0.6)
 LINE_WIDTH = 0.04  # m
-Floats = NDArray[np.float64]
-
 PLANAR = np.array([0, 1, 5])  # x, y and the turn about z among ROS's six
 
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration import RigidTransform
 
@@ -16,11 +15,9 @@ from .clock import nanoseconds
 from .frames import Frames
 from .messages import PoseWithCovarianceStamped
 from .odometry import OdometryHistory
-from .transforms import FrameError, matrix_of, planar
+from .reporting import PLANAR
+from .transforms import Floats, FrameError, matrix_of, planar
 
-Floats = NDArray[np.float64]
-
-PLANAR = np.array([0, 1, 5])  # x, y and rotation about z among the six of ROS
 UNKNOWN = np.diag([1.0, 1.0, math.pi])  # covariance of a pose without a valid one
 
 

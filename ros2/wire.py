@@ -25,17 +25,12 @@ MOST = 200  # messages that are taken from a reader at a time
 SENSOR = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))
 # For streams of which each message counts, though some may be lost.
 STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(100))
+_ACKNOWLEDGED = Policy.Reliability.Reliable(duration(seconds=1))
 # For messages that are published once and hold, also for subscribers that come later: maps and mounts.
-LATCHED = Qos(
-    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)
-)
+LATCHED = Qos(_ACKNOWLEDGED, Policy.Durability.TransientLocal, Policy.History.KeepLast(10))
 # For a state: only the newest counts, also for subscribers that come later.
-NEWEST = Qos(
-    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(1)
-)
-RELIABLE = Qos(
-    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile, Policy.History.KeepLast(10)
-)
+NEWEST = Qos(_ACKNOWLEDGED, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
+RELIABLE = Qos(_ACKNOWLEDGED, Policy.Durability.Volatile, Policy.History.KeepLast(10))
 
 
 def topic_name(name: str) -> str:
@@ -49,10 +44,6 @@ def undecodable(kind: type[IdlStruct], error: Exception) -> str:
         f"a message cannot be decoded and is ignored: {error}; expected a {kind.__name__}. Check the type that is "
         "published"
     )
-
-
-def _ignore(problem: str) -> None:
-    pass
 
 
 class Subscription(Generic[Message]):
@@ -84,7 +75,7 @@ class Subscription(Generic[Message]):
         name: str,
         kind: type[Message],
         *profiles: Qos,
-        problem: Callable[[str], None] = _ignore,
+        problem: Callable[[str], None] = lambda _: None,
     ) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name, self.problem, self._kind = name, problem, kind

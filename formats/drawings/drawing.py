@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from registration.layout import Floats
 
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_SEGMENTS, MAX_UNITS
 from ..options import DEFAULT_OPTIONS, ImportOptions
 from ..report import Notes, listed_counts, shown
 from .selection import excluded_by, kinds_of, levels_of, lower_keys, matches, walls_among, walls_first
-
-Floats = NDArray[np.float64]
 
 FLAT, STEEP = 1e-3, 0.05  # of the greater extent in the plane: how narrow and how high a section is
 LEFT_OUT = {

@@ -125,7 +125,7 @@ class Expansion:
         for entity in entities:
             self._count += 1
             if self._count > MAX_ENTITIES:
-                self._refuse(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
+                raise TooLargeError(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
             placed = outer._replace(entity=entity, layers=_layers_of(entity, outer.layers))
             if entity.dxf.get("invisible", 0):
                 self.drawing.notes.add_dropped("invisible", "entities and blocks with the attribute invisible", 1)
@@ -142,9 +142,9 @@ class Expansion:
 
     def _expanded(self, reference: Insert, placed: Placed, depth: int) -> Iterator[Placed]:
         if depth >= MAX_BLOCK_DEPTH:
-            self._refuse(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another")
+            raise TooLargeError(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another")
         if reference.mcount > MAX_ENTITIES:
-            self._refuse(f"expected at most {MAX_ENTITIES} copies of a block")
+            raise TooLargeError(f"expected at most {MAX_ENTITIES} copies of a block")
         name, block = shown(str(reference.dxf.get("name", ""))), reference.block()
         if block is None:
             self._missing[name] += 1
@@ -175,9 +175,6 @@ class Expansion:
         if self._missing:
             what = f"references to blocks that the file does not define: {listed(self._missing)}"
             notes.add_dropped("missing_block", what, self._missing.total())
-
-    def _refuse(self, why: str) -> None:
-        raise TooLargeError(why)
 
 
 def _layers_of(entity: DXFEntity, outer: tuple[str, ...]) -> tuple[str, ...]:

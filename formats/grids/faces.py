@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from registration import Segments
+from registration.layout import Floats
 from vectorization import VectorizationOptions, vectorize
 
 from ..errors import MalformedFileError, TooLargeError
@@ -25,7 +26,6 @@ DECIDED = ("mode", "thresholds", "unknown_grey", "inverted")  # notes on how cel
 WHY_DRAWN = "because walls have a constant thickness, as in a drawn grid; set the option surface for another value"
 WHY_MAPPED = "by the thickness of walls that are seen from one side, as in a mapped grid"
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 

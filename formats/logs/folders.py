@@ -14,13 +14,15 @@ FOLDER_SUFFIXES = (".mcap", ".db3")  # of files in the folder of a bag of ROS 2
 SUFFIXES = (".bag", *FOLDER_SUFFIXES)
 METADATA = "metadata.yaml"
 PACKED = ".zstd"  # what rosbag2 appends where it compresses whole files
+PACKED_SUFFIXES = tuple(f"{kind}{packed}" for kind in FOLDER_SUFFIXES for packed in (PACKED, ".zst"))
+OLD_SUFFIXES = (".bag", ".bag.active")  # of ROS 1
 _NUMBER = re.compile(r"_\d+$")  # of a file among those that one recording was split into
 
 
 def is_bag(path: Path) -> bool:
     """Tell whether a path is a recording: by its ending, or as a folder with such files."""
     if path.is_dir():
-        return (path / METADATA).is_file() or bool(_recorded(path) or _packed(path) or _active(path))
+        return (path / METADATA).is_file() or bool(_ending(path, *FOLDER_SUFFIXES, *PACKED_SUFFIXES, *OLD_SUFFIXES))
     return path.suffix.lower() in SUFFIXES or _hint(path) is not None
 
 
@@ -77,7 +79,7 @@ def _listed(folder: Path, notes: Notes) -> list[Path] | None:
 
 def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     """Return the files in a folder without a description, where they are of one recording."""
-    found = _recorded(folder)
+    found = _ending(folder, *FOLDER_SUFFIXES)
     if not found:
         _refuse_packed(folder)
         raise IncompleteFileError(
@@ -96,20 +98,9 @@ def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     return found[:MAX_RECORDED_FILES]
 
 
-def _recorded(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.suffix.lower() in FOLDER_SUFFIXES and file.is_file())
-
-
-def _packed(folder: Path) -> list[Path]:
-    return sorted(
-        file
-        for file in folder.iterdir()
-        if file.suffix.lower() in (PACKED, ".zst") and Path(file.stem).suffix.lower() in FOLDER_SUFFIXES
-    )
-
-
-def _active(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.name.lower().endswith((".bag", ".bag.active")))
+def _ending(folder: Path, *endings: str) -> list[Path]:
+    """Return the files in a folder whose names end in one of some endings, sorted."""
+    return sorted(file for file in folder.iterdir() if file.name.lower().endswith(endings) and file.is_file())
 
 
 def _unpacked(file: Path) -> Path:
@@ -118,14 +109,14 @@ def _unpacked(file: Path) -> Path:
 
 
 def _refuse_packed(folder: Path) -> None:
-    packed, active = _packed(folder), _active(folder)
+    packed, old = _ending(folder, *PACKED_SUFFIXES), _ending(folder, *OLD_SUFFIXES)
     if packed:
         raise UnsupportedFormatError(
             f"is compressed file by file ({first_of([file.name for file in packed])}); decompress it first with zstd -d"
         )
-    if active:
+    if old:
         raise UnsupportedFormatError(
-            f"is not a bag of ROS 2, and has {first_of([file.name for file in active])}; choose one file"
+            f"is not a bag of ROS 2, and has {first_of([file.name for file in old])}; choose one file"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -19,7 +19,7 @@ from association import (
 )
 from registration import RigidTransform, Segments
 
-from ..views import AnalysisError, Robot, finished, is_elsewhere, is_same, look, similar_pose
+from ..views import AnalysisError, Robot, Steps, finished, is_elsewhere, is_same, look, similar_pose
 from .drive import STEP, seen_on_the_way, ways_from
 from .standing import CLEARANCE, Standing, is_free, standing_places
 
@@ -161,8 +161,8 @@ class Analysis:
         """
         return finished(self.looking(number, deadline))
 
-    def looking(self, number: int, deadline: Deadline | None = None) -> Generator[None, None, PlaceVerdict | None]:
-        """Do what `look` does, one search at a step, and return the same; between steps others may have their turn.
+    def looking(self, number: int, deadline: Deadline | None = None) -> Steps[PlaceVerdict | None]:
+        """Do what `look` does, one search at a step, and return the same.
 
         Raises
         ------
@@ -170,8 +170,9 @@ class Analysis:
             When the deadline was cancelled.
         """
         pose = self.standing.pose(number)
-        walls_away = is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented)
-        if not walls_away or self._meets_a_point(pose):
+        points_away = np.hypot(*(self.index.points.positions - [pose.x, pose.y]).T) >= CLEARANCE
+        free = is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented)
+        if not (free and points_away.all()):
             return None
         seen = self._scan(pose, number)
         found = _verdict(number, pose, self._search(seen, deadline))
@@ -188,7 +189,7 @@ class Analysis:
 
     def _knows_after(
         self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
-    ) -> Generator[None, None, float | None]:
+    ) -> Steps[float | None]:
         """Return how far it drives until the scans so far give a usable answer that is right; metres."""
         ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
         seen_so_far = [[(pose, seen)] for _ in ways]
@@ -204,11 +205,6 @@ class Analysis:
                 if result.usable and result.pose is not None and is_same(result.pose, there):
                     return STEP * (len(views) - 1)
         return None
-
-    def _meets_a_point(self, pose: RigidTransform) -> bool:
-        """Return whether a point of the map is too near for a robot to stand there."""
-        away = self.index.points.positions - [pose.x, pose.y]
-        return bool((np.hypot(*away.T) < CLEARANCE).any())
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
         """Return the scan that the robot would send from there; the noise of a place is the same on each attempt."""

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from association import Scan, View, assemble
 from registration import IDENTITY, RigidTransform, Segments, wrap_angle
+from registration.layout import Floats
 from simulation import Scanner, scan
 
 STEP = 1.0  # m from view to view
@@ -20,8 +20,6 @@ RAYS = 72  # that feel for where there is room
 BESIDE = 2  # rays on either side that have to have room, too
 ANGLES = -math.pi + math.tau / RAYS * np.arange(RAYS)
 TURN = math.radians(120.0)  # the most that it turns where it cannot go on; back only where there is nothing else
-
-Floats = NDArray[np.float64]
 
 
 def ways_from(

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
+from registration.layout import Floats
 from simulation import Scanner, scan
 
 from ..views import AnalysisError, Robot
@@ -27,8 +28,6 @@ CELL = 0.1  # m; fine enough for doors
 MOST_CELLS = 4_000_000
 MOST_STEPS = 20_000_000  # along the walls
 ORDER = 20260301  # seeds the order in which places are tried
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from association import CancelledError, Deadline, MapIndex
 
 from . import tuning
@@ -36,7 +34,10 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     """
     until = deadline or Deadline()
     size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
-    findings = list(_size_findings(size))
+    findings: list[Finding] = []
+    if not tuning.SMALLEST <= size.diagonal <= tuning.LARGEST:
+        said = f"{size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m"
+        findings.append(Finding("unlikely_size", f"The map's diagonal is {said}. Check that it is in metres."))
     advice, near = Advice(drawn_sigma(index)), find_near_walls(index, until)
     if oriented and not findings:  # of another unit walls are too far apart to see one another
         sides = look_from_walls(index, near.opposite, until)
@@ -59,12 +60,3 @@ def _directed(sides: Sides, findings: list[Finding]) -> bool | None:
     if sides.meaningless:
         return False
     return None if findings or not sides.hits[:, 0].sum() else True
-
-
-def _size_findings(size: Size) -> Iterator[Finding]:
-    if not tuning.SMALLEST <= size.diagonal <= tuning.LARGEST:
-        yield Finding(
-            "unlikely_size",
-            f"The map's diagonal is {size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m. "
-            "Check that it is in metres.",
-        )

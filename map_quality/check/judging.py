@@ -211,10 +211,8 @@ def _moved(samples: Sequence[Sample]) -> Iterator[Finding]:
     # In a rotation the places far from the origin move most: agree about all three at the median.
     x, y, sine, cosine = np.median(np.column_stack([moves[:, :2], np.sin(moves[:, 2]), np.cos(moves[:, 2])]), axis=0)
     turn = math.atan2(sine, cosine)
-    away, turned = (
-        np.hypot(*(moves[:, :2] - [x, y]).T),
-        np.abs(np.remainder(moves[:, 2] - turn + np.pi, math.tau) - np.pi),
-    )
+    away = np.hypot(*(moves[:, :2] - [x, y]).T)
+    turned = np.abs(np.remainder(moves[:, 2] - turn + np.pi, math.tau) - np.pi)
     same = int(((away < 2.0 * tuning.MOVED_METRES) & (turned < tuning.MOVED_RADIANS)).sum())
     is_moved = math.hypot(x, y) >= tuning.MOVED_METRES or abs(turn) >= tuning.MOVED_RADIANS
     if same <= tuning.MANY * len(moves) or not is_moved:

@@ -50,10 +50,8 @@ def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> 
         searched = index if oriented else index.undirected_by(deadline)
     except IndexingEndedError:
         return Likeness(0, (), ())
-    segments, options = (
-        index.segments.take(np.arange(index.directed)),
-        AssociationOptions(oriented=oriented, on_map=1.0),
-    )
+    segments = index.segments.take(np.arange(index.directed))
+    options = AssociationOptions(oriented=oriented, on_map=1.0)
     looked, found, hits = 0, [], set[int]()
     for number, pose in enumerate(_places(index, segments)):
         if deadline.passed:
@@ -96,11 +94,8 @@ def _free_place(segments: Segments, piece: int) -> RigidTransform | None:
     (x, y), (dx, dy) = segments.midpoints[piece], segments.directions[piece]
     for normal in (math.atan2(dx, -dy), math.atan2(-dx, dy)):
         c, s = math.cos(normal), math.sin(normal)
-        room = float(
-            scan(
-                segments, RigidTransform(x + tuning.OFF_THE_WALL * c, y + tuning.OFF_THE_WALL * s, normal), RAY
-            ).ranges[0]
-        )
+        at_wall = RigidTransform(x + tuning.OFF_THE_WALL * c, y + tuning.OFF_THE_WALL * s, normal)
+        room = float(scan(segments, at_wall, RAY).ranges[0])
         if tuning.LEAST_ROOM < room < math.inf:
             away = min(tuning.CLEARANCE, 0.5 * room)
             return RigidTransform(x + away * c, y + away * s, 0.0)

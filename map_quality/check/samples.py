@@ -29,6 +29,7 @@ UNDONE: Mapping[Mistake | None, Callable[[Scan], Scan]] = {
     "reversed": turned_round,
 }
 """The change of a scan that undoes each mistake."""
+OPTIONS = AssociationOptions(max_alternatives=0, confidence=tuning.CONFIDENCE, on_map=1.0)  # under a hypothesis
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +106,9 @@ def try_sample(
     for one in hypotheses(oriented, index.sigma):
         if not deadline.passed:
             with suppress(IndexingEndedError):
-                trials[one] = _tried(index, scan, one, deadline)
+                place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)
+                options = replace(OPTIONS, oriented=one.oriented)
+                trials[one] = associate(place, UNDONE[one.mistake](scan), None, options, deadline)
     moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
     return Sample(result, trials, moved)
 
@@ -120,9 +123,3 @@ def hypotheses(oriented: bool, sigma: float | None) -> Iterator[Hypothesis]:
     for mistake in mistakes:
         for other in dict.fromkeys((sigma, tuning.WIDEST)):
             yield Hypothesis(oriented, other, mistake)
-
-
-def _tried(index: MapIndex, scan: Scan, one: Hypothesis, deadline: Deadline) -> AssociationResult:
-    place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)
-    options = AssociationOptions(max_alternatives=0, confidence=tuning.CONFIDENCE, oriented=one.oriented, on_map=1.0)
-    return associate(place, UNDONE[one.mistake](scan), None, options, deadline)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import (
-    AssociationOptions,
     AssociationResult,
     Deadline,
     IndexingEndedError,
@@ -27,7 +26,7 @@ from registration import Segments
 
 from ..scale import Matched, agreed
 from . import tuning
-from .samples import Sample, score_of
+from .samples import OPTIONS, Sample, score_of
 
 # Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
 TAKEN_FOR: Mapping[float, tuple[str, str]] = {
@@ -107,13 +106,7 @@ class _Scaled:
 
     def search(self, *, lax: bool = False) -> list[AssociationResult]:
         """Search each scan; `lax` finds walls that are off by decimetres, by segments alone, in half of the time."""
-        options = AssociationOptions(
-            max_alternatives=0,
-            confidence=tuning.CONFIDENCE,
-            oriented=self.oriented,
-            offset_tolerance=tuning.LAX_TOLERANCE if lax else None,
-            on_map=1.0,
-        )
+        options = replace(OPTIONS, oriented=self.oriented, offset_tolerance=tuning.LAX_TOLERANCE if lax else None)
         scans = [Scan(one.measured, None if one.views else one.viewpoint) for one in self.scans] if lax else self.scans
         return [associate(self.index, scan, None, options, self.deadline) for scan in scans]
 
@@ -140,10 +133,8 @@ class _Scaled:
         for factor in (*tuning.LADDER, *TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR)):
             of_map, of_scans = (1.0 / factor, 1.0) if self.is_usual else (1.0, factor)
             extent, diagonal = of_scans * self.extent, of_map * self.index.diagonal
-            if (
-                tuning.LEAST_EXTENT <= extent <= tuning.EXCEEDING * diagonal
-                and tuning.SMALLEST <= diagonal <= tuning.LARGEST
-            ):
+            fits = tuning.LEAST_EXTENT <= extent <= tuning.EXCEEDING * diagonal
+            if fits and tuning.SMALLEST <= diagonal <= tuning.LARGEST:
                 yield factor
 
 

@@ -161,14 +161,9 @@ def _pieces(group: SeenLines, known: Segments, deadline: Deadline) -> list[tuple
         covered += np.cumsum(steps[:count]) > 0
     seen = covered >= tuning.LEAST_VISITS
     seen[seen] = ~_on_map(known, place + middles[seen, None] * direction, direction, deadline)
-    return [
-        (
-            np.concatenate([place + (low + tuning.BIN * a) * direction, place + (low + tuning.BIN * b) * direction]),
-            sigma,
-        )
-        for a, b in runs(seen)
-        if (b - a) * tuning.BIN >= tuning.LEAST_PIECE
-    ]
+    long = np.array([run for run in runs(seen) if (run[1] - run[0]) * tuning.BIN >= tuning.LEAST_PIECE]).reshape(-1, 2)
+    ends = place + (low + tuning.BIN * long)[..., None] * direction
+    return [(piece, sigma) for piece in ends.reshape(-1, 4)]
 
 
 def _fit(group: SeenLines) -> tuple[Floats, Floats, float]:

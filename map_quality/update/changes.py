@@ -224,15 +224,8 @@ def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Cha
     poses = [evidence.places_of(rows, on=is_on) for rows, is_on in sides]
     if not are_enough(len(visits), min(poses)) or (draft.door and len(visits) < tuning.DOOR_VISITS):
         return None
-    doubt = tuning.DOUBT_VISIT ** len(visits) * tuning.DOUBT_POSE ** min(poses) + 0.1 * against / (
-        through + on + against
-    )
+    doubt = tuning.DOUBT_VISIT ** len(visits) * tuning.DOUBT_POSE ** min(poses)
+    doubt += 0.1 * against / (through + on + against)
+    confidence = float(np.clip(1.0 - doubt, 0.01, tuning.MOST_CONFIDENCE))
     told = Evidence(through, on, min(poses), len(visits), names[visits[0]], names[visits[-1]])
-    return Change(
-        draft.code,
-        draft.segments,
-        draft.new,
-        draft.sigma,
-        told,
-        float(np.clip(1.0 - doubt, 0.01, tuning.MOST_CONFIDENCE)),
-    )
+    return Change(draft.code, draft.segments, draft.new, draft.sigma, told, confidence)

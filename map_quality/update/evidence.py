@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from association import AssociationResult, Deadline
 from registration import Segments
 
+from ..views import Steps
 from . import tuning
 from .beams import NOTHING, Chunks, Followed, follow, hanging_lines
 from .result import Bools, Floats, Indices
@@ -189,7 +190,7 @@ class Gatherer:
     deadline: Deadline
     kept: dict[int, tuple[AssociationResult, Floats, Followed]] = field(default_factory=dict)
 
-    def gather(self, new: Segments, found: Sequence[Localized]) -> Generator[None, None, WallEvidence]:
+    def gather(self, new: Segments, found: Sequence[Localized]) -> Steps[WallEvidence]:
         """Follow the beams of localized scans, one scan at a step, and return the evidence.
 
         Parameters
@@ -207,9 +208,8 @@ class Gatherer:
             beyond = follow(at_new, one, lines, self.sigma, self.deadline, oriented=self.oriented)
             chunk += [seen.chunks, beyond.chunks + len(at_map)]
             counts += [seen.counts, beyond.counts]
-            of_scan.append(
-                np.tile([one.number, one.visit, places[one.place]], (len(seen.chunks) + len(beyond.chunks), 1))
-            )
+            numbers = one.number, one.visit, places[one.place]
+            of_scan.append(np.tile(numbers, (len(seen.chunks) + len(beyond.chunks), 1)))
             yield
         chunks = Chunks.of(Segments.derived(np.concatenate([self.known.endpoints, new.endpoints])))
         met = np.concatenate(chunk)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from association import CancelledError, Deadline, MapIndex
 from registration import RigidTransform
 
+from ..views import Steps
 from . import tuning
 from .scans import Localized, VisitScan, is_vouched, mahalanobis, search
 
@@ -46,7 +47,7 @@ class Carrying:
     until: float = math.inf
     _trail: list[tuple[int, VisitScan, Localized]] = field(default_factory=list)  # since the last anchor, as before
 
-    def carry(self) -> Generator[None, None, None]:
+    def carry(self) -> Steps[None]:
         """Carry poses forward and backward in each visit, one search at a step.
 
         1. Anchors are usable scans that another one of the visit confirms: the nearest before or after it agrees with
@@ -81,14 +82,15 @@ class Carrying:
             self.found[one] = replace(self.found[one], contradicted=True)
         return confirmed
 
-    def _along(self, rows: Sequence[int], anchors: set[int]) -> Generator[None, None, None]:
+    def _along(self, rows: Sequence[int], anchors: set[int]) -> Steps[None]:
         """Carry poses along some scans in this order, from anchor to anchor."""
         last: int | None = None
         self._trail.clear()
         for k in rows:
             if k in anchors:
                 if last is not None and self._distance(last, k) > tuning.AGREEING:
-                    self._undo()
+                    for at, sent, found in self._trail:
+                        self.scans[at], self.found[at] = sent, found
                 last = k
                 self._trail.clear()
             elif last is not None and self._is_wanted(k):
@@ -115,10 +117,6 @@ class Carrying:
             self._trail.append((k, self.scans[k], self.found[k]))
             self.scans[k], self.found[k] = sent, found
         return found
-
-    def _undo(self) -> None:
-        for k, sent, found in self._trail:
-            self.scans[k], self.found[k] = sent, found
 
     def _agree(self, a: int, b: int) -> bool:
         """Return whether the poses of two scans agree with odometry, which is precise enough to tell."""

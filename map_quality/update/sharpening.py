@@ -120,28 +120,16 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
         places = turned + np.array([one.pose.x, one.pose.y])
         lever = normals[:, 1] * turned[:, 0] - normals[:, 0] * turned[:, 1]
         along = np.einsum("ij,ij->i", places - middles[wall], known.directions[on])
-        zero, one_ = np.zeros(len(on)), np.ones(len(on))
+        scan, zero, one_ = np.full(len(on), number), np.zeros(len(on)), np.ones(len(on))
         offset = np.einsum("ij,ij->i", normals, places) - known.offsets[on]
         angle = -np.array([pair.angle for pair in one.result.correspondences])
         angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi  # a map without directions has either
-        parts += [
-            _Pairs(
-                np.full(len(on), number),
-                wall,
-                np.column_stack([normals, lever]),
-                np.column_stack([one_, along]),
-                offset,
-                pairs.variances + tuning.LINE_FLOOR**2,
-            ),
-            _Pairs(
-                np.full(len(on), number),
-                wall,
-                np.column_stack([zero, zero, one_]),
-                np.column_stack([zero, one_]),
-                angle,
-                pairs.variances / np.maximum(pairs.spreads, 1e-6) + tuning.ANGLE_FLOOR**2,
-            ),
-        ]
+        moved, turned_by = np.column_stack([normals, lever]), np.column_stack([zero, zero, one_])
+        aside, tilted = np.column_stack([one_, along]), np.column_stack([zero, one_])
+        noise = pairs.variances + tuning.LINE_FLOOR**2
+        angle_noise = pairs.variances / np.maximum(pairs.spreads, 1e-6) + tuning.ANGLE_FLOOR**2
+        parts.append(_Pairs(scan, wall, moved, aside, offset, noise))
+        parts.append(_Pairs(scan, wall, turned_by, tilted, angle, angle_noise))
     return _Pairs(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Pairs.__slots__))
 
 

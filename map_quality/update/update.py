@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Collection, Generator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from registration import InvalidArgumentError, Segments
 
-from ..views import finished
+from ..views import Steps, finished
 from . import tuning
 from .additions import candidates, unexplained
 from .beams import Chunks, sees
@@ -95,8 +95,8 @@ def updating(
     *,
     accept: float | None,
     refuse: Collection[int],
-) -> Generator[None, None, MapUpdate]:
-    """Do what `update` does, one search at a step, and return the same; between steps others may have their turn.
+) -> Steps[MapUpdate]:
+    """Do what `update` does, one search at a step, and return the same.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def updating(
         raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
     begun = _Update.of(index, scans, deadline or Deadline())
     first = yield from begun.localize()
-    chosen, refused = begun.choose_evidence(first)
+    chosen, refused = choose_evidence(begun.names, first, begun.sigma)
     proposed = Proposed()
     with contextlib.suppress(TimeOverError):
         proposed = yield from begun.propose(chosen, first)
@@ -132,10 +132,8 @@ class _Update:
     def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
         """Begin an update."""
         known = Segments.derived(index.segments.endpoints[: index.directed])
-        sigma, oriented = (
-            tuning.USUAL_SIGMA if index.sigma is None else index.sigma,
-            len(index.segments) == index.directed,
-        )
+        sigma = tuning.USUAL_SIGMA if index.sigma is None else index.sigma
+        oriented = len(index.segments) == index.directed
         names = list(dict.fromkeys(one.visit for one in scans))
         # The proposal must not depend on the order of the visits.
         return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, oriented, deadline))
@@ -150,7 +148,7 @@ class _Update:
         """Of its walls, metres."""
         return self.gatherer.sigma
 
-    def localize(self) -> Generator[None, None, list[Localized]]:
+    def localize(self) -> Steps[list[Localized]]:
         """Search all scans that there is time for: each alone, and those that are not usable by odometry."""
         held, found = held_back(one.visit for one in self.scans), []
         now = time.monotonic()
@@ -160,22 +158,14 @@ class _Update:
                 raise CancelledError
             if time.monotonic() > at:
                 break
-            result = search(self.index, one, self.deadline)
+            visit, result = self.names.index(one.visit), search(self.index, one, self.deadline)
             vouched = is_vouched(one, result)
-            found.append(
-                Localized(
-                    number, self.names.index(one.visit), one.scan, result, self.index.segments, held[number], vouched
-                )
-            )
+            found.append(Localized(number, visit, one.scan, result, self.index.segments, held[number], vouched))
             yield
         yield from Carrying(self.index, self.scans, found, self.deadline, at).carry()
         return found
 
-    def choose_evidence(self, found: Sequence[Localized]) -> tuple[list[Localized], list[RefusedVisit]]:
-        """Return the scans that give evidence, and the visits that give none."""
-        return choose_evidence(self.names, found, self.sigma)
-
-    def propose(self, chosen: Sequence[Localized], first: Sequence[Localized]) -> Generator[None, None, Proposed]:
+    def propose(self, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
         """Draft changes until they show no more scans, and verify them."""
         latest = first
         shown: list[tuple[str, tuple[int, ...], int]] = []
@@ -185,19 +175,17 @@ class _Update:
             if shown == before or number == tuning.ROUNDS - 1:
                 break
             latest = yield from self.search_others(trial, first, latest)
-            chosen, _ = self.choose_evidence(latest)
+            chosen, _ = choose_evidence(self.names, latest, self.sigma)
         return (yield from self.verify(drafts, evidence, first))
 
-    def draft(self, chosen: Sequence[Localized]) -> Generator[None, None, tuple[Drafts, Drafts, WallEvidence]]:
+    def draft(self, chosen: Sequence[Localized]) -> Steps[tuple[Drafts, Drafts, WallEvidence]]:
         """Return changes, those of a trial, and the evidence about all walls of the map and possible new ones."""
         known, deadline = self.known, self.deadline
         new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
         evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
         return *draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
 
-    def verify(
-        self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]
-    ) -> Generator[None, None, Proposed]:
+    def verify(self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]) -> Steps[Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
         found, changed = list(first), self._changed(drafts)
         for _ in range(tuning.DROPS):
@@ -223,7 +211,7 @@ class _Update:
         seen = np.array([[sees(one, scan, self.sigma, self.deadline) for scan in lost] for one in walls])
         return blamed(seen, most_lost(len(first)))
 
-    def sharpen(self, proposed: Proposed, first: Sequence[Localized]) -> Generator[None, None, Proposed]:
+    def sharpen(self, proposed: Proposed, first: Sequence[Localized]) -> Steps[Proposed]:
         """Estimate the walls from all scans, and search all scans on the sharper map.
 
         Returns
@@ -234,7 +222,7 @@ class _Update:
         if self.index.sigma is None or self.index.sigma < tuning.LEAST_BLUR:
             return proposed
         found = proposed.found or tuple(first)
-        chosen, _ = self.choose_evidence(found)
+        chosen, _ = choose_evidence(self.names, found, self.sigma)
         if not chosen:
             return proposed
         segments, kept = apply(self.known, proposed.changes)
@@ -261,7 +249,7 @@ class _Update:
 
     def search_others(
         self, drafts: Drafts, first: Sequence[Localized], latest: Sequence[Localized]
-    ) -> Generator[None, None, list[Localized]]:
+    ) -> Steps[list[Localized]]:
         """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
 
         Scans that were precise at first keep that pose, which depends on no change.
@@ -278,7 +266,7 @@ class _Update:
 
     def _search_all(
         self, index: MapIndex, before: Sequence[Localized], changed: Chunks | None
-    ) -> Generator[None, None, list[Localized]]:
+    ) -> Steps[list[Localized]]:
         """Search the scans again that see changed walls, and all that are held back; None: all walls have changed.
 
         The others keep their answer: at their poses, nothing has changed.
@@ -301,7 +289,7 @@ class _Update:
         segments, _ = apply(self.known, [change for _, change in drafts])
         return self._indexed(segments) if len(segments) else None
 
-    def _search(self, index: MapIndex, one: Localized) -> Generator[None, None, Localized]:
+    def _search(self, index: MapIndex, one: Localized) -> Steps[Localized]:
         """Search one scan in another map, unless that is the map of its last search."""
         go_on(self.deadline)
         before = self.latest.get(one.number)

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from registration.layout import Floats
+
 from ...options import ImportOptions
 from ..drawing import Drawing
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 MOST_LINES = 3000  # that are compared with each other; larger drawings are taken for faces

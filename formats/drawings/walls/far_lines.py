@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from registration.layout import Floats
 from registration.limits import MAX_LENGTH
 
 from ...errors import MalformedFileError
@@ -13,7 +14,6 @@ from ...limits import MAX_EXTENT, MAX_NAMED
 from ...report import listed
 from ..drawing import Drawing
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 

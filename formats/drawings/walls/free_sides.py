@@ -11,9 +11,9 @@ import scipy
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from ...errors import InvalidOptionError
+from registration.layout import Floats
 
-Floats = NDArray[np.float64]
+from ...errors import InvalidOptionError
 
 FINEST = 0.02  # m; cells of the picture that is filled
 PIXELS = 16_000_000  # of it at most

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration import Segments
+from registration.layout import Floats
 
 from .centre_lines import AT_ONCE, MEETS, in_frame, parallel_to
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MOST_JOINED = 3000  # walls whose joints are worked out; of more only the faces are drawn
 INSIDE = 1e-6  # m; what lies no deeper in another wall stays

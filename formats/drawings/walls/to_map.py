@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration import InputError, Segments
+from registration.layout import Floats
 
 from ...errors import IncompleteFileError, MalformedFileError
 from ...line_map import LineMap
@@ -18,8 +18,6 @@ from .far_lines import near_lines
 from .free_sides import Sides, sides_seen
 from .levels import on_level, undirected
 from .outline import outline
-
-Floats = NDArray[np.float64]
 
 LEAST_LENGTH = 0.01  # m; shorter lines are left out
 SAME = 1e-3  # m; lines whose ends are nearer to one another are one
