@@ -11,7 +11,7 @@ from .drawings.csv_table import read_csv
 from .drawings.drawing import Drawing
 from .drawings.geojson import read_geojson
 from .drawings.own_json import read_json
-from .drawings.svg import read_svg
+from .drawings.svg.reading import read_svg
 from .drawings.walls.to_map import to_map
 from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError, naming
 from .files import ending_of, name_of

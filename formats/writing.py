@@ -17,7 +17,8 @@ from registration import RigidTransform
 
 from .drawings.csv_table import COLUMNS
 from .drawings.geojson import OWN
-from .drawings.svg import METRES, NAMESPACE, ORIENTED
+from .drawings.svg.reading import METRES, ORIENTED
+from .drawings.svg.xml import NAMESPACE
 from .errors import UnsupportedFormatError
 from .files import ending_of, name_of
 from .line_map import LineMap

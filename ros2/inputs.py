@@ -179,7 +179,7 @@ class Inputs:
                 f"scans are usable, but have not agreed for {SILENT_SECONDS:g} s; drive 0.5 m or rotate by 30 degrees. "
                 "If the robot has driven, scans contradict odometry: check odometry and the mount of the laser",
             )
-        if topics.initial.incompatible:
+        if topics.initial.readers.incompatible:
             yield (
                 "",
                 f"a subscriber of {topics.initial.name} requests an incompatible QoS; expected reliable or best "

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formats.logs import transforms
 from formats.logs.sensors import tilt_of
 from formats.logs.tuning import MOST_TILT
 from registration import RigidTransform
-from registration.layout import Floats
 
 from .messages import TransformStamped
 from .options import MAX_NAME, quoted
 from .tuning import MAX_MOUNT
+
+Floats = NDArray[np.float64]
 
 
 class FrameError(ValueError):

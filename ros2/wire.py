@@ -104,13 +104,13 @@ class Subscription(Generic[Message]):
 
 
 class Publisher(Generic[Message]):
-    """A publisher."""
+    """A publisher; `readers` are the subscribers of others."""
 
     def __init__(self, participant: DomainParticipant, name: str, kind: type[Message], quality: Qos) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name = name
         self._writer: Any = DataWriter(participant, topic, qos=quality)
-        self._readers = Endpoints(participant, topic_name(name), [quality], writers=False)
+        self.readers = Endpoints(participant, topic_name(name), [quality], writers=False)
         self._known: frozenset[Any] = frozenset()
 
     def publish(self, message: Message) -> None:
@@ -122,18 +122,13 @@ class Publisher(Generic[Message]):
         return bool(self._writer.wait_for_acks(duration(seconds=seconds)))
 
     @property
-    def incompatible(self) -> bool:
-        """Return whether there are subscribers whose quality of service does not fit."""
-        return self._readers.incompatible
-
-    @property
     def subscribed(self) -> bool:
         """Return whether there was a subscriber at the last call of `joined`."""
         return bool(self._known)
 
     def joined(self) -> bool:
         """Return whether there is a new subscriber since the last call."""
-        known, self._known = self._known, self._readers.connected
+        known, self._known = self._known, self.readers.connected
         return bool(self._known - known)
 
 

@@ -8,8 +8,3 @@
     shapes    shapes and paths to polylines; lengths with units
     reading   the four of them, one after the other
 """
-
-from .reading import METRES, ORIENTED, read_svg
-from .xml import NAMESPACE
-
-__all__ = ["METRES", "NAMESPACE", "ORIENTED", "read_svg"]
