@@ -187,7 +187,7 @@ def test_copies(tmp_path: Path, use: str, expected: list[list[float]]) -> None:
 
 
 def test_copies_of_copies_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("formats.drawings.svg.visible.MAX_ENTITIES", 5_000)
+    monkeypatch.setattr("formats.drawings.svg.xml.MAX_ENTITIES", 5_000)
     levels = "".join(f"<g id='g{k}'>" + f"<use href='#g{k + 1}'/>" * 10 + "</g>" for k in range(8))
     with pytest.raises(TooLargeError, match="copies by use included"):
         read(tmp_path, f"<defs>{levels}<g id='g8'>{ONE}</g></defs><use href='#g0'/>")

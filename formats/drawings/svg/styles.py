@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -21,7 +22,6 @@ PROPERTIES = frozenset((
 ))  # fmt: skip
 OF_CSS_ALONE = frozenset({"translate", "rotate", "scale"})  # attributes of these names are something else
 SCREEN = re.compile(r"(only )?(screen|all)?")  # the media whose rules hold
-CACHED = 10_000  # texts of style attributes, which repeat
 
 Declared = tuple[tuple[str, str, bool], ...]
 """Properties with their values, and whether these are important."""
@@ -32,7 +32,6 @@ class Styles:
 
     def __init__(self, root: Element) -> None:
         self._matched: dict[Element, list[Declared]] = {}
-        self._inline: dict[str, Declared] = {}
         sheets = [element.text for element in root.iter() if kind_of(element) == "style" and element.text]
         matcher, count = cssselect2.Matcher(), 0
         for sheet in sheets:
@@ -52,21 +51,11 @@ class Styles:
     def of(self, element: Element) -> Mapping[str, str]:
         """Return the values of the properties that are set on an element itself, in lower case."""
         values = {key: element.get(key, "").strip() for key in PROPERTIES & element.attrib.keys()}
-        layers = [*self._matched.get(element, ()), self._declared_inline(element.get("style", ""))]
+        layers = [*self._matched.get(element, ()), _declared_inline(element.get("style", ""))]
         for important in (False, True):
             for declared in layers:
                 values |= {key: value for key, value, weight in declared if weight is important}
         return {key: value for key, value in values.items() if value.lower() != "inherit"}
-
-    def _declared_inline(self, text: str) -> Declared:
-        if not text:
-            return ()
-        found = self._inline.get(text)
-        if found is None:
-            found = _declared(tinycss2.parse_blocks_contents(text, skip_comments=True, skip_whitespace=True))
-            if len(self._inline) < CACHED:
-                self._inline[text] = found
-        return found
 
 
 def _rules(sheet: str) -> Iterable[tuple[Any, Declared]]:
@@ -86,6 +75,11 @@ def _rules(sheet: str) -> Iterable[tuple[Any, Declared]]:
         except cssselect2.SelectorError:
             continue
         yield from ((selector, declared) for selector in selectors)
+
+
+@lru_cache(10_000)  # style attributes repeat
+def _declared_inline(text: str) -> Declared:
+    return _declared(tinycss2.parse_blocks_contents(text, skip_comments=True, skip_whitespace=True))
 
 
 def _declared(nodes: Iterable[Any]) -> Declared:

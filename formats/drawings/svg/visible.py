@@ -11,13 +11,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import svgelements
 
-from ...errors import TooLargeError
-from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES, MAX_UNITS
+from ...limits import MAX_UNITS
 from ..drawing import Drawing
 from .shapes import SHAPES, Measure, Viewport
 from .styles import Styles
 from .transforms import matrix_of
-from .xml import kind_of
+from .xml import Bounds, kind_of
 
 INKSCAPE_LABEL = "http://www.inkscape.org/namespaces/inkscape}label"
 LINK = "http://www.w3.org/1999/xlink}href"
@@ -83,7 +82,7 @@ class Visible:
         self._by_id: dict[str, Element] = {}
         for element in root.iter():
             self._by_id.setdefault(element.get("id", ""), element)
-        self._count = self._path_bytes = 0
+        self._bounds = Bounds()
         self._whole = Viewport()
 
     def shapes(self) -> Iterator[tuple[Element, Place]]:
@@ -106,7 +105,7 @@ class Visible:
         kind = kind_of(element)
         if kind in NOT_DRAWN or kind.startswith("{"):
             return
-        self._bound(element, depth)
+        self._bounds.take(element.attrib, depth)
         style = self._styles.of(element)
         if not self._displayed(element, style):
             return
@@ -126,20 +125,6 @@ class Visible:
             self._drawing.drop(kind)
         elif self._painted(element, kind, place):
             yield element, place
-
-    def _bound(self, element: Element, depth: int) -> None:
-        self._count += 1
-        self._path_bytes += len(element.get("d", "")) + len(element.get("points", ""))
-        if self._count > MAX_ENTITIES or depth > MAX_DEPTH:
-            raise TooLargeError(
-                f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another, found "
-                f"{self._count}, {depth} in one another, or more"
-            )
-        if self._path_bytes > MAX_PATH_BYTES:
-            raise TooLargeError(
-                f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included, found "
-                f"{self._path_bytes} or more; simplify the paths"
-            )
 
     def _displayed(self, element: Element, style: Mapping[str, str]) -> bool:
         """Tell whether an element is displayed; count the shapes in it where it is not."""
@@ -248,7 +233,7 @@ class Visible:
         if kind_of(target) not in ("symbol", "svg"):
             yield from self._drawn(target, place, depth + 1)
             return
-        self._bound(target, depth)
+        self._bounds.take(target.attrib, depth)
         style = self._styles.of(target)
         if self._displayed(target, style):
             yield from self._nested(target, element, self._inherited(target, place, style), depth)

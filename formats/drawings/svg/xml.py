@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from xml.parsers import expat
@@ -20,31 +22,45 @@ class Node(Element):
     line: int = 0
 
 
+@dataclass(slots=True)
+class Bounds:
+    """Counts elements and the characters of their paths, and refuses too many."""
+
+    count: int = 0
+    path_bytes: int = 0
+
+    def take(self, attributes: Mapping[str, str], depth: int) -> None:
+        """Take an element, which is in so many others less one."""
+        self.count += 1
+        self.path_bytes += len(attributes.get("d", "")) + len(attributes.get("points", ""))
+        if self.count > MAX_ENTITIES or depth > MAX_DEPTH:
+            raise TooLargeError(
+                f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another, found "
+                f"{self.count}, {depth} in one another, or more"
+            )
+        if self.path_bytes > MAX_PATH_BYTES:
+            raise TooLargeError(
+                f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included, found "
+                f"{self.path_bytes} or more; simplify the paths"
+            )
+
+
 class _Builder:
     """Builds the tree of elements, with the text of style elements alone."""
 
     def __init__(self) -> None:
         self.tree = TreeBuilder(element_factory=Node)
         self.parser = expat.ParserCreate(namespace_separator="}")
-        self.depth = self.count = self.path_bytes = self.style_bytes = 0
+        self.bounds = Bounds()
+        self.depth = self.style_bytes = 0
         self.in_style = False
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
         self.parser.EntityDeclHandler = self.parser.AttlistDeclHandler = self.refuse
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        self.depth, self.count = self.depth + 1, self.count + 1
-        self.path_bytes += len(attributes.get("d", "")) + len(attributes.get("points", ""))
-        if self.path_bytes > MAX_PATH_BYTES:
-            raise TooLargeError(
-                f"expected at most {MAX_PATH_BYTES} characters of paths, found {self.path_bytes} or more; simplify the "
-                "paths"
-            )
-        if self.depth > MAX_DEPTH or self.count > MAX_ENTITIES:
-            raise TooLargeError(
-                f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another, found {self.count}, "
-                f"{self.depth} in one another, or more"
-            )
+        self.depth += 1
+        self.bounds.take(attributes, self.depth)
         node = self.tree.start("{" + tag if "}" in tag else tag, attributes)
         assert isinstance(node, Node)
         node.line = self.parser.CurrentLineNumber
