@@ -90,8 +90,7 @@ def read_map(
             return _read_bag(file, options, notes)
         if suffix in DRAWINGS:
             drawing = DRAWINGS[suffix](file, options, notes)
-            line_map = to_map(drawing, options)
-            return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
+            return ImportedMap(to_map(drawing), notes.report(drawing.format, (drawing.name,)))
         raise _unsupported(file, "a file", MAP_SUFFIXES)
 
 

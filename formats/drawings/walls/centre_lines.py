@@ -36,7 +36,7 @@ class Walls:
     told: str
 
 
-def are_centres(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> bool:
+def are_centres(endpoints: Floats, drawing: Drawing) -> bool:
     """Tell whether lines run in the middle of walls: as the caller says, or as they lie.
 
     Parameters
@@ -45,8 +45,8 @@ def are_centres(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> 
         Metres.
     drawing : Drawing
         Its notes take what was assumed.
-    options : ImportOptions
     """
+    options = drawing.options
     if options.drawn is not None:
         return options.drawn == "centres"
     told = options.directions is not None or bool(options.point) or drawing.oriented or drawing.format == "json"

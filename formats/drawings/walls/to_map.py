@@ -11,7 +11,7 @@ from registration.layout import Floats
 
 from ...errors import IncompleteFileError, MalformedFileError
 from ...line_map import LineMap
-from ...options import UNITS, ImportOptions
+from ...options import UNITS
 from ..drawing import Drawing
 from .centre_lines import are_centres, walls_of
 from .far_lines import near_lines
@@ -28,14 +28,13 @@ LEAST_USUAL, USUAL, GREATEST_USUAL = 0.6, 3.0, 20.0
 OFTEN_MISTAKEN = ("mm", "cm", "m", "in", "ft")  # for one another
 
 
-def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
+def to_map(drawing: Drawing) -> LineMap:
     """Make a map of a drawing.
 
     Parameters
     ----------
     drawing : Drawing
         Its notes take what was done.
-    options : ImportOptions
 
     Raises
     ------
@@ -46,6 +45,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     InvalidOptionError
         When a free place lies on a wall or outside.
     """
+    options = drawing.options
     metres = options.metres or drawing.metres
     drawing.leave_out_others()
     if metres is None:
@@ -66,12 +66,12 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
         endpoints, widths = endpoints[near], widths[near]
         if drawing.format in ("dxf", "svg"):
-            _note_unit(endpoints, metres, drawing, options)
+            _note_unit(endpoints, metres, drawing)
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
-    if are_centres(endpoints, drawing, options):
-        endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True
+    if are_centres(endpoints, drawing):
+        endpoints, oriented = _with_faces(endpoints, widths, drawing), True
     elif options.point:
-        endpoints, oriented = _directed(endpoints, drawing, options), True
+        endpoints, oriented = _directed(endpoints, drawing), True
     if not oriented:
         drawing.notes.add_assumed(
             "directions",
@@ -104,18 +104,18 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
     return endpoints[first], widths[first]
 
 
-def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
+def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing) -> Floats:
     """Return both faces of walls drawn by their centre line, free space on the left."""
-    walls = walls_of(widths, options)
+    walls = walls_of(widths, drawing.options)
     drawing.notes.add_assumed(walls.code, walls.told)
     drawing.notes.add_merged("faces", "centre lines made into two faces", len(endpoints))
     drawing.meta |= {"thickness": f"{float(np.median(walls.thickness)):.3g}"}
     return outline(_segments(endpoints, drawing).endpoints, walls.thickness)
 
 
-def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
+def _directed(endpoints: Floats, drawing: Drawing) -> Floats:
     """Return lines with free space on the left; in both directions if it is on both sides or unknown."""
-    seen = sides_seen(endpoints, options.point)
+    seen = sides_seen(endpoints, drawing.options.point)
     backward = endpoints[:, [2, 3, 0, 1]]
     counts = {side: int((seen == side).sum()) for side in Sides}
     drawing.notes.add_assumed(
@@ -140,7 +140,7 @@ def _segments(endpoints: Floats, drawing: Drawing) -> Segments:
         raise MalformedFileError(f"a line {error.message}; check the unit") from error
 
 
-def _note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: ImportOptions) -> None:
+def _note_unit(endpoints: Floats, metres: float, drawing: Drawing) -> None:
     """Note the unit and the size of a drawing, and units that are likelier where lines are unusually long or short.
 
     Parameters
@@ -151,11 +151,10 @@ def _note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: Impo
         Per unit.
     drawing : Drawing
         Its notes take it.
-    options : ImportOptions
     """
     corners = endpoints.reshape(-1, 2)
     width, height = corners.max(axis=0) - corners.min(axis=0)
-    who = "the option states" if options.metres is not None else "the file states"
+    who = "the option states" if drawing.options.metres is not None else "the file states"
     unit = _named(metres)
     drawing.notes.add_read("unit", f"1 unit is {unit}, as {who}: the drawing is {width:.4g} m by {height:.4g} m")
     lengths = np.sort(np.hypot(*(endpoints[:, 2:] - endpoints[:, :2]).T))
