@@ -319,7 +319,9 @@ class AssociationResult:
     def message(self) -> str:
         """The verdict in one or two sentences, for people."""
         if self.status is Status.NO_MATCH or self.pose is None or self.diagnostics is None:
-            return f"No pose on {'these maps' if self.maps else 'this map'} explains the scan."
+            larger = any(one.code == "scan_exceeds_map" for one in self.warnings)
+            unit = " It is larger than the map: its unit may be wrong, see `warnings`." if larger else ""
+            return f"No pose on {'these maps' if self.maps else 'this map'} explains the scan.{unit}"
         least = self.diagnostics.score - AS_WELL
         others = [other for other in self.alternatives if other.score >= least]
         if self.status is Status.DEGENERATE:

@@ -94,3 +94,4 @@ FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on ei
 LEAST_STUCK = 10
 STUCK_SHARE = 0.5  # measured
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
+FARTHEST = 300.0  # m, geometry; across what lasers see indoors

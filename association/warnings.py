@@ -18,6 +18,7 @@ from .tuning import (
     DOUBTING_DEVIATIONS,
     EXCEEDING,
     FACING,
+    FARTHEST,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LEAST_STUCK,
@@ -156,10 +157,10 @@ def _exceeding(context: SearchContext) -> str | None:
     reach = inner_extent(segments)
     if reach <= EXCEEDING * room:
         return None
-    return (
-        f"The scan is {reach:.3g} m wide, but the map's diagonal is only {room:.3g} m. Check that both are in metres, "
-        "and that the map contains this place."
-    )
+    wide = f"The scan is {reach:.1f} m wide, but the map's diagonal is only {room:.1f} m."
+    if reach > FARTHEST:
+        return f"{wide} No laser sees so far: the scan seems to be in millimetres or centimetres. Send it in metres."
+    return f"{wide} Check that the scan is in metres, that the map is, and that it contains this place."
 
 
 def _facing_away(context: SearchContext) -> str | None:

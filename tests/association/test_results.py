@@ -271,7 +271,12 @@ def test_the_value_of_stuck_ranges_is_named_and_a_few_prove_nothing() -> None:
 @pytest.mark.parametrize(("factor", "warned"), [(1.0, False), (1.08, False), (1.2, True), (3.28, True), (1e3, True)])
 def test_a_scan_larger_than_the_map_has_a_warning(factor: float, warned: bool) -> None:
     """All of a room is seen, corner to corner."""
-    assert ("scan_exceeds_map" in codes(scan_of(factor * seen(ROOM, INSIDE)[0]))) == warned
+    answer = answer_of(ROOM_INDEX, scan_of(factor * seen(ROOM, INSIDE)[0]))
+    messages = [one.message for one in answer.warnings if one.code == "scan_exceeds_map"]
+    assert bool(messages) == warned
+    if factor == 1e3:
+        assert "the scan seems to be in millimetres" in messages[0]
+        assert "its unit may be wrong" in answer.message
 
 
 def test_a_segment_seen_through_a_window_does_not_make_a_scan_large() -> None:
