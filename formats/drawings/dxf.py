@@ -73,7 +73,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         if not options.layers and not options.where:
             drawing.walls = walls_among(expansion.layers(document.modelspace()), notes)
         for placed in expansion.visible(document.modelspace()):
-            if not drawing.takes(placed.layers, _properties(placed, document)):
+            if not drawing.takes(placed.layers, _properties(placed)):
                 continue
             before = len(drawing.polylines)
             _add(placed, drawing, SAGITTA / metres)
@@ -129,17 +129,14 @@ def _width(entity: DXFEntity) -> float:
     return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
 
 
-def _properties(placed: Placed, document: Document) -> dict[str, str]:
+def _properties(placed: Placed) -> dict[str, str]:
     """Return what the option where may name."""
-    dxf, layer, linetype = placed.entity.dxf, placed.layers[-1], str(placed.entity.dxf.get("linetype", "BYLAYER"))
-    if linetype.upper() == "BYLAYER" and layer in document.layers:
-        linetype = str(document.layers.get(layer).dxf.get("linetype", linetype))
     return {
-        "layer": layer,
+        "layer": placed.layers[-1],
         "block": "/".join(placed.blocks),
         "entity": placed.entity.dxftype(),
-        "color": str(dxf.get("color", 256)),
-        "linetype": linetype,
+        "color": str(placed.entity.dxf.get("color", 256)),
+        "linetype": placed.linetype,
     }
 
 

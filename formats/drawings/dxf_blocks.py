@@ -9,7 +9,7 @@ a part of its lines.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -51,12 +51,16 @@ Clips = tuple[Clip, ...]
 
 
 class Placed(NamedTuple):
-    """An entity with its layers, those of the references that it is in first, what these clip, and their blocks."""
+    """An entity with its layers, those of the references that it is in first, what these clip, their blocks, its line.
+
+    Without a reference, BYBLOCK is a continuous line.
+    """
 
     entity: Any
     layers: tuple[str, ...]
     clips: Clips = ()
     blocks: tuple[str, ...] = ()
+    linetype: str = "Continuous"
 
 
 @dataclass(slots=True)
@@ -67,12 +71,15 @@ class Expansion:
     ----------
     frozen, off : set of str
         Layers by name, casefolded.
+    linetypes : mapping of str to str
+        Of the layers.
     drawing : Drawing
         Whose notes take what was done.
     """
 
     frozen: set[str]
     off: set[str]
+    linetypes: Mapping[str, str]
     drawing: Drawing
     _hidden: Counter[str] = field(default_factory=Counter)
     _external: Counter[str] = field(default_factory=Counter)
@@ -84,7 +91,9 @@ class Expansion:
         """Take the states of a document's layers."""
         layers = list(document.layers)
         frozen = {layer.dxf.name.casefold() for layer in layers if layer.is_frozen()}
-        return cls(frozen, {layer.dxf.name.casefold() for layer in layers if layer.is_off()}, drawing)
+        off = {layer.dxf.name.casefold() for layer in layers if layer.is_off()}
+        linetypes = {layer.dxf.name.casefold(): str(layer.dxf.get("linetype", "Continuous")) for layer in layers}
+        return cls(frozen, off, linetypes, drawing)
 
     def visible(self, entities: Iterable[Any]) -> Iterator[Placed]:
         """Yield the visible entities with their layers; notes are complete when it ends.
@@ -126,7 +135,7 @@ class Expansion:
             self._count += 1
             if self._count > MAX_ENTITIES:
                 raise TooLargeError(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
-            placed = outer._replace(entity=entity, layers=_layers_of(entity, outer.layers))
+            placed = self._placed(entity, _layers_of(entity, outer.layers), outer)
             if entity.dxf.get("invisible", 0):
                 self.drawing.notes.add_dropped("invisible", "entities and blocks with the attribute invisible", 1)
             elif self.hides(placed.layers[-1], reference=isinstance(entity, Insert)):
@@ -136,9 +145,17 @@ class Expansion:
             elif isinstance(entity, MLine):
                 self.drawing.notes.add_read("entity_mline", "MLINE entities", 1)
                 lines = (part for part in entity.virtual_entities() if part.dxftype() != "HATCH")
-                yield from (placed._replace(entity=part) for part in lines)
+                yield from (self._placed(part, placed.layers, outer) for part in lines)
             else:
                 yield placed
+
+    def _placed(self, entity: DXFEntity, layers: tuple[str, ...], outer: Placed) -> Placed:
+        linetype = str(entity.dxf.get("linetype", "BYLAYER"))
+        if linetype.upper() == "BYLAYER":
+            linetype = self.linetypes.get(layers[-1].casefold(), linetype)
+        elif linetype.upper() == "BYBLOCK":
+            linetype = outer.linetype
+        return outer._replace(entity=entity, layers=layers, linetype=linetype)
 
     def _expanded(self, reference: Insert, placed: Placed, depth: int) -> Iterator[Placed]:
         if depth >= MAX_BLOCK_DEPTH:

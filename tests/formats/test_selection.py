@@ -244,6 +244,23 @@ def dashed(tmp_path: Path, kind: str) -> Path:
     return tmp_path / "plan.dxf"
 
 
+def test_lines_of_a_block_are_dashed_as_its_reference(tmp_path: Path) -> None:
+    document = new(setup=True)
+    document.linetypes.add("HIDDEN", [0.3, 0.2, -0.1])
+    document.layers.add("BEAMS", linetype="DASHED")
+    inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
+    inner.add_line((0.0, 0.0), (5.0, 0.0), dxfattribs={"linetype": "ByBlock"})
+    inner.add_line((0.0, 1.0), (5.0, 1.0))  # as the layer of the reference
+    inner.add_line((0.0, 2.0), (5.0, 2.0), dxfattribs={"linetype": "CONTINUOUS"})
+    outer.add_blockref("INNER", (0.0, 0.0), {"linetype": "BYBLOCK"})
+    for k, attributes in enumerate(({}, {"linetype": "HIDDEN"}, {"layer": "BEAMS"}, {"linetype": "BYBLOCK"})):
+        document.modelspace().add_blockref("OUTER", (0.0, 10.0 * k), attributes)
+    document.saveas(tmp_path / "plan.dxf")
+    found = read_map(tmp_path / "plan.dxf", ImportOptions(units="m", drawn="faces"))
+    seen = sorted({round(float(y)) for y in found.map.segments.endpoints[:, 1]})
+    assert seen == [0, 1, 2, 11, 12, 22, 30, 31, 32]
+
+
 @pytest.mark.parametrize(
     ("kind", "key", "told"),
     [("dxf", "linetype", ("linetype=DASHED2", "linetype=HIDDEN")), ("svg", "stroke-dasharray", ("=4 2", "=3"))],
