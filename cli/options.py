@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperArgument, TyperCommand
@@ -83,7 +83,7 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
     flat: list[Parameter] = []
     for one in parameters:
         group = groups.get(one.name)
-        flat += [one] if group is None else inspect.signature(group, eval_str=True).parameters.values()
+        flat += [one] if group is None else _options_of(group)
 
     @wraps(command)
     def called(**values: Any) -> None:
@@ -93,6 +93,12 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
     called.__signature__ = Signature([one.replace(kind=Parameter.KEYWORD_ONLY) for one in flat])  # type: ignore[attr-defined]
     return called
+
+
+def _options_of(group: type) -> list[Parameter]:
+    """Return a parameter for each field, also for those that a dataclass inherits."""
+    hints = get_type_hints(group, include_extras=True)
+    return [one.replace(annotation=hints[one.name]) for one in inspect.signature(group).parameters.values()]
 
 
 class PlainCommand(TyperCommand):

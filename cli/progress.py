@@ -41,7 +41,7 @@ def compile_first() -> None:
         return
     from linefix.compiling import start_compiler
 
-    message = "linefix: compiling the kernels, which takes up to a minute; later runs load them from the cache"
+    message = "linefix: compiling the kernels, about a minute on two idle cores; later runs load them from the cache"
     print(message, file=sys.stderr)
     reported = time.monotonic()
     # If it ends early or can keep nothing this process compiles what it needs.

@@ -18,6 +18,7 @@ STDIN = "-"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 MAX_VALUES = 1_000_000_000  # of a file; what a request may hold is the service's business
+LOGS = (".bag", ".mcap", ".db3", ".clf", ".log")
 FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
 LOST = re.compile(r"A message was lost!!!.*?---\s*\n", re.DOTALL)  # of `ros2 topic echo`
@@ -94,10 +95,14 @@ def read_scan(name: str) -> Json:
     Raises
     ------
     WrongUseError
-        When there is no such file, or it cannot be read.
+        When there is no such file, it cannot be read, or it is a log.
     RefusedError
         When the content is neither JSON nor YAML, or no scan.
     """
+    if Path(name).suffix.lower() in LOGS or Path(name).is_dir():
+        raise WrongUseError(
+            f"{name}: is a log or a folder, expected one scan; linefix replay LOG --map MAP localizes scans of a log"
+        )
     data = bytes_of(name)
     message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):

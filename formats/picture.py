@@ -32,6 +32,7 @@ STRIP = 60  # pixels; below the map, for the scale and the legend
 LETTERS = 22  # pixels; height of the text
 LEAST_BAR = 120  # pixels; of the scale
 PAPER = (255, 255, 255)
+Box = tuple[float, float, float, float]  # left, top, right, bottom, pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,13 +115,15 @@ def draw_map(
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
         sheet.draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
         sheet.draw.line([(x, y), tip], fill=colour, width=1)
+    written: list[Box] = []
     for text in texts:
-        _write(sheet, text)
-    entries = [("wall", rgb(WALL))] + [("free side", rgb(MATCHED))] * map.oriented
-    entries += [("usable pose", rgb(USABLE))] * bool(poses) + [("pose that is not usable", rgb(POINT))] * bool(doubtful)
+        written.append(_write(sheet, text, written))
+    entries = [("wall", rgb(WALL), False)] + [("free side", rgb(MATCHED), False)] * map.oriented
+    entries += [("usable pose", rgb(USABLE), False)] * bool(poses)
+    entries += [("pose that is not usable", rgb(POINT), False)] * bool(doubtful)
     painted = {mark.colour for mark in marks}
-    entries += [(name.replace("_", " "), rgb(one)) for name, one in VERDICTS.items() if rgb(one) in painted]
-    entries += [(one.name, one.colour) for one in lines if len(one.ends)]
+    entries += [(name.replace("_", " "), rgb(one), False) for name, one in VERDICTS.items() if rgb(one) in painted]
+    entries += [(one.name, one.colour, one.dashed) for one in lines if len(one.ends)]
     _annotate(sheet.draw, sheet.height, sheet.scale, entries)
     sheet.picture.save(path, format="PNG")
 
@@ -176,27 +179,38 @@ def _draw_line(
         draw.line(ends, fill=how.colour, width=5)
 
 
-def _write(sheet: _Sheet, told: DrawnText) -> None:
-    """Write a text on paper of its own."""
-    font, at = ImageFont.load_default(LETTERS), sheet.place(told.x, told.y)
-    left, top, right, bottom = sheet.draw.textbbox(at, told.text, font=font, anchor="mm")
-    sheet.draw.rectangle([left - 3, top - 3, right + 3, bottom + 3], fill=PAPER, outline=told.colour)
-    sheet.draw.text(at, told.text, fill=told.colour, font=font, anchor="mm")
+def _write(sheet: _Sheet, told: DrawnText, written: Iterable[Box]) -> Box:
+    """Write a text on paper of its own, below those that are written there; return the paper."""
+    font, (x, y) = ImageFont.load_default(LETTERS), sheet.place(told.x, told.y)
+    left, top, right, bottom = sheet.draw.textbbox((x, y), told.text, font=font, anchor="mm")
+    paper = (left - 3, top - 3, right + 3, bottom + 3)
+    for other in sorted(written, key=lambda one: one[1]):
+        if paper[0] <= other[2] and other[0] <= paper[2] and paper[1] <= other[3] and other[1] <= paper[3]:
+            down = other[3] + 1 - paper[1]
+            y, paper = y + down, (paper[0], paper[1] + down, paper[2], paper[3] + down)
+    sheet.draw.rectangle(paper, fill=PAPER, outline=told.colour)
+    sheet.draw.text((x, y), told.text, fill=told.colour, font=font, anchor="mm")
+    return paper
 
 
 def _annotate(
-    draw: ImageDraw.ImageDraw, top: float, scale: float, entries: Iterable[tuple[str, tuple[int, int, int]]]
+    draw: ImageDraw.ImageDraw, top: float, scale: float, entries: Iterable[tuple[str, tuple[int, int, int], bool]]
 ) -> None:
-    """Draw the scale and a legend of names and colours; `top` of the strip in pixels, `scale` in pixels per metre."""
+    """Draw the scale, and a legend of names, colours, and whether lines are dashed.
+
+    `top` of the strip in pixels, `scale` in pixels per metre.
+    """
     font = ImageFont.load_default(LETTERS)
     metres = 10.0 ** math.floor(math.log10(LEAST_BAR / scale))
     metres *= next(one for one in (1, 2, 5, 10) if one * metres * scale >= LEAST_BAR)
     x, y = float(MARGIN), top + 0.5 * STRIP
     draw.line([(x, y - 6), (x, y), (x + metres * scale, y), (x + metres * scale, y - 6)], fill=rgb(INK), width=3)
     x += metres * scale + 12
-    for text, colour in [(f"{metres:g} m", None), *entries]:
+    for text, colour, dashed in [(f"{metres:g} m", None, False), *entries]:
         if colour is not None:
             draw.rectangle([x, y - 6, x + 26, y + 6], fill=colour)
+            if dashed:
+                draw.rectangle([x + 10, y - 6, x + 16, y + 6], fill=PAPER)
             x += 34
         draw.text((x, y), text, fill=rgb(INK), font=font, anchor="lm")
         x += draw.textlength(text, font=font) + 28

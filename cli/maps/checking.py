@@ -16,6 +16,9 @@ from ..scans import read_scan
 if TYPE_CHECKING:
     from formats import LoggedScan
 
+SHOWN = 3  # places of a finding
+BETTER = {"mirrored", "reversed", "undirected", "centre_lines", "scale"}  # findings by scans
+AS_IT_IS = "; no better mirrored, reversed, undirected or at another scale"
 SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
 
@@ -33,8 +36,9 @@ def check(
     sent = [one for _, one in scans.values()]
     sent += [] if log is None else [of_sensor(one) for one in some_scans(log, SAMPLES, source)]
     names = {place: name for place, (name, _) in scans.items()} | {"": on, "/map": on, "/scans": str(log)}
-    answer = where.ask("check_map", read_map_or_id(on), {"scans": sent} if sent else None, names=names)
-    output.print(answer, rows(check_rows(answer)))
+    target = read_map_or_id(on)
+    answer = where.ask("check_map", target, {"scans": sent} if sent else None, names=names)
+    output.print(answer, rows(check_rows(answer, where.whole_map(target))))
 
 
 def of_sensor(one: LoggedScan) -> Json:
@@ -44,20 +48,25 @@ def of_sensor(one: LoggedScan) -> Json:
     return scan_json(replace(one, mount=None))
 
 
-def check_rows(found: Json) -> Iterator[tuple[str, str]]:
-    """Yield the findings of a map as text for people."""
+def check_rows(found: Json, document: Json) -> Iterator[tuple[str, str]]:
+    """Yield the findings of a map, whose document is given, as text for people."""
     size, samples = found["size"], found.get("samples")
     yield "size", f"{size['walls']} walls, {size['length']:.1f} m, {size['diagonal']:.1f} m across"
     for one in found["findings"]:
-        yield "finding", f"{one['code']}: {one['message']}"
+        walls = [document["segments"][k] for k in one["segments"][:SHOWN]]
+        places = ", ".join(f"({0.5 * (x1 + x2):.1f}, {0.5 * (y1 + y2):.1f})" for x1, y1, x2, y2 in walls)
+        where = f" Near {places}{' and more' * (len(one['segments']) > SHOWN)}." * bool(walls)
+        yield "finding", f"{one['code']}: {one['message']}{where}"
     if not found["findings"]:
         yield "finding", "none"
     for name, value in found["advice"].items():
-        if value is not None:
-            yield "advice", f'store the map with "{name}": {str(value).lower()}'
+        if value not in (None, document.get(name, {"oriented": True}.get(name))):
+            yield "advice", f'set "{name}" of the map to {str(value).lower()}'
     if samples is not None:
         tried = sum(one["status"] is not None for one in samples["scans"])
-        yield "scans", f"{samples['usable']} of {tried} usable; with the advice {samples['usable_as_advised']}"
+        usable = f"{samples['usable']} of {tried} usable; with the advice {samples['usable_as_advised']}"
+        as_it_is = found["complete"] and BETTER.isdisjoint(one["code"] for one in found["findings"])
+        yield "scans", usable + AS_IT_IS * as_it_is
         if tried < len(samples["scans"]):
             yield "note", f"the time limit ended the check before {len(samples['scans']) - tried} more scans"
     elif not found["complete"]:

@@ -67,7 +67,7 @@ def import_map(
     answer = imported(file, said, where)
     if log is not None:
         answer = beside_log(answer, file, said, log)
-    found = [*report_rows(answer), *check_rows(answer["check"])]
+    found = [*report_rows(answer), *check_rows(answer["check"], answer["map"])]
     if update and log is not None:
         updated = update_by_drive(answer["map"], log)
         found += update_rows(updated, answer["map"])

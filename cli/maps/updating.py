@@ -25,47 +25,63 @@ if TYPE_CHECKING:
 SCANS = 200  # of a log; more cost time, and say the same again
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Visits(TopicOptions):
+    """The logs of visits, and what to read of them."""
+
+    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")]
+    scans: Annotated[int, option("Use so many scans of each log at most.", "N", min=3)] = SCANS
+
+    def read(self) -> dict[str, list[LoggedScan]]:
+        """Return scans of each visit, by the name of its log.
+
+        Raises
+        ------
+        WrongUseError
+            When a log is there twice.
+        """
+        if len({log.resolve() for log in self.logs}) < len(self.logs):
+            raise WrongUseError("LOG: found the same log twice, expected a log of each visit")
+        same = len({log.name for log in self.logs}) < len(self.logs)
+        return {str(log) if same else log.name: self._scans_of(log) for log in self.logs}
+
+    def _scans_of(self, log: Path) -> list[LoggedScan]:
+        """Return some scans of a log; those that odometry does not connect with the others are without it."""
+        taken = some_scans(log, self.scans, self)
+        # Odometry connects the scans of one part only: that with most of them.
+        parts = Counter(one.part for one in taken).most_common(1)
+        return [one if one.part == parts[0][0] else replace(one, pose=None) for one in taken]
+
+
 @dataclass(frozen=True, slots=True)
-class ChangeOptions:
-    """Which changes to accept."""
+class Result:
+    """Which changes to accept, and files for the new map."""
 
     accept: Annotated[Number, option("Leave changes of less confidence out.", "CONFIDENCE", min=0.0, max=1.0)] = None
     refuse: Annotated[list[int] | None, option("Leave this change out; repeat for more changes.", "INDEX")] = None
+    out: OutMap = None
+    picture: Picture = None
 
 
 @grouped
-def update(
-    on: MapArgument,
-    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")],
-    changes: ChangeOptions,
-    source: TopicOptions,
-    where: Where,
-    output: Output,
-    out: OutMap = None,
-    picture: Picture = None,
-    scans: Annotated[int, option("Use so many scans of each log at most.", "N", min=3)] = SCANS,
-) -> None:
+def update(on: MapArgument, visits: Visits, result: Result, where: Where, output: Output) -> None:
     """Propose changes of a map that the scans of several visits show, and write the new map."""
-    target = read_map_or_id(on)
-    visits = dict(zip(visit_names(logs), (_scans(log, scans, source) for log in logs), strict=True))
-    names = flags_of(changes) | {"": on, "/map": on}
-    names |= {f"/visits/{number}": name for number, name in enumerate(visits)}
-    answer = where.ask("update_map", target, _request_of(visits, changes), names=names)
-    if out is not None:
-        write_document(answer["map"], out)
-    if picture is not None:
-        draw_changes(where.whole_map(target), answer, picture)
-    output.print(answer, _lines(answer, target, len(visits), where))
+    target, scans = read_map_or_id(on), visits.read()
+    names = flags_of(result) | {"": on, "/map": on}
+    names |= {f"/visits/{number}": name for number, name in enumerate(scans)}
+    request = {**_request_of(scans), "accept": result.accept, "refuse": result.refuse or []}
+    answer = where.ask("update_map", target, request, names=names)
+    if result.out is not None:
+        write_document(answer["map"], result.out)
+    old = where.whole_map(target)
+    if result.picture is not None:
+        draw_changes(old, answer, result.picture)
+    output.print(answer, rows(update_rows(answer, old, len(scans))))
 
 
-def _lines(answer: Json, target: Json, visits: int, where: Where) -> Iterator[str]:
-    yield from rows(update_rows(answer, where.whole_map(target), visits))
-
-
-def _request_of(visits: Mapping[str, Sequence[LoggedScan]], changes: ChangeOptions) -> Json:
+def _request_of(visits: Mapping[str, Sequence[LoggedScan]]) -> Json:
     """Return a request for an update; poses are those of the sensor, so that mounts make no difference."""
-    sent_visits = [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]
-    return {"visits": sent_visits, "accept": changes.accept, "refuse": changes.refuse or []}
+    return {"visits": [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]}
 
 
 def _sent(one: LoggedScan) -> Json:
@@ -77,28 +93,6 @@ def _sent(one: LoggedScan) -> Json:
     return told
 
 
-def visit_names(logs: list[Path]) -> list[str]:
-    """Return a name for each visit: that of its log.
-
-    Raises
-    ------
-    WrongUseError
-        When a log is there twice.
-    """
-    if len({log.resolve() for log in logs}) < len(logs):
-        raise WrongUseError("LOG: found the same log twice, expected a log of each visit")
-    names = [log.name for log in logs]
-    return names if len(set(names)) == len(names) else [str(log) for log in logs]
-
-
-def _scans(log: Path, most: int, source: TopicOptions) -> list[LoggedScan]:
-    """Return some scans of a log; those that odometry does not connect with the others are without it."""
-    taken = some_scans(log, most, source)
-    # Odometry connects the scans of one part only: that with most of them.
-    parts = Counter(one.part for one in taken).most_common(1)
-    return [one if one.part == parts[0][0] else replace(one, pose=None) for one in taken]
-
-
 def update_by_drive(document: Json, log: Path) -> Json:
     """Return the update of a map by one log; its halves count as two visits.
 
@@ -107,10 +101,9 @@ def update_by_drive(document: Json, log: Path) -> Json:
     RefusedError
         When the log, or a scan, is not taken.
     """
-    scans = _scans(log, 2 * SCANS, TopicOptions())
+    (scans,) = Visits(logs=[log], scans=2 * SCANS).read().values()
     half = len(scans) // 2
-    halves = {"first half": scans[:half], "second half": scans[half:]}
-    return Where().ask("update_map", document, _request_of(halves, ChangeOptions()))
+    return Where().ask("update_map", document, _request_of({"first half": scans[:half], "second half": scans[half:]}))
 
 
 def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str, str]]:

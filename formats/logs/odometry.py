@@ -129,7 +129,7 @@ class Odometry:
         return _speed(step, (last - first) / NS)
 
     def note_doubts(self, notes: Notes) -> None:
-        """Note where odometry contradicts itself, is missing, or begins again."""
+        """Note where odometry contradicts itself, or begins again."""
         for track in self.moving:
             topics = " and ".join(shown(one) for one in sorted(track.topics))
             if track.jumps:
@@ -139,18 +139,20 @@ class Odometry:
                     "reset. Odometry near them is not used",
                     len(track.jumps),
                 )
-            if track.longest_gap:
-                notes.add_assumed(
-                    "odometry_gap",
-                    f"odometry on {topics} is missing for up to {track.longest_gap / NS:.1f} s; scans in gaps have no "
-                    "pose",
-                )
             if track.part_count > 1:
                 notes.add_assumed(
                     "odometry_parts",
                     f"the stamps of odometry on {topics} jump back; each of {track.part_count} parts has its own "
                     "odometry",
                 )
+
+    def note_gaps(self, notes: Notes) -> None:
+        """Note for how long odometry is missing, where a scan has no pose."""
+        for track in self.moving:
+            if track.longest_gap:
+                topics = " and ".join(shown(one) for one in sorted(track.topics))
+                told = f"odometry on {topics} is missing for up to {track.longest_gap / NS:.1f} s"
+                notes.add_assumed("odometry_gap", f"{told}; scans in gaps have no pose")
 
 
 def _step(before: Known | None, after: Known | None) -> RigidTransform | None:

@@ -75,6 +75,7 @@ def _note_place(sensor: Sensor, place: Place, stamp: int, received: int, notes: 
     if place.pose is not None or sensor.odometry is None:
         return
     notes.add_dropped("no_pose", "scans without a pose in the log (they are included)", 1)
+    sensor.odometry.note_gaps(notes)
     apart = sensor.clock_offset(stamp, received)
     if abs(apart) * NS > CLOCKS_APART_NS:
         notes.add_assumed(

@@ -116,6 +116,25 @@ def test_a_check_beside_the_scans_of_a_log(linefix: Linefix, folder: Path) -> No
     assert "finding  mirrored" in told
     assert "finding  thickness" not in told
     assert "of 5 usable" in told
+    assert "no better mirrored" not in told
+    right = linefix("map", "check", "floor.json", "--log", "drive.log", LINEFIX_MAX_DEADLINE_MS="600000").out
+    assert "of 5 usable; with the advice 5; no better mirrored, reversed, undirected or at another scale" in right
+    assert 'set "sigma" of the map to' in right
+    assert "oriented" not in right  # it is as advised
+
+
+def test_a_finding_says_where(linefix: Linefix, folder: Path) -> None:
+    walls = [*faces().tolist(), [1.0, 1.0, 1.05, 1.0], [2.0, 1.0, 2.05, 1.0]]
+    (folder / "crumbs.json").write_text(json.dumps({"segments": walls}))
+    assert re.search(
+        r"finding  short_pieces: .* Near \(1.0, 1.0\), \(2.0, 1.0\)\.", linefix("map", "check", "crumbs.json").out
+    )
+
+
+@pytest.mark.parametrize("name", ["drive.log", "maps"])
+def test_a_log_is_no_scan(linefix: Linefix, folder: Path, name: str) -> None:
+    write_log(folder / "drive.log", 1)
+    assert "expected one scan; linefix replay LOG --map MAP" in refused(linefix("locate", "floor.json", name), 2)
 
 
 def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:

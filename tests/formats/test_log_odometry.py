@@ -71,6 +71,9 @@ def test_odometry_is_unknown_in_a_gap(tmp_path: Path, messages: bool, seconds: f
     assert found[2].unknown_s == pytest.approx(0.0 if known else seconds)
     assert ("odometry_gap" in notes, "no_pose" in notes) == (not known, not known)
     assert known or f"missing for up to {seconds:.1f} s" in told
+    (tmp_path / "outside").mkdir()
+    _, notes, _ = recorded(tmp_path / "outside", values, at(5.5, 30.5 + lost), messages=messages)
+    assert "odometry_gap" not in notes  # no scan is in it
 
 
 @pytest.mark.parametrize("messages", [False, True])

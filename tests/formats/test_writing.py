@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from formats import LineMap, StampedPose, UnsupportedFormatError, draw_map, read_map, write_map, write_tum
+from formats.picture import DrawnLines, DrawnText
 from registration import RigidTransform, Segments
 
 
@@ -61,6 +62,18 @@ def test_a_picture_shows_walls_free_sides_and_poses(tmp_path: Path) -> None:
     assert not (strip[30] == (16, 20, 24)).all(axis=1)[180]
     draw_map(LineMap(room, oriented=False), tmp_path / "b.png")
     assert not (np.asarray(Image.open(tmp_path / "b.png")) == (42, 160, 224)).all(axis=2).any()
+
+
+def test_texts_at_one_place_are_below_each_other_and_dashes_are_so_in_the_legend(tmp_path: Path) -> None:
+    room = LineMap(Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2], [2, 2, 0, 2], [0, 2, 0, 0]]))
+    colours = [(200, 0, 0), (0, 0, 200)]
+    lines = [DrawnLines(np.array([[0.5, 0.2, 1.5, 0.2]]), (0, 90, 0), "old", dashed=True)]
+    draw_map(room, tmp_path / "a.png", lines=lines, texts=[DrawnText(1.0, 1.0, "8", colour) for colour in colours])
+    pixels = np.asarray(Image.open(tmp_path / "a.png"))
+    first, second = (np.nonzero((pixels == colour).all(axis=2))[0] for colour in colours)
+    assert first.min() < 800 < first.max() < second.min()
+    swatch = np.nonzero((pixels[1630] == (0, 90, 0)).all(axis=1))[0]
+    assert (np.diff(swatch) > 1).sum() == 1
 
 
 def test_tum_has_a_line_a_pose_with_the_time_to_the_nanosecond(tmp_path: Path) -> None:
