@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from formats import LoggedScan
 
 SCANS = 200  # of a log; more cost time, and say the same again
+SHOWN = 8  # segments of a change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +116,7 @@ def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str,
         kept = "" if one["accepted"] else ", not accepted"
         before, after = [old["segments"][k] for k in one["segments"]], [new["segment"] for new in one["new"]]
         x, y = _middle((*before, *after))
-        which = f" (segments {', '.join(map(str, one['segments'][:8]))}{', ...' * (len(before) > 8)})" * bool(before)
+        which = f" (segments {_some(one['segments'])})" * bool(before)
         yield (
             f"change {number}",
             f"{one['code']} near ({x:.1f}, {y:.1f}): {_metres(before)}{which} before, {_metres(after)} after; "
@@ -124,6 +125,8 @@ def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str,
         )
     if not answer["changes"]:
         yield "change", "none" + ("; a change needs logs of two visits" if visits < 2 else "")
+    for one in answer["kept"]:
+        yield "kept", f"segments {_some(one['segments'])}: {one['message']}"
     sharp = answer["sharpened"]["sigma"]
     if sharp:
         yield "sharper", f"{len(sharp)} walls at better positions, sigma {1e3 * median(sharp):.1f} mm (median)"
@@ -131,6 +134,11 @@ def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str,
         yield name, f"{of['usable_before']} of {of['scans']} usable before, {of['usable_after']} after{more}"
     if not answer["complete"]:
         yield "note", "the time limit ended the update; changes that were not verified are not proposed"
+
+
+def _some(segments: Sequence[int]) -> str:
+    """Return the first indices of segments."""
+    return ", ".join(map(str, segments[:SHOWN])) + ", ..." * (len(segments) > SHOWN)
 
 
 def _middle(rows: Sequence[Sequence[float]]) -> tuple[float, float]:

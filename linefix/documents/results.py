@@ -291,5 +291,6 @@ def update_json(update: MapUpdate, old: MapDocument) -> Json:
         "held_back": {"scans": held.scans, "usable_before": held.before, "usable_after": held.after},
         "sharpened": answer_of(updates.SharpenedAnswer, update.sharpened),
         "refused_visits": answers_of(updates.RefusedVisitAnswer, update.refused_visits),
+        "kept": answers_of(updates.KeptWallsAnswer, update.kept),
         "complete": update.complete,
     }

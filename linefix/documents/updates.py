@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from map_quality import ChangeCode
+from map_quality import ChangeCode, KeptCode
 
 from .arrays import Covariance, MapSegmentRows
 from .errors import TooManyError
@@ -232,6 +232,24 @@ class RefusedVisitAnswer(Answer):
     message: str
 
 
+class KeptWallsAnswer(Answer):
+    """Walls of the map that stay although beams of several visits pass through a part of them.
+
+    Attributes
+    ----------
+    code
+        later versions may add codes
+    message
+        the reason, for people
+    segments
+        indices of the old map's segments
+    """
+
+    code: KeptCode
+    message: str
+    segments: list[Index]
+
+
 class UpdateAnswer(Answer):
     """Proposed changes of a map; nothing is stored.
 
@@ -266,6 +284,7 @@ class UpdateAnswer(Answer):
     held_back: HeldBackAnswer
     sharpened: SharpenedAnswer
     refused_visits: list[RefusedVisitAnswer]
+    kept: list[KeptWallsAnswer]
     complete: bool
     client_ref: Any
     request_id: str

@@ -117,6 +117,12 @@ class WallEvidence:
         through, ended, _ = self.counts[rows].T
         return np.asarray((through + ended > 0) & ((ended > through) == on))
 
+    def passed_walls(self) -> Indices:
+        """Return the walls with a chunk that most beams of several visits pass through."""
+        chunk, cells = _by_visit(self.chunk, self.visit, self.counts)
+        passed, visits = np.unique(chunk[shows(cells[:, 0], cells[:, 1])], return_counts=True)
+        return np.unique(self.chunks.walls_of(passed[visits >= tuning.LEAST_VISITS]))
+
     def rows_of(self, chunks: Indices) -> Indices:
         """Return the rows of some chunks."""
         begin, end = (np.searchsorted(self.chunk, chunks, side=side) for side in ("left", "right"))

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 ChangeCode = Literal["removed", "added", "moved", "extended", "shortened"]
+KeptCode = Literal["still_seen", "little_passed", "worse_without"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +120,24 @@ class RefusedVisit:
 
 
 @dataclass(frozen=True, slots=True)
+class KeptWalls:
+    """Walls of the map that stay although beams of several visits pass through a part of them.
+
+    Attributes
+    ----------
+    code : KeptCode
+    message : str
+        The reason.
+    segments : tuple of int
+        Indices of the old map's segments.
+    """
+
+    code: KeptCode
+    message: str
+    segments: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class MapUpdate:
     """A proposal; nothing is stored.
 
@@ -139,6 +158,8 @@ class MapUpdate:
     sharpened : Sharpened
         Walls that are in the new map at better positions; they are in no change.
     refused_visits : tuple of RefusedVisit
+    kept : tuple of KeptWalls
+        At most one for each code.
     complete : bool
         False if the deadline ended it; then no change is proposed that was not verified.
     """
@@ -151,6 +172,7 @@ class MapUpdate:
     held_back: Usable
     sharpened: Sharpened = NOT_SHARPENED
     refused_visits: tuple[RefusedVisit, ...] = ()
+    kept: tuple[KeptWalls, ...] = ()
     complete: bool = True
 
 

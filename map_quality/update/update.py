@@ -35,7 +35,17 @@ from .scans import (
     search,
 )
 from .sharpening import sharpen
-from .verifying import Proposed, blamed, is_better, keeps_usable, lost_scans, most_lost, total_score, usable_of
+from .verifying import (
+    Proposed,
+    blamed,
+    is_better,
+    keeps_usable,
+    kept_walls,
+    lost_scans,
+    most_lost,
+    total_score,
+    usable_of,
+)
 from .walls import Draft
 
 Drafts = Sequence[tuple[Draft, Change]]
@@ -176,7 +186,10 @@ class _Update:
                 break
             latest = yield from self.search_others(trial, first, latest)
             chosen, _ = choose_evidence(self.names, latest, self.sigma)
-        return (yield from self.verify(drafts, evidence, first))
+        proposed = yield from self.verify(drafts, evidence, first)
+        drafted = {k for _, change in drafts for k in change.segments}
+        changed = {k for change in proposed.changes for k in change.segments}
+        return replace(proposed, kept=tuple(kept_walls(evidence, len(self.known), drafted, changed)))
 
     def draft(self, chosen: Sequence[Localized]) -> Steps[tuple[Drafts, Drafts, WallEvidence]]:
         """Return changes, those of a trial, and the evidence about all walls of the map and possible new ones."""
@@ -330,5 +343,6 @@ class _Update:
             usable_of(first, after, held=True),
             proposed.sharpened,
             tuple(refused),
+            proposed.kept,
             len(first) == len(self.scans) and not self.deadline.passed,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,15 @@ from numpy.typing import NDArray
 
 from . import tuning
 from .evidence import WallEvidence
-from .result import NOT_SHARPENED, Change, Sharpened, Usable
+from .result import NOT_SHARPENED, Change, KeptCode, KeptWalls, Sharpened, Usable
 from .scans import Localized
 from .walls import Draft
+
+KEPT: dict[KeptCode, str] = {
+    "still_seen": "beams pass through a part of the wall, and beams of a visit end on a part of it",
+    "little_passed": "beams pass through too little of the wall, or on too few visits or from too few places",
+    "worse_without": "beams pass through, but without the wall scans fit less, move, or are not usable",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +32,13 @@ class Proposed:
     found : tuple of Localized
         All scans, searched on the new map; empty where nothing has changed.
     sharpened : Sharpened
+    kept : tuple of KeptWalls
     """
 
     changes: tuple[Change, ...] = ()
     found: tuple[Localized, ...] = ()
     sharpened: Sharpened = NOT_SHARPENED
+    kept: tuple[KeptWalls, ...] = ()
 
 
 def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
@@ -94,6 +102,23 @@ def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:
         found.append(worst)
         left &= ~seen[worst]
     return found
+
+
+def kept_walls(evidence: WallEvidence, known: int, drafted: set[int], changed: set[int]) -> Iterator[KeptWalls]:
+    """Yield the first `known` walls that several visits pass through and that no change names, by the reason.
+
+    `drafted` are those for which a change was verified, `changed` those of the changes that are left.
+    """
+    found: dict[KeptCode, list[int]] = {}
+    for wall in evidence.passed_walls().tolist():
+        if wall < known and wall not in changed:
+            own = np.arange(evidence.chunks.first[wall], evidence.chunks.first[wall + 1])
+            read = evidence.is_read(evidence.rows_of(own))
+            code: KeptCode = "worse_without" if wall in drafted else "still_seen" if read else "little_passed"
+            found.setdefault(code, []).append(wall)
+    for code, message in KEPT.items():
+        if code in found:
+            yield KeptWalls(code, message, tuple(found[code]))
 
 
 def usable_of(first: Sequence[Localized], found: Sequence[Localized], *, held: bool) -> Usable:

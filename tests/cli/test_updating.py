@@ -71,6 +71,17 @@ def test_a_new_map_and_a_picture_of_the_changes(linefix: Linefix, folder: Path) 
         assert REMOVED in {colour for _, colour in middle.getcolors(1 << 24)}
 
 
+def test_a_wall_that_stays_although_beams_pass_through_has_its_reason(linefix: Linefix, folder: Path) -> None:
+    walls, today = (
+        [*box, *HALL.endpoints[:12].tolist()] for box in ([[8, 5.5, 6, 5.5]], [[8, 5.5, 7.25, 5.5], [6.8, 5.5, 6, 5.5]])
+    )
+    (folder / "old.json").write_text(json.dumps({"segments": walls, "sigma": 0.005}))
+    for k in range(3):
+        write_visit(folder / f"{k}.log", Segments.from_array(np.array(today, dtype=float)), k)
+    told = linefix.done("map", "update", "old.json", "0.log", "1.log", "2.log").out
+    assert "kept       segments 0: beams pass through a part of the wall, and beams of a visit end on" in told
+
+
 def test_one_visit_shows_no_change_and_says_so(linefix: Linefix) -> None:
     told = linefix.done("map", "update", "hall.json", "monday.log")
     assert "change     none; a change needs logs of two visits" in told.out.splitlines()

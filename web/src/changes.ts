@@ -2,6 +2,7 @@
 
 import { distance } from "./geometry";
 import { state } from "./state";
+import { toPixels, view } from "./view";
 import type { Change, ChangeCode, Segment } from "./types";
 
 export const CODES: ChangeCode[] = ["removed", "added", "moved", "extended", "shortened"];
@@ -10,6 +11,7 @@ export const colourOf = (code: ChangeCode) => `change-${code}`;
 const REFUSED = 0.3; // opacity
 const [WIDTH, HALO] = [4, 13]; // px
 const DASHES = [8, 6];
+const LETTERS = 14; // px
 
 type Line = (segment: Segment, colour: string, width: number, dashes?: number[]) => void;
 
@@ -25,6 +27,25 @@ export function drawChanges(context: CanvasRenderingContext2D, colours: Record<s
     for (const wall of newWalls(one)) line(wall, colour, WIDTH);
     context.globalAlpha = 1;
   });
+  drawNumbers(context, colours);
+}
+
+/** Write the number of each change in the middle of its walls, above small ones, and below the numbers that are there. */
+function drawNumbers(context: CanvasRenderingContext2D, colours: Record<string, string>): void {
+  const written: [number, number][] = [];
+  Object.assign(context, { font: `600 ${LETTERS}px sans-serif`, textAlign: "center", textBaseline: "middle", lineWidth: 4, strokeStyle: colours.paper });
+  state.proposal?.changes.forEach((one, k) => {
+    const ends = [...oldWalls(one), ...newWalls(one)];
+    const middle = (axis: number) => ends.reduce((sum, wall) => sum + wall[axis] + wall[axis + 2], 0) / (2 * ends.length);
+    const longest = Math.max(...ends.map(([x1, y1, x2, y2]) => Math.hypot(x2 - x1, y2 - y1)));
+    let [x, y] = toPixels(middle(0), middle(1));
+    if (longest * view.scale < 2 * LETTERS) y -= LETTERS;
+    while (written.some(([a, b]) => Math.abs(a - x) < LETTERS && Math.abs(b - y) < LETTERS)) y += LETTERS;
+    written.push([x, y]);
+    context.fillStyle = colours[colourOf(one.code)];
+    context.strokeText(`${k}`, x, y);
+    context.fillText(`${k}`, x, y);
+  });
 }
 
 /** The index of the change that is nearest, within some metres; -1 for none. */
@@ -39,7 +60,7 @@ export function changeAt(x: number, y: number, near: number): number {
   return found;
 }
 
-const counted = (count: number, what: string) => `${count} ${what}${count === 1 ? "" : "s"}`;
+export const counted = (count: number, what: string) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
 export function titleOf(one: Change): string {
   const parts = [one.segments.length ? counted(one.segments.length, "old wall") : "", one.new.length ? `${one.new.length} new` : ""];

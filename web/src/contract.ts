@@ -499,6 +499,12 @@ export interface components {
             /** @default null */
             sigma?: number | null;
         };
+        KeptWallsAnswer: {
+            /** @enum {string} */
+            code: "still_seen" | "little_passed" | "worse_without";
+            message: string;
+            segments: number[];
+        };
         KnownMap: {
             /** @default map */
             frame_id?: string;
@@ -1164,6 +1170,7 @@ export interface components {
             client_ref: unknown;
             complete: boolean;
             held_back: components["schemas"]["HeldBackAnswer"];
+            kept: components["schemas"]["KeptWallsAnswer"][];
             map: components["schemas"]["NewMapAnswer"];
             refused_visits: components["schemas"]["RefusedVisitAnswer"][];
             request_id: string;
@@ -1338,6 +1345,7 @@ export type ImportAnswer = components['schemas']['ImportAnswer'];
 export type ImportTimingAnswer = components['schemas']['ImportTimingAnswer'];
 export type ImportedMapAnswer = components['schemas']['ImportedMapAnswer'];
 export type InlineMap = components['schemas']['InlineMap'];
+export type KeptWallsAnswer = components['schemas']['KeptWallsAnswer'];
 export type KnownMap = components['schemas']['KnownMap'];
 export type Laser = components['schemas']['Laser'];
 export type LaserScan = components['schemas']['LaserScan'];

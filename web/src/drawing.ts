@@ -14,7 +14,7 @@ import { drawWalls } from "./walls";
 const canvas = element<HTMLCanvasElement>("#plan");
 const context = canvas.getContext("2d")!;
 /** Everything that has a colour of its own, in the style sheet and in the legend. */
-const NAMES = ["grid", "wall", "off", "added", "robot", "scan", "beam", "matched", "unmatched", "missing", "critical", "estimate", "other"];
+const NAMES = ["paper", "grid", "wall", "off", "added", "robot", "scan", "beam", "matched", "unmatched", "missing", "critical", "estimate", "other"];
 export const KINDS = ["usable", "ambiguous", "degenerate", "no_match"];
 export let colours: Record<string, string> = {};
 let frame = 0;

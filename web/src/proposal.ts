@@ -1,7 +1,7 @@
 // A proposal of changes: from a file or from logs, its list, and the map with the changes that are accepted.
 
 import { applyChanges, getMap, importScans, limits, Problem, putMap, updateMap } from "./api";
-import { colourOf, confidenceOf, evidenceOf, titleOf } from "./changes";
+import { colourOf, confidenceOf, counted, evidenceOf, titleOf } from "./changes";
 import { element, made, save } from "./dom";
 import { redraw } from "./drawing";
 import { key } from "./legend";
@@ -70,13 +70,14 @@ function ofSensor(name: string, scan: Scan): Scan {
   return { laser: view.laser, ...(view.twist ? { twist: view.twist } : {}) };
 }
 
-function summaryOf({ changes, scans, usable_before, usable_after, sharpened, refused_visits, complete }: Proposal): string {
+function summaryOf({ changes, scans, usable_before, usable_after, sharpened, refused_visits, kept = [], complete }: Proposal): string {
   const accepted = changes.filter((one) => one.accepted).length;
   return [
     changes.length ? `${accepted} of ${changes.length} changes accepted.` : "No change is proposed.",
     sharpened.segments.length ? `${sharpened.segments.length} walls are at better positions.` : "",
     `Of ${scans} scans, ${usable_before} are usable on the old map, and ${usable_after} with all changes.`,
     ...refused_visits.map((one) => `${one.visit} gives no evidence: ${one.message}`),
+    ...kept.map(({ segments, message }) => `Kept: ${counted(segments.length, "wall")}; ${message}.`),
     complete ? "" : "The time limit ended the search; changes that were not verified are not proposed.",
   ].filter(Boolean).join(" ");
 }

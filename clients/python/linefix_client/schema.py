@@ -143,6 +143,16 @@ class ImportedMapAnswer(TypedDict):
     meta: Any
 
 
+class KeptWallsAnswer(TypedDict):
+    """
+    Walls of the map that stay although beams of several visits pass through a part of them.
+    """
+
+    code: Literal["still_seen", "little_passed", "worse_without"]
+    message: str
+    segments: list[int]
+
+
 class Limits(TypedDict):
     """
     Limits of requests; a request beyond one is rejected.
@@ -620,11 +630,11 @@ class PointScan(TypedDict):
     A scan as points in scanning order.
     """
 
+    points: list[list[float]]
+    sigma: NotRequired[float | None]
     frame_id: NotRequired[str]
     stamp: NotRequired[Any]
     viewpoint: NotRequired[list[float] | None]
-    points: list[list[float]]
-    sigma: NotRequired[float | None]
 
 
 class Pose(TypedDict):
@@ -753,12 +763,12 @@ class UpdateScan(TypedDict):
     A scan as ranges, and optionally the pose of it that the robot assumed, or its odometry.
     """
 
-    frame_id: NotRequired[str]
-    stamp: NotRequired[Any]
-    viewpoint: NotRequired[list[float] | None]
     laser: Laser
     sigma: NotRequired[float | None]
     twist: NotRequired[Twist | None]
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
     pose: NotRequired[Pose | None]
     covariance: NotRequired[list[list[float]] | None]
     flipped: NotRequired[bool]
@@ -958,6 +968,7 @@ class UpdateAnswer(TypedDict):
     held_back: HeldBackAnswer
     sharpened: SharpenedAnswer
     refused_visits: list[RefusedVisitAnswer]
+    kept: list[KeptWallsAnswer]
     complete: bool
     client_ref: Any
     request_id: str
@@ -1025,12 +1036,12 @@ class LaserScan(TypedDict):
     A scan as ranges.
     """
 
-    frame_id: NotRequired[str]
-    stamp: NotRequired[Any]
-    viewpoint: NotRequired[list[float] | None]
     laser: Laser
     sigma: NotRequired[float | None]
     twist: NotRequired[Twist | None]
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
 
 
 class LaserView(TypedDict):

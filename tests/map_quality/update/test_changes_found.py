@@ -50,6 +50,17 @@ def test_an_unchanged_hall_stays_as_it_is() -> None:
     assert found.usable.before == found.usable.after > 18
 
 
+def test_a_wall_with_a_small_gap_stays_and_the_reason_is_given() -> None:
+    def partition(*ends: float) -> list[list[float]]:
+        return [[x, 5.5, y, 5.5] for x, y in zip(ends[::2], ends[1::2], strict=True)]
+
+    hall, today = segments(RACK, partition(8.0, 6.0)), segments(RACK, partition(8.0, 7.25, 6.8, 6.0))
+    found = updated(hall, *visits(today, today, today))
+    assert found.changes == ()
+    assert [(one.code, one.segments) for one in found.kept] == [("still_seen", (16,))]
+    assert updated(hall, *visits(hall, hall, hall)).kept == ()
+
+
 def test_a_thing_that_is_gone_is_removed_whole() -> None:
     hall, today = segments(RACK, PILLAR), segments(PILLAR)
     found = updated(hall, *visits(today, today))

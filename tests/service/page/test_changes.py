@@ -91,6 +91,8 @@ def test_changes_have_colours_evidence_and_a_map_with_the_accepted_ones(
     assert ADDED in near
     near = [drawn(page).colour(PILLAR_SIDE[0], PILLAR_SIDE[1] + 0.02 * k)[:3] for k in range(-10, 11)]
     assert REMOVED in near  # dashed
+    middle = [drawn(page).colour(8.3 + 0.02 * k, 3.3)[:3] for k in range(-5, 6)]
+    assert REMOVED in middle  # its number
 
     told = next(one for one in proposal["changes"] if one["code"] == "removed")["evidence"]
     beams, places, visits = (told[name] for name in ("beams_through", "poses", "visits"))
