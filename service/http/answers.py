@@ -13,11 +13,11 @@ from linefix.documents.replies import (
     MapReference,
     Milliseconds,
     PoseAnswer,
-    Row2,
     Row4,
     TimingAnswer,
 )
 from linefix.documents.strict import Answer
+from linefix.documents.updates import NewMapAnswer
 
 from .problems import KINDS
 
@@ -142,16 +142,16 @@ class ReportAnswer(Answer):
     assumed: list[NoteAnswer] = Field(description="assumptions, where the files state nothing")
 
 
-class ImportedMapAnswer(Answer):
-    """A map, as it may be stored or sent with a request."""
+class ImportedMapAnswer(NewMapAnswer):
+    """A map, as it may be stored or sent with a request.
 
-    segments: list[Row4] = Field(description="metres; free space on the left where `oriented`")
-    sigma: float | None
+    Attributes
+    ----------
+    segments
+        metres; free space on the left where `oriented`
+    """
+
     oriented: bool
-    frame_id: str
-    points: list[Row2] = Field([], description="`[x, y]` each, metres; absent if the map has none")
-    points_sigma: float | None = Field(None, description="metres; absent if the map has no points")
-    meta: Any
 
 
 class GridPictureAnswer(Answer):

@@ -48,11 +48,7 @@ async def limits(exchange: Admitted) -> Response:
     names = [name for name in Limits.model_fields if name in type(settings).model_fields]
     fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
     held = exchange.services.limits
-    fixed |= {
-        "max_views": held.views,
-        "max_beams_together": held.beams_together,
-        "max_segments_together": held.segments_together,
-    }
+    fixed |= {f"max_{name}": getattr(held, name) for name in ("views", "beams_together", "segments_together")}
     return json_response(encode({name: getattr(settings, name) for name in names} | fixed))
 
 
