@@ -30,13 +30,13 @@ from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
 
-def _read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def _read_dxf(path: Path, drawing: Drawing) -> None:
     from .drawings.dxf import read_dxf  # takes as long to load as all other readers, and only this needs it
 
-    return read_dxf(path, options, notes)
+    read_dxf(path, drawing)
 
 
-DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
+DRAWINGS: dict[str, Callable[[Path, Drawing], None]] = {
     ".dxf": _read_dxf,
     ".svg": read_svg,
     ".geojson": read_geojson,
@@ -89,7 +89,8 @@ def read_map(
         if is_bag(file):
             return _read_bag(file, options, notes)
         if suffix in DRAWINGS:
-            drawing = DRAWINGS[suffix](file, options, notes)
+            drawing = Drawing(name_of(file), suffix[1:], notes, options)
+            DRAWINGS[suffix](file, drawing)
             return ImportedMap(to_map(drawing), notes.report(drawing.format, (drawing.name,)))
         raise _unsupported(file, "a file", MAP_SUFFIXES)
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
-from ..files import name_of, read_bounded, text_of
+from ..files import read_bounded, text_of
 from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES
-from ..options import UNITS, ImportOptions
-from ..report import Notes, first_of, shown
+from ..options import UNITS
+from ..report import first_of, shown
 from .drawing import Drawing
 
 COLUMNS = ("x1", "y1", "x2", "y2")
@@ -56,7 +56,7 @@ class Table:
     metres: float
 
 
-def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def read_csv(path: Path, drawing: Drawing) -> None:
     """Read rows of x1, y1, x2, y2, metres unless an option or the header says otherwise.
 
     A first row may name the columns, then in any order and among others, which are properties of the segments. Lines
@@ -79,7 +79,7 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         )
     comments = {line[1:].strip() for line in lines if line.startswith("#")}
     table = _table(lines)
-    drawing = Drawing(name_of(path), "csv", notes, options, table.metres, "oriented=true" in comments)
+    drawing.metres, drawing.oriented = table.metres, "oriented=true" in comments
     others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
     commas, loose = 0, []
     for row, line in zip(table.rows, table.lines, strict=True):
@@ -103,8 +103,7 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
             drawing.add([(x1, y1, z1), (x2, y2, z2)], layers=layers, properties=properties, groups=layers)
     drawing.add_segments(loose)
     if commas:
-        notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
-    return drawing
+        drawing.notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
 
 
 def _table(lines: list[str]) -> Table:

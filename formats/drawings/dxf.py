@@ -20,9 +20,9 @@ from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
 
 from ..errors import FormatError, MalformedFileError, TooLargeError, UnsupportedFormatError
-from ..files import name_of, read_bounded
+from ..files import read_bounded
 from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
-from ..options import US_FOOT, ImportOptions
+from ..options import US_FOOT
 from ..report import Notes, shown
 from .drawing import Drawing
 from .dxf_blocks import Expansion, Placed, shown_parts
@@ -56,7 +56,7 @@ BROKEN = (DXFError, ArithmeticError, ValueError, TypeError, AttributeError, Look
 PROXIES = ("ACAD_PROXY", "AEC_", "ACDBZOMBIE")  # beginnings of the kinds of entities of other programs
 
 
-def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def read_dxf(path: Path, drawing: Drawing) -> None:
     """Read the lines of a DXF's model space, blocks taken apart.
 
     Raises
@@ -64,14 +64,14 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     FormatError
         When it is no DXF, or expands to too much.
     """
-    document = _document(path, notes)
-    drawing = Drawing(name_of(path), "dxf", notes, options, _metres(document, notes))
+    document, options = _document(path, drawing.notes), drawing.options
+    drawing.metres = _metres(document, drawing.notes)
     expansion = Expansion.of(document, drawing)
     metres = options.metres or drawing.metres or 1.0
     directed = 0
     try:
         if not options.layers and not options.where:
-            drawing.walls = walls_among(expansion.layers(document.modelspace()), notes)
+            drawing.walls = walls_among(expansion.layers(document.modelspace()), drawing.notes)
         for placed in expansion.visible(document.modelspace()):
             if not drawing.takes(placed.layers, _properties(placed)):
                 continue
@@ -86,7 +86,6 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         ) from error
     _note_paper_space(document, drawing)
     drawing.oriented = 0 < directed == len(drawing.polylines)
-    return drawing
 
 
 def _document(path: Path, notes: Notes) -> Document:

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import MalformedFileError, TooLargeError
-from ..files import kind_of, load_json, name_of, read_bounded
+from ..files import kind_of, load_json, read_bounded
 from ..limits import MAX_ENTITIES, MAX_MAP_BYTES, MAX_UNITS
-from ..options import ImportOptions
-from ..report import Notes
 from .coordinate_systems import require_lengths
 from .drawing import Drawing
 from .selection import lower_keys
@@ -25,17 +23,16 @@ HIDDEN = ("feature_type", "id")  # members of an IMDF feature outside its proper
 Lines = Iterator[tuple[Any, bool]]
 
 
-def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def read_geojson(path: Path, drawing: Drawing) -> None:
     """Read the lines and the outlines of areas.
 
     Parameters
     ----------
     path : Path
         An object, or one feature on each line.
-    options : ImportOptions
-        Layers are the properties ``layer`` and ``name``, and ``thickness`` or ``width`` are those of a wall drawn by
-        its centre line.
-    notes : Notes
+    drawing : Drawing
+        Takes them. Layers are the properties ``layer`` and ``name``, and ``thickness`` or ``width`` are those of a wall
+        drawn by its centre line.
 
     Raises
     ------
@@ -48,7 +45,7 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}")
     own = root.get(OWN)
     told = own if isinstance(own, dict) else {}
-    drawing = Drawing(name_of(path), "geojson", notes, options, 1.0, told.get("oriented") is True)
+    drawing.metres, drawing.oriented = 1.0, told.get("oriented") is True
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
         raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}")
@@ -60,7 +57,6 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         _read_feature(feature, drawing, k)
     if told.get("metres") is not True:
         require_lengths(root.get("crs", root.get("coordRefSys")), drawing)
-    return drawing
 
 
 def _loaded(content: bytes) -> Any:

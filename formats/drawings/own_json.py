@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import MalformedFileError, TooLargeError
-from ..files import kind_of, load_json, name_of, read_bounded
+from ..files import kind_of, load_json, read_bounded
 from ..limits import MAX_MAP_BYTES, MAX_POINTS
-from ..options import ImportOptions
-from ..report import Notes, shown
+from ..report import shown
 from .drawing import Drawing
 
 OWN_FIELDS = {"segments", "sigma", "oriented", "frame_id", "meta", "points", "points_sigma"}
 
 
-def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def read_json(path: Path, drawing: Drawing) -> None:
     """Read a map file of our own: an object with ``segments``, or the array alone.
 
     Raises
@@ -37,12 +36,11 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, 4, f"segment {k}"))), None)
     if wrong is not None:
         raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}")
-    drawing = Drawing(name_of(path), "json", notes, options, 1.0)
+    drawing.metres = 1.0
     _take_properties(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
-        notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
+        drawing.notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
     drawing.add_segments(rows)
-    return drawing
 
 
 def _fault_of_row(row: Any, width: int, named: str) -> str | None:

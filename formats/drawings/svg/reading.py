@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FormatError, MalformedFileError
-from ...files import name_of, read_bounded
+from ...files import read_bounded
 from ...limits import MAX_MAP_BYTES
-from ...options import ImportOptions
-from ...report import Notes
 from ..drawing import Drawing
 from .shapes import SHAPES, Measure, Points
 from .visible import Visible
@@ -23,15 +21,14 @@ from .xml import kind_of, parse_xml
 METRES, ORIENTED = "data-metres-per-unit", "data-free-space-on-left"
 
 
-def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+def read_svg(path: Path, drawing: Drawing) -> None:
     """Read the visible lines, shapes and paths of an SVG; y is turned to point up.
 
     Parameters
     ----------
     path : Path
-    options : ImportOptions
-        Layers are the ids, classes and Inkscape labels of an element and of those that it is in.
-    notes : Notes
+    drawing : Drawing
+        Takes them. Layers are the ids, classes and Inkscape labels of an element and of those that it is in.
 
     Raises
     ------
@@ -41,7 +38,6 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     root = parse_xml(read_bounded(path, MAX_MAP_BYTES))
     if kind_of(root) != "svg":
         raise MalformedFileError("expected an svg element")
-    drawing = Drawing(name_of(path), "svg", notes, options)
     drawing.oriented = root.get(ORIENTED) == "true"
     try:
         drawing.metres = float(root.attrib[METRES]) if METRES in root.attrib else None
@@ -53,7 +49,6 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         raise MalformedFileError(
             "has an element that cannot be read; expected SVG 1.1. Save it as plain SVG"
         ) from error
-    return drawing
 
 
 def _read_shapes(root: Element, drawing: Drawing) -> None:
