@@ -45,9 +45,8 @@ ScanArgument = Annotated[
 ]
 Picture = Annotated[File, option("Draw the result to this PNG file.", "FILE")]
 OutMap = Annotated[File, option(WRITE_MAP, "FILE")]
-Oriented = Annotated[
-    bool, flag("Free space lies on the left of segments, or directions have no meaning.", "--oriented/--no-oriented")
-]
+ORIENTED = flag("Free space lies on the left of segments, or directions have no meaning.", "--oriented/--no-oriented")
+Oriented = Annotated[bool, ORIENTED]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from registration.limits import MAX_COORDINATE
 from .errors import InvalidOptionError
 
 Drawn = Literal["faces", "centres"]
-Directions = Literal["drawn", "none"]
 
 US_FOOT = 1200 / 3937  # of the US survey, m
 UNITS = {
@@ -44,8 +43,8 @@ class ImportOptions:
         Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.2.
     point : tuple of (x, y)
         Free places, metres in the map frame: directions are found from there.
-    directions : "drawn", "none" or None
-        Meaning of the directions of lines: free space lies on the left of each, or none. None: found from
+    oriented : bool or None
+        True if free space lies on the left of each line, false if directions have no meaning. None: found from
         `point` where given, else as the file says.
     local_metres : bool
         True if the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
@@ -73,7 +72,7 @@ class ImportOptions:
     drawn: Drawn | None = None
     thickness: float | None = None
     point: tuple[tuple[float, float], ...] = ()
-    directions: Directions | None = None
+    oriented: bool | None = None
     local_metres: bool = False
     topic: str | None = None
     unknown: int | Literal["none"] | None = None
@@ -88,7 +87,6 @@ class ImportOptions:
         checks = [
             ("units", known, f"one of {units}, or 1e-6 to 1e4 metres per unit"),
             ("drawn", self.drawn in (None, "faces", "centres"), "faces or centres"),
-            ("directions", self.directions in (None, "drawn", "none"), "drawn or none"),
             ("thickness", self.thickness is None or 0.0 <= self.thickness <= 10.0, "from 0 to 10 m"),
             ("unknown", self.unknown in (None, "none") or grey, "none, or a grey value from 0 to 255"),
             ("surface", self.surface is None or 0.0 <= self.surface <= 10.0, "from 0 to 10 cells"),

@@ -11,7 +11,20 @@ from ..asking import Where, answering
 from ..errors import WrongUseError, flags_of
 from ..inputs import draw_picture, existing, write_document
 from ..logs import some_scans
-from ..options import File, Number, OutMap, Picture, Text, Texts, TopicOptions, argument, flag, grouped, option
+from ..options import (
+    ORIENTED,
+    File,
+    Number,
+    OutMap,
+    Picture,
+    Text,
+    Texts,
+    TopicOptions,
+    argument,
+    flag,
+    grouped,
+    option,
+)
 from ..printing import Json, Output, noted, rows
 from ..scans import needing_formats
 from .checking import SAMPLES, check_rows, of_sensor
@@ -33,7 +46,7 @@ class SaidOfFile:
     point: Annotated[tuple[float, float] | None, option("A free place, to find the walls' directions.", "X Y")] = None
     drawn: Annotated[Text, option("What a drawing's lines are: faces or centres of walls.", "WHAT")] = None
     thickness: Annotated[Number, option("Thickness of walls drawn by centre lines.", "METRES")] = None
-    directions: Annotated[Text, option("drawn: free space is left of each line; none: unknown.", "WHAT")] = None
+    oriented: Annotated[bool | None, ORIENTED] = None
     local_metres: Annotated[bool, flag("The coordinates of a GeoJSON are metres.", "--local-metres")] = False
     topic: Annotated[Text, option("Topic of the grid in a bag.", "TOPIC")] = None
     unknown: Annotated[Text, option("Grey value of unknown cells in a picture, 0 to 255, or none.", "GREY")] = None
@@ -41,7 +54,7 @@ class SaidOfFile:
     @property
     def fields(self) -> Json:
         """The form: each field is a list of text."""
-        said = {name: value for name, value in asdict(self).items() if value is not None and value is not False}
+        said = {name: value for name, value in asdict(self).items() if value is not None}
         said |= {} if self.point is None else {"point": f"{self.point[0]} {self.point[1]}"}
         return {name: value if isinstance(value, list) else [str(value)] for name, value in said.items()}
 

@@ -126,7 +126,7 @@ FIELDS: Known = {
     "point": (_places, _said("a free place, `x y` in metres; may be repeated")),
     "drawn": (_text, _said("whether lines of a drawing are faces or centre lines of walls", "faces", "centres")),
     "thickness": (_number, _said("of walls drawn as centre lines, metres")),
-    "directions": (_text, _said("whether free space lies on the left of the lines", "drawn", "none")),
+    "oriented": (_truth, _said("whether free space lies on the left of the lines", "true", "false")),
     "local_metres": (_truth, _said("whether a GeoJSON is in metres", "true", "false")),
     "topic": (_text, _said("of the grid in a bag")),
     "unknown": (

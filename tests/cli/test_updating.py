@@ -154,7 +154,7 @@ def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) ->
     (folder / "hall.csv").write_text("".join(f"{a},{b},{c},{d}\n" for a, b, c, d in ends))
     lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
     (folder / "drive.log").write_text("".join(lines))
-    plain = ("map", "import", "hall.csv", "--directions", "drawn", "--units", "m", "--json")
+    plain = ("map", "import", "hall.csv", "--oriented", "--units", "m", "--json")
     told = linefix.done(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
     assert REMOVED in colours_of(folder / "changes.png")
     answer = told.answer

@@ -216,11 +216,11 @@ def test_directions_are_found_from_a_place_inside(tmp_path: Path) -> None:
 def test_directions_mean_what_the_caller_says(tmp_path: Path) -> None:
     path = text(tmp_path, "a.csv", "0,0,4,0\n")
     assert not read_map(path).map.oriented
-    assert read_map(path, ImportOptions(directions="drawn")).map.oriented
+    assert read_map(path, ImportOptions(oriented=True)).map.oriented
     path = text(tmp_path, "a.json", '{"segments": [[0, 0, 4, 0]], "sigma": 0.03, "frame_id": "hq", "meta": {"a": "b"}}')
     own = read_map(path).map
     assert (own.oriented, own.sigma, own.frame_id, own.meta) == (True, 0.03, "hq", {"a": "b"})
-    assert not read_map(path, ImportOptions(directions="none")).map.oriented
+    assert not read_map(path, ImportOptions(oriented=False)).map.oriented
 
 
 @pytest.mark.parametrize(
@@ -303,8 +303,8 @@ def test_faces_are_not_taken_for_centre_lines(tmp_path: Path, lines: Lines) -> N
     "said",
     [
         ImportOptions(drawn="faces"),
-        ImportOptions(directions="none"),
-        ImportOptions(directions="drawn"),
+        ImportOptions(oriented=False),
+        ImportOptions(oriented=True),
         ImportOptions(point=((1.0, 1.0),)),
     ],
     ids=["faces", "none", "drawn", "point"],

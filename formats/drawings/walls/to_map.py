@@ -60,8 +60,8 @@ def to_map(drawing: Drawing) -> LineMap:
     lengths = [len(one.ends) for one in drawing.polylines]
     widths = np.repeat([one.width for one in drawing.polylines], lengths) * metres
     oriented = drawing.oriented and not options.point
-    if options.directions is not None:
-        oriented = options.directions == "drawn"
+    if options.oriented is not None:
+        oriented = options.oriented
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
         endpoints, widths = endpoints[near], widths[near]

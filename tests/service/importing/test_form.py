@@ -60,6 +60,7 @@ def test_fields_are_options() -> None:
         "point": ["1 2.5", "-3,4"],
         "drawn": ["centres"],
         "thickness": ["0.2"],
+        "oriented": ["false"],
         "local_metres": ["true"],
         "where": ["indoor=wall", "layer=A, B"],
         "level": [" 1 "],
@@ -72,6 +73,7 @@ def test_fields_are_options() -> None:
         ((1.0, 2.5), (-3.0, 4.0)),
     )
     assert (options.drawn, options.thickness, options.local_metres) == ("centres", 0.2, True)
+    assert options.oriented is False
     assert (options.where, options.level, options.surface) == (("indoor=wall", "layer=A, B"), "1", 0.5)
     assert options_of({"units": ["ft"]}).units == "ft"
 
