@@ -168,6 +168,15 @@ class Inputs:
             yield doubt, f"no odometry: {reason}. Without it, scans agree only at rest"
         elif odometry.jump:
             yield f"odometry on {odometry.source} contradicts itself", self._jump
+        elif odometry.frames:
+            frames = " and ".join(map(quoted, odometry.frames))
+            told = f"odometry on {odometry.source} alternates between the frames {frames}"
+            yield told, f"{told}: it has several publishers; stop all but one. Odometry is not used until then"
+        elif odometry.apart:
+            told = f"odometry on {odometry.source} and tf differ by {odometry.apart} in {quoted(odometry.frame)}"
+            remedy = "stop one of the two publishers, or set --odom to the topic of the one that publishes tf"
+            wrong = "the transform from the map would be wrong by that"
+            yield told if self._options.publish_tf else "", f"{told}; {remedy}. With --publish-tf, {wrong}"
         elif self._apart >= 3:
             yield f"the clocks of scans and of odometry on {odometry.source} differ", self._clocks
         if self.shared:

@@ -6,7 +6,10 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from formats.logs.tracks import Known, Track
+from formats.logs.tuning import JITTER
 from registration import IDENTITY, RigidTransform
 
 from .clock import NS, Clock, nanoseconds
@@ -16,6 +19,7 @@ from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE, ENDED_SECONDS, MAX_SPEED, MAX_T
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
+SWITCHES = 4  # of the frame, within some seconds: two publishers, not one that began again
 TRANSFORMS = "tf"  # as a source
 
 
@@ -57,6 +61,9 @@ class OdometryHistory:
         self._speeds: deque[tuple[int, Speed]] = deque(maxlen=KEPT)
         self._received = 0  # the newest value, by the clock
         self._held: tuple[int, Floats, int] | None = None  # a value whose stamp the next one has to confirm
+        self._switched: deque[tuple[float, str]] = deque(maxlen=SWITCHES)  # times of messages in another frame
+        self._transform: tuple[int, Floats] | None = None  # that messages have to reach before it is compared
+        self._apart: tuple[float, str] = -math.inf, ""  # when it differed from messages, and by how much
 
     def take(self, message: Odometry, child_from_base: RigidTransform = IDENTITY, topic: str = "odometry") -> None:
         """Take a message; messages go before transforms.
@@ -93,11 +100,29 @@ class OdometryHistory:
             return
         if self.source in ("", TRANSFORMS) or self.silent_s > ENDED_SECONDS:
             self._add(stamp, odom_from_base, frame, TRANSFORMS)
+        elif frame == self.frame:
+            self._compare(stamp, odom_from_base)
+
+    def _compare(self, stamp: int, odom_from_base: Floats) -> None:
+        """Compare messages with a transform between the same frames."""
+        then, matrix = self._transform = self._transform or (stamp, odom_from_base)
+        if self._track.newest[0] < then:
+            return
+        self._transform, known = None, self._track.known(then)
+        if known is None:
+            return
+        step = planar(np.linalg.inv(known.matrix) @ matrix)[0]
+        distance, angle = math.hypot(step.x, step.y), abs(step.theta)
+        self._apart = -math.inf, ""
+        if max(distance, angle) > JITTER:
+            self._apart = self._clock.steady() / NS, f"{distance:.2f} m and {math.degrees(angle):.0f} degrees"
 
     def _add(self, stamp: int, odom_from_base: Floats, frame: str, source: str) -> None:
         """Add a value; a stamp far from the time by odometry counts when the next one confirms its clock."""
         now, held, self._held = self._clock.steady(), self._held, None
         if (frame, source) != (self.frame, self.source):
+            if source == self.source:
+                self._switched.append((now / NS, self.frame))
             self.frame, self.source, self._track = frame, source, Track(static=False, most=KEPT)
             self._tracks += 1
         elif abs(self._track.newest[0] + now - self._received - stamp) > CLOCK_BACK_NS:
@@ -126,6 +151,18 @@ class OdometryHistory:
         """The last step that is not possible, as a text, until a while after; empty where there is none."""
         jumps = self._track.jumps if len(self._track) else []
         return str(jumps[-1]) if jumps and self._track.newest[0] - jumps[-1].end < ENDED_SECONDS * NS else ""
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The frames that messages of the topic come in, if these alternate; else none."""
+        lately = [frame for when, frame in self._switched if self._clock.steady() / NS - when < ENDED_SECONDS]
+        return tuple(sorted({self.frame, *lately})) if len(lately) == SWITCHES else ()
+
+    @property
+    def apart(self) -> str:
+        """By how much messages and the transform between the same frames differ; empty where they do not."""
+        when, told = self._apart
+        return told if self._clock.steady() / NS - when < ENDED_SECONDS else ""
 
     def clock_offset(self, stamp: int, received: int) -> float:
         """Return how many seconds longer after its stamp a scan was received than odometry was; 0 without odometry."""

@@ -30,6 +30,12 @@ def told(stamp: int, x: float, frame: str = "odom") -> messages.Odometry:
     return message
 
 
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ros2.inputs.ENDED_SECONDS", "ros2.inputs.SILENT_SECONDS"):
+        monkeypatch.setattr(name, 1.0)
+
+
 def test_odometry_is_known_between_values_that_are_near_and_possible() -> None:
     odometry = OdometryHistory()
     for k in (*range(20), *range(50, 60)):
@@ -70,6 +76,60 @@ def test_transforms_are_odometry_until_messages_come() -> None:
     assert odometry.newest[1].x == 7.0
 
 
+def test_messages_and_transforms_that_differ_are_two_sources() -> None:
+    odometry = OdometryHistory()
+    for k in range(20):
+        odometry.take(told(k * TENTH, 0.112 * k), topic="/odom")  # wheels slip
+        odometry.take_transform(k * TENTH, matrix_in_space(linefix.RigidTransform(0.1 * k, 0.0, 0.0)), "odom")
+        assert bool(odometry.apart) == (k > 8)
+    assert odometry.apart == "0.23 m and 0 degrees"
+    for k in range(20, 23):
+        odometry.take_transform(k * TENTH, matrix_in_space(linefix.RigidTransform(0.112 * k, 0.0, 0.0)), "odom")
+        odometry.take(told(k * TENTH, 0.112 * k), topic="/odom")
+    assert not odometry.apart
+
+
+def test_messages_of_one_topic_in_two_frames_are_two_sources() -> None:
+    odometry = OdometryHistory()
+    for k in range(20):
+        odometry.take(told(k * TENTH, 0.1 * k, "odom" if k < 10 else "wheels"))
+    assert not odometry.frames  # one that began again
+    for k in range(20, 25):
+        odometry.take(told(k * TENTH, 0.1 * k, ("odom", "wheels")[k % 2]))
+    assert odometry.frames == ("odom", "wheels")
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [("tf", 'odometry on /odom and tf differ by 1.00 m and 0 degrees in "odom"'),
+     ("wheels", 'odometry on /odom alternates between the frames "odom" and "wheels"')],
+)  # fmt: skip
+def test_two_sources_of_odometry_are_named(
+    domain: int, room: linefix.MapIndex, soon: None, other: str, expected: str
+) -> None:
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain, agree=1, publish_tf=True), room, logged.append):
+        robot, tick = Fleet(domain), [10]
+        robot.mounts.publish(mount())
+
+        def play() -> None:
+            tick[0] += 1
+            second, at = 0.1 * tick[0], moved(1.0 + 0.01 * tick[0])
+            robot.drive(at, second)
+            if other != "tf":
+                robot.odometry.publish(told(tick[0] * TENTH, 0.0, other))
+                return
+            moves = messages.Transform(messages.Vector3(at.x + 2.0, at.y), quaternion(at.theta))
+            header = messages.Header(messages.Time(int(second), int(1e9 * (second % 1.0))), "odom")
+            robot.tf.publish(messages.TFMessage([messages.TransformStamped(header, "base_link", moves)]))
+
+        def named(status: messages.DiagnosticStatus) -> bool:
+            return bool({one.key: one.value for one in status.values}["input problem"] == expected)
+
+        assert robot.until(robot.status, play, named).level > 0
+        wait_until(lambda: any(line.startswith(expected) for line in logged), lambda: logged)
+
+
 def test_a_slow_robot_without_odometry_does_not_rest() -> None:
     slow = [linefix.RigidTransform(0.02 * k, 0.0, 0.0) for k in range(100)]  # 0.05 m/s
     assert first_agreed(drive(slow, odometry=False)) is None
@@ -103,12 +163,6 @@ def test_a_map_that_changes_keeps_the_agreed_pose(domain: int) -> None:
         grid.info.origin.position.x += 1.0
         robot.maps.publish(grid)
         wait_until(lambda: any("are new or gone, the pose is discarded" in line for line in logged), lambda: logged)
-
-
-@pytest.fixture
-def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ros2.inputs.ENDED_SECONDS", "ros2.inputs.SILENT_SECONDS"):
-        monkeypatch.setattr(name, 1.0)
 
 
 @pytest.mark.parametrize("seen", [None, False], ids=["no scans", "no ranges"])
