@@ -34,7 +34,7 @@ def opened(path: Path, source: TopicOptions, mount: RigidTransform | None = None
     with needing_formats(f"reading {existing(path).name}"):
         from formats import LogOptions, read_log
 
-        return read_log(path, LogOptions(source.topic, None, source.tf_namespace, mount, source.base))
+        return read_log(path, LogOptions(source.topic, source.odom, source.tf_namespace, mount, source.base))
 
 
 def mount_of(given: tuple[float, float, float] | None) -> RigidTransform | None:

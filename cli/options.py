@@ -70,6 +70,9 @@ class TopicOptions:
         Text, option("Namespace of transforms, in a bag of several robots: /robot1.", "NAMESPACE")
     ] = None
     base: Annotated[Text, option("Base frame of the robot. Default: base_link or base_footprint.", "FRAME")] = None
+    odom: Annotated[
+        Text, option("Topic of odometry, or frame of it in tf. Default: the frame odom, else a topic.", "SOURCE")
+    ] = None
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:

@@ -63,6 +63,11 @@ class Odometry:
         return cls(topic.outer, topic.topic, tree, path, topic.track, moving)
 
     @property
+    def name(self) -> str:
+        """The topic, or the frame of transforms: as an option chooses it."""
+        return self.source if self._messages is not None else self.outer
+
+    @property
     def stands(self) -> bool:
         """True where all poses are equal."""
         return not self.moving
@@ -97,7 +102,7 @@ class Odometry:
             "odometry_contradicts",
             f"odometry of {shown(self.source)} and {shown(other.source)} contradict each other, by up to {told}, the "
             f"first from stamp {found[len(self._contradicted)][0] / NS:.3f} to {found[-1][1] / NS:.3f}; it is not used "
-            "there. Record the log without the wrong one",
+            f"there. Choose one with the option odometry (--odom {shown(self.name)} or --odom {shown(other.name)})",
             len(found) - len(self._contradicted),
         )
         return replace(self, _contradicted=_joined(found))

@@ -28,8 +28,10 @@ class LogOptions:
     topic : str or None
         Of the scans; None: the one with most of them. In a CARMEN log the kind of line, such as ``FLASER``; None: the
         first kind.
-    pose_frame : str or None
-        Frame that the poses are wanted in; None: ``odom`` where the log has it, else the outermost that moves.
+    odometry : str or None
+        Where the poses come from: a topic of Odometry messages, or a frame of the transforms that they are in; other
+        sources are not compared with it. None: ``odom`` where the log has it, else the outermost frame that moves, else
+        the likeliest topic.
     tf_namespace : str or None
         Of a bag of several robots, the namespace of the transforms, such as ``/robot1``; None: that of the scans.
     mount : RigidTransform or None
@@ -39,7 +41,7 @@ class LogOptions:
     """
 
     topic: str | None = None
-    pose_frame: str | None = None
+    odometry: str | None = None
     tf_namespace: str | None = None
     mount: RigidTransform | None = None
     base: str | None = None

@@ -20,7 +20,7 @@ from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
 from .tracks import NS, Floats
 from .transforms import Transforms, planar
-from .trees import BagFrames
+from .trees import BagFrames, OdometryTopic
 from .tuning import FASTEST, MOST_TILT, SAID_TILT
 
 NAMELESS = "'', the empty frame_id of the scans: set it in the driver"
@@ -220,18 +220,14 @@ class Sensors:
 
     def _odometry(self, topic: str, namespace: str, tree: Transforms, frame: str) -> Odometry | None:
         """Return the odometry of a frame: frames that move, else Odometry messages; None where there is none."""
-        wanted = self._options.pose_frame
-        if wanted is not None:
-            path = tree.path(wanted, frame)
-            return None if path is None or len(path) < 2 else self._doubted(Odometry.of_tree(tree, path))
+        if self._options.odometry is not None:
+            return self._doubted(self._chosen(self._options.odometry, tree, frame))
         paths = [tree.path(outer, frame) or [frame] for outer in outer_frames(tree, frame)]
         moving = next((path for path in paths if moves(tree, path, self._bases)), None)
         above = tree.above(frame)
         base = base_of(above, self._bases)
         fitting = self._frames.odometry_of(topic, namespace, above, base)
-        others = [
-            Odometry.of_messages(tree, tree.path(one.child or base or frame, frame) or [frame], one) for one in fitting
-        ]
+        others = [self._of_messages(tree, frame, one) for one in fitting]
         if moving is not None:
             return self._doubted(Odometry.of_tree(tree, moving), others)
         if not fitting:
@@ -240,6 +236,24 @@ class Sensors:
         found, *others = others
         self._note_messages(found, [one.source for one in others])
         return self._doubted(found, others)
+
+    def _of_messages(self, tree: Transforms, frame: str, topic: OdometryTopic) -> Odometry:
+        child = topic.child or base_of(tree.above(frame), self._bases) or frame
+        return Odometry.of_messages(tree, tree.path(child, frame) or [frame], topic)
+
+    def _chosen(self, source: str, tree: Transforms, frame: str) -> Odometry:
+        """Return the odometry of a topic, or in a frame."""
+        topics = {one.topic: one for one in self._frames.odometry}
+        if source in topics:
+            return self._of_messages(tree, frame, topics[source])
+        path = tree.path(source.strip("/"), frame)
+        if path is None or len(path) < 2:
+            there = ", ".join(map(shown, (*topics, *tree.above(frame)[1:]))) or "none"
+            raise IncompleteFileError(
+                f"no odometry from {shown(source)}: expected a topic of Odometry messages or a frame above "
+                f"{shown(frame)}, found {there}; correct the option odometry (--odom)"
+            )
+        return Odometry.of_tree(tree, path)
 
     def _doubted(self, found: Odometry, others: Sequence[Odometry] = ()) -> Odometry:
         for other in others:

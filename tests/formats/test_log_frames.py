@@ -155,7 +155,7 @@ def test_a_frame_may_have_several_parents(tmp_path: Path) -> None:
     assert near(scan.pose, 1.2, 0.0, 0.0)
     assert near(scan.mount, 0.2, 0.0, 0.0)
     assert "several_parents" in codes(log)
-    assert near(next(iter(read_log(path, LogOptions(pose_frame="map")))).pose, 41.2, 0.0, 0.0)
+    assert near(next(iter(read_log(path, LogOptions(odometry="map")))).pose, 41.2, 0.0, 0.0)
 
 
 def circle(bag: Robots) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from formats import LoggedScan, LogOptions, read_log
+from formats import IncompleteFileError, LoggedScan, LogOptions, read_log
 from registration import RigidTransform
 
 from .bags import FOUR_BEAMS, SECOND, UP, Robots, codes, fixed, read
@@ -219,3 +219,11 @@ def test_two_sources_that_contradict_each_other_are_named(
     told = [note.message for note in log.report.assumed if note.code == "odometry_contradicts"]
     assert len(told) == (not known)
     assert known or all(one in told[0] for one in ("tf" if by_tf else "/odom", "/wheels", "within 2.0 s", "stamp 10"))
+    for source, factor in (("odom" if by_tf else "/odom", 1.0), ("/wheels", scale)):
+        assert known or f"--odom {source}" in told[0]
+        chosen = read_log(bag.path, LogOptions(odometry=source))
+        first = 4.5 * factor + 0.2 + shift * (source == "/wheels")  # the laser is 0.2 m ahead
+        assert [scan.pose and scan.pose.x for scan in chosen] == pytest.approx([first, first + 4.5 * factor])
+        assert "odometry_contradicts" not in codes(chosen)
+    with pytest.raises(IncompleteFileError, match=r"no odometry from /rtk: expected a topic .*, found .*/wheels"):
+        list(read_log(bag.path, LogOptions(odometry="/rtk")))

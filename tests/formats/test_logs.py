@@ -146,7 +146,7 @@ def test_a_bag_gives_scans_where_tf_has_the_sensor(tmp_path: Path, kind: str) ->
     assert log.report.format == {"bag": "rosbag1", "sqlite3": "rosbag2", "mcap": "rosbag2"}[kind]
     counts = {n.code: n.count for n in (*log.report.read, *log.report.dropped)}
     assert counts == {"scans": 4, "transforms": 4, "no_pose": 1}
-    in_map = next(iter(read_log(bag.path, LogOptions(pose_frame="map"))))
+    in_map = next(iter(read_log(bag.path, LogOptions(odometry="map"))))
     assert near(in_map.pose, 101.5, 0.1, 0.0)
 
 
