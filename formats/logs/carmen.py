@@ -94,7 +94,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             continue
         stamps.of(scan.stamp_ns)
         notes.add_read("scans", f"{kind} scans", 1)
-        moves = _moves(path, kind) if moves is None else moves
+        moves = _moves(path, kind, settings) if moves is None else moves
         if scan.pose is not None and not moves:
             notes.add_assumed("no_odometry", "no odometry was found: in all scans the robot is at 0, 0, 0")
             scan = replace(scan, pose=None, pose_frame="")
@@ -106,13 +106,13 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
         raise IncompleteFileError(f"has no {wanted or 'scan'}; it has {there}")
 
 
-def _moves(path: Path, kind: str) -> bool:
+def _moves(path: Path, kind: str, settings: Settings) -> bool:
     """Tell whether the robot is anywhere but at 0, 0, 0 in the scans of a kind, up to the first such scan."""
     for _, words in _messages(path, Notes()):
         if words[0] != kind:
             continue
         try:
-            scan = _scan_of(words, {}, Notes())
+            scan = _scan_of(words, settings, Notes())
         except (InputError, ValueError, LookupError, OverflowError):
             continue
         if scan.pose is None or scan.pose != scan.mount:
@@ -159,8 +159,8 @@ def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple
     step = _setting(settings, f"laser_{side}_laser_resolution")
     field = _setting(settings, f"laser_{side}_laser_fov")
     why, spaces = "by the PARAM of the log", max(1, n - 1)
-    if step and step < FINEST:
-        step, field = math.degrees(step), field and math.degrees(field)
+    if 0.0 < (step or (field or 0.0) / spaces) < FINEST:
+        step, field = step and math.degrees(step), field and math.degrees(field)
         why += ", which has radians"
     if step and field and min(abs(n * step - field), abs((n - 1) * step - field)) > 1.5 * step:
         why, step, field = f"because its PARAM {field:g} and {step:g} degrees contradict each other", None, None
@@ -168,10 +168,13 @@ def _field_of_view(n: int, settings: Settings, side: str, notes: Notes) -> tuple
         field = n * step if n % 2 == 0 and n * step in (180.0, 360.0) else (n - 1) * step
     elif not (step or field):
         why = "by the number of ranges"
+    remedy = f"put a line such as `PARAM laser_{side}_laser_fov 240`, in degrees, in front of the scans"
+    if "contradict" in why:
+        remedy = f"correct the lines `PARAM laser_{side}_laser_fov` and `PARAM laser_{side}_laser_resolution`"
     if not (step or field or n in FIELDS_OF_VIEW or n in HALF_TURN or n <= FEW_BEAMS):
         raise IncompleteFileError(
             f"found {n} ranges, whose field of view neither a PARAM nor the number of ranges says, expected a known "
-            f"scanner; put the line `PARAM laser_{side}_laser_fov DEGREES` in front of the scans",
+            f"scanner; {remedy}",
             argument="ranges",
         )
     if n not in FIELDS_OF_VIEW and n % 2 == 0 and field in (None, n * step if step else field):

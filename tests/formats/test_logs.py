@@ -20,6 +20,7 @@ from formats import (
     read_log,
     read_map,
 )
+from registration import RigidTransform
 
 from .bags import FOUR_BEAMS, GRID, KINDS, SECOND, Robots, near, yawed
 
@@ -67,6 +68,7 @@ FIELD, STEP = "PARAM laser_front_laser_fov", "PARAM laser_front_laser_resolution
         (f"{FIELD} 190\n", 191, -95, 95, "by the PARAM"), (f"{FIELD} 180\n{STEP} 1.0\n", 180, -90, 89, None),
         (f"{FIELD} 240\n{STEP} 0.36\n", 667, -120, 119.76, "by the PARAM"),
         (f"{FIELD} 180\n{STEP} 0.25\n", 541, -135, 135, "contradict"),
+        (f"{FIELD} 4.18879\n", 301, -120, 120, "which has radians"),
         (f"{FIELD} 4.712389\n{STEP} 0.00872665\n", 541, -135, 135, "which has radians"),
     ],
 )  # fmt: skip
@@ -80,12 +82,17 @@ def test_the_field_of_view_of_flaser(
     assert (said is None and not found) or (said is not None and said in found[0])
 
 
-@pytest.mark.parametrize("params", ["", f"{FIELD} 180\n{STEP} 0.25\n"])
+@pytest.mark.parametrize(
+    ("params", "remedy"), [("", f"`{FIELD} 240`"), (f"{FIELD} 180\n{STEP} 0.25\n", f"correct .*{FIELD}.*{STEP}")]
+)
 @pytest.mark.parametrize("beams", [500, 1440])
-def test_an_unknown_number_of_beams_needs_a_param(tmp_path: Path, params: str, beams: int) -> None:
-    log = read_log(written(tmp_path, f"{params}FLASER {beams} {'1.0 ' * beams} 0 0 0 0 0 0 1 host 1\n"))
-    with pytest.raises(MalformedFileError, match=f"{beams} ranges.*`PARAM laser_front_laser_fov DEGREES`"):
-        list(log)
+def test_an_unknown_number_of_beams_needs_a_param(tmp_path: Path, params: str, remedy: str, beams: int) -> None:
+    scan = f"FLASER {beams} {'1.0 ' * beams} 1 0 0 1 0 0 1 host 1\n"
+    with pytest.raises(MalformedFileError, match=f"{beams} ranges.*{remedy}"):
+        list(read_log(written(tmp_path, params + scan)))
+    log = read_log(written(tmp_path, f"{FIELD} 240\n{scan}"))
+    assert [found.pose for found in log] == [RigidTransform(1.0, 0.0, 0.0)]
+    assert "no_odometry" not in {note.code for note in log.report.assumed}
 
 
 def test_settings_that_are_used_are_not_dropped(tmp_path: Path) -> None:
