@@ -14,17 +14,11 @@ from simulation import Scanner, SimulationError, scan
 
 from .buildings import FAMILIES, Style
 from .changes import clutter
-from .conditions import CONDITIONS, Stranger
+from .conditions import BEAMS, CONDITIONS, RANGE_MAX, Stranger
 from .map_errors import clipped
 from .places import free_place
 
 Floats = NDArray[np.float64]
-
-BEAMS = 720
-RANGE_MIN = 0.05  # m
-RANGE_MAX = (20.0, 30.0)  # m
-SIGMA = (0.01, 0.03)  # m
-FIELDS_OF_VIEW = (1.5 * math.pi, math.tau)
 
 RADIUS = (2.0, 6.0)  # m; of a window
 BEYOND = (1.0, 15.0)  # m; by how much the truth lies outside of it
@@ -137,7 +131,7 @@ def _attempt(world: str, condition: str, number: int, rng: np.random.Generator) 
         pose, known = _unmapped_part(building.segments, standing, rng)
     if known is None:
         return None
-    declared = _laser(rng, full_turn=rule.full_turn)
+    declared = rule.draw_laser(rng)
     laser = rule.laser(declared, rng)
     people, share = np.zeros((0, 4)), 0.0
     if rule.clutter > 0.0:
@@ -166,13 +160,6 @@ def _attempt(world: str, condition: str, number: int, rng: np.random.Generator) 
         clutter=share,
         shown=known,
     )
-
-
-def _laser(rng: np.random.Generator, *, full_turn: bool) -> Scanner:
-    """Draw what a laser is declared to be."""
-    view = float(rng.choice(FIELDS_OF_VIEW)) if full_turn else FIELDS_OF_VIEW[0]
-    reach, sigma = rng.uniform(*RANGE_MAX), rng.uniform(*SIGMA)
-    return Scanner.over(view, BEAMS, range_min=RANGE_MIN, range_max=reach, sigma=sigma)
 
 
 def _searched(world: str, style: Style, own: Segments, stranger: Stranger | None, rng: np.random.Generator) -> Segments:

@@ -16,6 +16,16 @@ from .buildings import Building
 from .changes import rearranged, with_doors
 from .map_errors import DrawnMap, exact, in_pieces, stretched, walls_off
 
+BEAMS = 720
+RANGE_MIN = 0.05  # m
+RANGE_MAX = (20.0, 30.0)  # m
+SIGMA = (0.01, 0.03)  # m
+FIELDS_OF_VIEW = (1.5 * math.pi, math.tau)
+# Of depth cameras, and of lasers whose view the robot's body limits:
+FEW_BEAMS = 240
+SHORT_RANGE_MAX = (4.0, 10.0)  # m
+NARROW_FIELDS_OF_VIEW = (math.radians(60.0), math.radians(180.0))
+
 SWEEP = 0.1  # s; of a full turn of the laser
 TURNING = math.radians(90.0)  # rad/s
 WRONG_STEP = 0.005  # share of the angle between two beams
@@ -29,6 +39,27 @@ class Stranger(StrEnum):
     OTHER_TYPE = "the map is of another kind of building"
     MIRRORED = "the laser is mounted upside down, without notice"
     WINDOW = "the window that is searched does not hold the truth"
+
+
+def any_laser(rng: np.random.Generator) -> Scanner:
+    """Draw a laser of 270 or 360 degrees."""
+    return _laser(float(rng.choice(FIELDS_OF_VIEW)), rng)
+
+
+def laser_of_270_degrees(rng: np.random.Generator) -> Scanner:
+    """Draw a laser of 270 degrees."""
+    return _laser(FIELDS_OF_VIEW[0], rng)
+
+
+def short_sighted(rng: np.random.Generator) -> Scanner:
+    """Draw a laser that sees little: 60 to 180 degrees and 4 to 10 m."""
+    view, reach, sigma = rng.uniform(*NARROW_FIELDS_OF_VIEW), rng.uniform(*SHORT_RANGE_MAX), rng.uniform(*SIGMA)
+    return Scanner.over(view, FEW_BEAMS, range_min=RANGE_MIN, range_max=reach, sigma=sigma)
+
+
+def _laser(view: float, rng: np.random.Generator) -> Scanner:
+    reach, sigma = rng.uniform(*RANGE_MAX), rng.uniform(*SIGMA)
+    return Scanner.over(view, BEAMS, range_min=RANGE_MIN, range_max=reach, sigma=sigma)
 
 
 def as_mapped(building: Building, _rng: np.random.Generator) -> Building:
@@ -57,8 +88,8 @@ class Condition:
         From what the map should show to what it does.
     laser : callable
         From the laser as it is declared to what it really is.
-    full_turn : bool
-        True if lasers of 360 degrees occur; else all see 270.
+    draw_laser : callable
+        The laser as it is declared.
     corrected : bool
         True if the beams' angles are declared as they really are: the robot knows how fast it turned.
     stranger : Stranger or None
@@ -70,7 +101,7 @@ class Condition:
     clutter: float = 0.0
     draw_map: Callable[[Segments, np.random.Generator], DrawnMap] = exact
     laser: Callable[[Scanner, np.random.Generator], Scanner] = as_declared
-    full_turn: bool = True
+    draw_laser: Callable[[np.random.Generator], Scanner] = any_laser
     corrected: bool = False
     stranger: Stranger | None = None
 
@@ -142,11 +173,11 @@ CONDITIONS: dict[str, Condition] = {
     "bias": Condition("all ranges are too long or too short by 2 cm", laser=_biased),
     "noisier": Condition("the noise is declared two times too small", laser=_noisier),
     "wrong_step": Condition("the angle between two beams is declared wrong by half a percent",
-                            laser=_wrong_step, full_turn=False),
+                            laser=_wrong_step, draw_laser=laser_of_270_degrees),
     "turning": Condition("the robot turns at 90 degrees/s, ten scans a second", laser=_turning,
-                         full_turn=False),
+                         draw_laser=laser_of_270_degrees),
     "turning_corrected": Condition("the robot turns at 90 degrees/s and corrects its scan for it",
-                                   laser=_turning, full_turn=False, corrected=True),
+                                   laser=_turning, draw_laser=laser_of_270_degrees, corrected=True),
     "saturated": Condition("a beam without return reads range_max", laser=_saturated),
     "unmapped": Condition("from a part of the building that is not mapped", stranger=Stranger.UNMAPPED),
     "sister": Condition("in another building of the same style", stranger=Stranger.SISTER),
@@ -163,5 +194,11 @@ CONDITIONS: dict[str, Condition] = {
                                   stranger=Stranger.OTHER_TYPE),
     "rough_mirrored": Condition("mirrored, and rough", today=rearranged, draw_map=_with_some_error,
                                 laser=_upside_down, stranger=Stranger.MIRRORED),
+    "narrow": Condition("from a laser that sees little, in a building that has changed", today=rearranged,
+                        draw_laser=short_sighted),
+    "narrow_unmapped": Condition("unmapped, and narrow", today=rearranged, draw_laser=short_sighted,
+                                 stranger=Stranger.UNMAPPED),
+    "narrow_sister": Condition("sister, and narrow", today=rearranged, draw_laser=short_sighted,
+                               stranger=Stranger.SISTER),
     "window": Condition("in a window that does not hold the truth", stranger=Stranger.WINDOW),
 }  # fmt: skip
