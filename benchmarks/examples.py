@@ -48,9 +48,9 @@ ROOM_SIZE = 4.0  # m; of every other four drawn maps, what lies so near to one p
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
-# A robot off its map is in another part of its building, or in a building of the same style. What is told easily would
-# only make these seem rare; it is reported.
-EASILY_TOLD = ("other_type", "rough_other_type", "mirrored", "rough_mirrored")
+# A robot off its map is in another part of its building, or in a building of the same style. Another kind of building
+# is told without being fitted on, and would make these seem rare; it is reported.
+EASILY_TOLD = ("other_type", "rough_other_type")
 
 
 @dataclass(frozen=True, slots=True)
