@@ -1,6 +1,6 @@
 """Buildings and cases are drawn as they were: figures of benchmarks compare only while the same seed draws the same.
 
-After a change that is meant to draw others: ``python -m tests.simulation.test_as_drawn``.
+After a change that is meant to draw others: ``python -m tests.benchmarks.worlds.test_as_drawn``.
 """
 
 from __future__ import annotations
