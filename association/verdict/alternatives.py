@@ -22,8 +22,12 @@ from .kernels.things import compare_things
 from .tuning import (
     COMPARED,
     COUNTED,
+    LEAST_THING,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
+    MOVED_BEFORE,
+    OF_A_THING,
+    SEEN_BEFORE,
     UNCOUNTED,
 )
 
@@ -64,8 +68,8 @@ def compare(
     Each explanation is matched again with wide gates, since of many similar places the one that fits best shows smaller
     errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
     what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
-    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most, and one thing
-    alone never decides.
+    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most, less where more
+    of the scan is not on the map, and one thing alone never decides.
     """
     others = tuple(others[:COMPARED])
     if not others:
@@ -109,7 +113,18 @@ def _gaps(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: floa
         rows = context.index.obstacles.walls[table["wall"]]
         lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
         values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
-    return np.asarray(compare_things(values, distances, beams.rows))
+    return np.asarray(compare_things(values, distances, beams.rows, _of_a_thing(context, sets[0])))
+
+
+def _of_a_thing(context: SearchContext, best: ConsensusSet) -> float:
+    """Return the most that a thing counts, nats: the log odds that it was not moved.
+
+    A scan of which much is not on the map was taken where much has moved.
+    """
+    things = context.lines.rows["length"] > LEAST_THING
+    moved = int((things & (best.parts < 0.5)).sum())
+    share = (moved + MOVED_BEFORE) / (int(things.sum()) + SEEN_BEFORE)
+    return min(OF_A_THING, math.log((1.0 - share) / share)) if share < 0.5 else 0.0
 
 
 def _loose_sigma(context: SearchContext, wall_sigma: float) -> float | None:

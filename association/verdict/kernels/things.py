@@ -11,11 +11,11 @@ from registration.layout import Floats, Records
 
 from ...index.kernels.walls import root_of
 from ...scan.kernels.joining import ascending
-from ..tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
+from ..tuning import LEAST_OF_BEAM, THING_WIDTH, THINGS_APART
 
 
 @kernel
-def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
+def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing: float) -> Floats:
     """Return by how much the first explanation has more evidence than each other, each thing within its limit, nats.
 
     Places at which two explanations differ are one thing if they are no farther than `THINGS_APART` from one another.
@@ -28,6 +28,8 @@ def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
         From the sensor to the thing that a value speaks of, metres.
     beams : (m,) of `BEAM`
         From where each place is seen, and its direction.
+    of_a_thing : float
+        The most that a thing counts, nats.
     """
     gaps = np.zeros(len(values) - 1)
     m = len(beams)
@@ -64,6 +66,6 @@ def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
         for one in range(count):
             if thing[one] == one:
                 width = math.hypot(high[one, 0] - low[one, 0], high[one, 1] - low[one, 1])
-                limit = OF_A_THING * max(1.0, width / THING_WIDTH)
+                limit = of_a_thing * max(1.0, width / THING_WIDTH)
                 gaps[other - 1] += min(limit, max(-limit, total[one]))
     return gaps

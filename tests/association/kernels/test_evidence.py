@@ -15,7 +15,7 @@ from association.consensus.tuning import MAX_OTHERS, SIGHT_TOLERANCE
 from association.layout import BEAM, ENDS, MATCH, SHOWN, WALL, as_records, record
 from association.tables import Pieces
 from association.verdict.kernels.things import compare_things
-from association.verdict.tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
+from association.verdict.tuning import LEAST_OF_BEAM, THING_WIDTH, THINGS_APART
 from registration.layout import POSE
 
 from .reference import SEEDS
@@ -28,7 +28,7 @@ def test_things_are_connected_places(seed: int) -> None:
     beams, angles = np.zeros(m, BEAM), rng.uniform(-math.pi, math.pi, m)
     beams["dx"], beams["dy"] = np.cos(angles), np.sin(angles)
     values, distances = rng.normal(0.0, 2.0, (3, m)) * (rng.random((3, m)) < 0.5), rng.uniform(0.5, 5.0, (3, m))
-    expected = []
+    of_a_thing, expected = float(rng.uniform(0.0, 3.0)), []
     for other in (1, 2):
         more = values[0] - values[other]
         differs = np.abs(more) > LEAST_OF_BEAM
@@ -39,10 +39,10 @@ def test_things_are_connected_places(seed: int) -> None:
         gap = 0.0
         for one in range(count):
             width = math.hypot(*np.ptp(places[thing == one], axis=0))
-            limit = OF_A_THING * max(1.0, width / THING_WIDTH)
+            limit = of_a_thing * max(1.0, width / THING_WIDTH)
             gap += float(np.clip(more[differs][thing == one].sum(), -limit, limit))
         expected.append(gap)
-    assert np.allclose(compare_things(values, distances, beams), expected)
+    assert np.allclose(compare_things(values, distances, beams, of_a_thing), expected)
 
 
 @given(seed=SEEDS)
