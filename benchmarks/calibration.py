@@ -6,8 +6,8 @@ feature speaks so. An answer is right with the probability ``m / (1 + exp(-a) + 
 among its alternatives. All three kinds are fitted at once, by their likelihood: scans of floor plans (three levels of
 clutter), of logs and of drawn worlds, as segments and with their raw ranges, and scans of parts of drawn buildings that
 their map does not show, of buildings of the same style, and mirrored ones. Out-of-map scans that no scan could tell are
-left out: all that these teach is to mistrust a scan that fits without fault. Those of other kinds of buildings are told
-without that, and are reported only: among them the others would seem rare.
+left out, since the model would learn no more from them than to mistrust a scan that fits without fault. Those of other
+kinds of buildings are reported only: the others would seem rare among them.
 
 The report of an answer comes from a fit without its building, its log or its world; the coefficients come from all of
 these. The drawn worlds that ``python -m benchmarks worlds`` reports on are never fitted on.

@@ -48,8 +48,8 @@ ROOM_SIZE = 4.0  # m; of every other four drawn maps, what lies so near to one p
 BLOCKS = 32  # in which cases are searched
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
-# A robot off its map is in another part of its building, or in a building of the same style. Another kind of building
-# is told without being fitted on, and would make these seem rare; it is reported.
+# A robot off its map is in another part of its building, or in a building of the same style. Scans from another
+# kind of building are recognized without a fit, and these would seem rare among them; they are reported.
 EASILY_TOLD = ("other_type", "rough_other_type")
 
 
