@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from benchmarks.worlds import FAMILIES, Case, draw_case
-from benchmarks.worlds.cases import RANGE_MAX, _unmapped_part
+from benchmarks.worlds.cases import _unmapped_part
+from benchmarks.worlds.conditions import RANGE_MAX
 from benchmarks.worlds.places import distances
 from registration.layout import Floats
 from simulation import Scanner, scan
