@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from association import CancelledError, Deadline, MapIndex, Scan, associate, scaled
+from association import AssociationOptions, CancelledError, Deadline, MapIndex, Scan, associate, scaled
 from map_quality import Sample, SampleReport, conclude, try_sample
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
@@ -62,7 +62,6 @@ def test_nothing_is_told_of_a_map_that_is_right() -> None:
     assert report.usable_as_advised >= report.usable
 
 
-@pytest.mark.xfail(strict=True, reason="thickness is found in place of centre_lines and undirected")
 def test_lines_along_the_middle_of_walls() -> None:
     """Nearly none was usable without a recipe; the advice is one, and half of a wall's thickness is in it."""
     report = told(centre_lines())
@@ -135,7 +134,7 @@ def test_scans_that_see_nothing_show_nothing() -> None:
 
 def test_a_scan_is_usable_here_as_it_is_where_it_is_asked() -> None:
     index = index_of(faces())
-    asked = [associate(index, scan).usable for _, scan in sampled()]
+    asked = [associate(index, scan, options=AssociationOptions(on_map=1.0)).usable for _, scan in sampled()]
     samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]
     assert [one.result.usable for one in samples] == asked
     assert sum(asked) > len(asked) / 2

