@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SHOWN = 3  # places of a finding
 BETTER = {"mirrored", "reversed", "undirected", "centre_lines", "scale"}  # findings by scans
-AS_IT_IS = "; no better mirrored, reversed, undirected or at another scale"
+AS_IT_IS = "; no better mirrored, reversed, without directions or at another scale"
 SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
 
