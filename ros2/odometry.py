@@ -203,7 +203,7 @@ class OdometryHistory:
     def known(self, stamp: int, received: int | None = None, *, doubted: bool = False) -> Known | None:
         """Return odom_from_base of something with a stamp and a time of reception; None where it is not known.
 
-        Where scans contradict it (`doubted`), it is known only if `same_place`.
+        If scans contradict the odometry (`doubted`), the pose is known only where `same_place` holds.
         """
         known = self._track.known(stamp, received) if len(self._track) else None
         if known is None or (doubted and received is not None and not self.same_place(stamp, received)):

@@ -29,9 +29,9 @@ class LogOptions:
         Of the scans; None: the one with most of them. In a CARMEN log the kind of line, such as ``FLASER``; None: the
         first kind.
     odometry : str or None
-        Where the poses come from: a topic of Odometry messages, or a frame of the transforms that they are in; other
-        sources are not compared with it. None: ``odom`` where the log has it, else the outermost frame that moves, else
-        the likeliest topic.
+        Source of the poses: a topic of Odometry messages, or the name of a frame of the transforms. Other sources are
+        not compared with it. None: ``odom`` where the log has it, else the outermost frame that moves, else the
+        likeliest topic.
     tf_namespace : str or None
         Of a bag of several robots, the namespace of the transforms, such as ``/robot1``; None: that of the scans.
     mount : RigidTransform or None
