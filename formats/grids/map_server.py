@@ -103,7 +103,7 @@ def read_grid(
         )
     if not picture.exists():
         raise IncompleteFileError(
-            f"names the picture {shown(told.image)}, but its folder has no such file; copy the picture there"
+            f"names the picture {shown(told.image)}, but there is no such file in its folder; copy the picture there"
         )
     with naming(name_of(picture)):
         pixels, alpha = read_picture(picture)
