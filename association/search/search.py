@@ -20,7 +20,8 @@ from ..options import AssociationOptions
 from ..result import SearchReport
 from ..tables import ScoreRules
 from ..tuning import COMPLETE_ABOVE, DISTINCT_ANGLE, DISTINCT_DISTANCE
-from .kernels.proposals import rank_bases, reject, slide_line, sweep_base
+from .kernels.bases import rank_bases
+from .kernels.proposals import reject, slide_line, sweep_base
 from .stopping import StoppingRule, random_order
 from .tuning import (
     BASE_LINES,
