@@ -146,7 +146,7 @@ class Recording:
 
 
 class Robots:
-    """A bag of either ROS with scans, transforms and odometry of any topics."""
+    """A bag of either ROS with scans, transforms and odometry of any topics; what writes to it returns it."""
 
     def __init__(self, kind: str, folder: Path) -> None:
         self.messages = Messages("ros1" if kind == "bag" else "cdr")
@@ -156,52 +156,49 @@ class Robots:
         self.topics: dict[str, Any] = {}
         self.writer.open()
 
-    def write(self, topic: str, kind: str, ns: int, data: bytes) -> None:
+    def write(self, topic: str, kind: str, ns: int, data: bytes) -> Robots:
         if topic not in self.topics:
             self.topics[topic] = self.writer.add_connection(topic, kind, typestore=TYPES[self.messages.encoding])
         self.writer.write(self.topics[topic], ns, data)
+        return self
 
-    def scan(self, ns: int, topic: str = "/scan", frame: str = "laser", laser: Laser = FOUR_BEAMS) -> None:
-        self.write(topic, SCAN, ns, self.messages.scan(ns, laser, frame))
+    def scan(self, ns: int, topic: str = "/scan", frame: str = "laser", laser: Laser = FOUR_BEAMS) -> Robots:
+        return self.write(topic, SCAN, ns, self.messages.scan(ns, laser, frame))
 
     def transform(
-        self,
-        topic: str,
-        ns: int,
-        parent: str,
-        child: str,
-        place: Place = (0.0, 0.0, 0.0),
-        turn: Quaternion = UP,
-    ) -> None:
+        self, topic: str, ns: int, parent: str, child: str, place: Place = (0.0, 0.0, 0.0), turn: Quaternion = UP
+    ) -> Robots:
         make = self.messages
         value = make.geometry("Transform", make.geometry("Vector3", *place), make.geometry("Quaternion", *turn))
         one = make.geometry("TransformStamped", make.header(ns, parent), child, value)
-        self.write(topic, TF, ns, make.encoded(make.type(TF, [one]), TF))
+        return self.write(topic, TF, ns, make.encoded(make.type(TF, [one]), TF))
 
-    def drive(self, topic: str, parent: str, child: str, speed: float = 1.0) -> None:
+    def fixed(self, *chain: str, topic: str = "/tf_static") -> Robots:
+        for parent, child in pairwise(chain):
+            self.transform(topic, 0, parent, child, (0.2, 0.0, 0.3))
+        return self
+
+    def drive(self, topic: str, parent: str, child: str, speed: float = 1.0) -> Robots:
         for k in range(5):
             self.transform(topic, k * SECOND // 2, parent, child, (0.5 * speed * k, 0.0, 0.0))
+        return self
 
-    def says(self, ns: int, x: float, child: str = "base_link", topic: str = "/odom", turn: Quaternion = UP) -> None:
+    def rotate(self, parent: str, child: str, step: float) -> Robots:
+        for k in range(5):
+            self.transform("/tf", k * SECOND // 2, parent, child, (0.1, 0.0, 0.0), yawed(step * k))
+        return self
+
+    def says(self, ns: int, x: float, child: str = "base_link", topic: str = "/odom", turn: Quaternion = UP) -> Robots:
         kind, make = "nav_msgs/msg/Odometry", self.messages
         zero, sure = make.geometry("Vector3", 0.0, 0.0, 0.0), np.zeros(36)
         speed = make.geometry("TwistWithCovariance", make.geometry("Twist", zero, zero), sure)
         pose = make.geometry("PoseWithCovariance", make.pose((x, 0.0, 0.0), turn), sure)
-        self.write(topic, kind, ns, make.encoded(make.type(kind, make.header(ns, "odom"), child, pose, speed), kind))
+        message = make.type(kind, make.header(ns, "odom"), child, pose, speed)
+        return self.write(topic, kind, ns, make.encoded(message, kind))
 
     def done(self) -> Path:
         self.writer.close()
         return self.path
-
-
-def fixed(bag: Robots, *chain: str, topic: str = "/tf_static") -> None:
-    for parent, child in pairwise(chain):
-        bag.transform(topic, 0, parent, child, (0.2, 0.0, 0.3))
-
-
-def codes(log: Log) -> dict[str, int]:
-    report = log.report
-    return {note.code: note.count for note in (*report.dropped, *report.assumed)}
 
 
 def read(bag: Robots, options: LogOptions | None = None) -> tuple[list[LoggedScan], Log]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, read_map
 
 from .bags import BEGUN, GRID, Recording, grid_bytes
+from .reading import notes
 
 
 def room() -> Any:
@@ -36,48 +36,46 @@ def inflated(cells: Any) -> Any:
 MAP, COSTS = room(), inflated(room())
 
 
-def read(tmp_path: Path, grids: dict[str, Any], topic: str | None = None, times: int = 1) -> ImportedMap:
-    recording = Recording(tmp_path / "a.mcap")
+def read(recording: Recording, grids: dict[str, Any], times: int = 1) -> ImportedMap:
     for name, cells in grids.items():
         for k in range(1 if cells is MAP else times):
             recording.put(name, BEGUN + k, grid_bytes(cells), GRID)
-    return read_map(recording.done(), ImportOptions(topic=topic))
+    return read_map(recording.done())
 
 
 @pytest.mark.parametrize("first", ["/map", "/robot1/map", "/slam/map", "/cartographer_grid"])
 @pytest.mark.parametrize("other", ["/global_costmap/costmap", "/move_base/local_costmap/costmap", "/navigation/grid"])
-def test_the_map_is_taken_and_not_costmaps(tmp_path: Path, first: str, other: str) -> None:
-    imported = read(tmp_path, {other: COSTS, first: MAP}, times=5)
+def test_the_map_is_taken_and_not_costmaps(recording: Recording, first: str, other: str) -> None:
+    imported = read(recording, {other: COSTS, first: MAP}, times=5)
     assert len(imported.map.segments) == 4
-    (note,) = [note for note in imported.report.assumed if note.code == "topic"]
-    assert note.message.startswith(f"the grid of {first} (60 x 50 cells of 0.1 m) is the map; not {other} (60 x 50")
+    message = notes(imported)["topic"].message
+    assert message.startswith(f"the grid of {first} (60 x 50 cells of 0.1 m) is the map; not {other} (60 x 50")
 
 
-def test_a_topic_called_map_goes_before_others(tmp_path: Path) -> None:
-    imported = read(tmp_path, {"/a": MAP, "/map": MAP, "/robot/map": MAP})
-    assert "the grid of /map " in next(note.message for note in imported.report.assumed if note.code == "topic")
+def test_a_topic_called_map_goes_before_others(recording: Recording) -> None:
+    imported = read(recording, {"/a": MAP, "/map": MAP, "/robot/map": MAP})
+    assert "the grid of /map " in notes(imported)["topic"].message
 
 
 @pytest.mark.parametrize(
     "grids", [{"/a": MAP, "/b": MAP}, {"/r1/map": MAP, "/r2/map": MAP}, {"/x/costmap": COSTS, "/y/costmap": COSTS}]
 )
-def test_where_it_is_not_clear_the_topics_are_listed(tmp_path: Path, grids: dict[str, Any]) -> None:
+def test_where_it_is_not_clear_the_topics_are_listed(recording: Recording, grids: dict[str, Any]) -> None:
     first, second = grids
     with pytest.raises(IncompleteFileError, match=rf"{first} \(60 x 50 .*\), {second} \(60 x 50 .*\); .*--topic"):
-        read(tmp_path, grids)
+        read(recording, grids)
     if "costmap" not in first:
-        assert len(read(tmp_path, grids, second.lstrip("/")).map.segments) == 4
+        chosen = read_map(recording.path, ImportOptions(topic=second.lstrip("/")))
+        assert len(chosen.map.segments) == 4
 
 
-def test_a_grid_without_cells_is_passed_over(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "a.mcap")
+def test_a_grid_without_cells_is_passed_over(recording: Recording) -> None:
     recording.put("/map", BEGUN, grid_bytes(MAP), GRID)
     recording.put("/map", BEGUN + 1, grid_bytes(np.zeros((0, 0))), GRID)
     assert len(read_map(recording.done()).map.segments) == 4
 
 
-def test_a_bag_without_a_grid_names_its_topics(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "a.mcap")
+def test_a_bag_without_a_grid_names_its_topics(recording: Recording) -> None:
     recording.channel("/map", GRID)
     recording.scans(2)
     with pytest.raises(
@@ -86,26 +84,23 @@ def test_a_bag_without_a_grid_names_its_topics(tmp_path: Path) -> None:
         read_map(recording.done())
 
 
-def placed(tmp_path: Path, position: tuple[float, float, float], orientation: tuple[float, ...]) -> ImportedMap:
-    recording = Recording(tmp_path / "a.mcap")
-    recording.put("/map", BEGUN, grid_bytes(MAP, position, orientation), GRID)
-    return read_map(recording.done())
-
-
 @pytest.mark.parametrize(
-    ("orientation", "noted"),
-    [((0, 0, 0, 0), True), ((0, 0, 0, 1), False), ((0, 0, 0, 2), False), ((0, 0, 0, -1), False)],
+    ("orientation", "noted", "right"),
+    [
+        ((0, 0, 0, 0), True, 10.05),  # never set
+        ((0, 0, 0, 1), False, 10.05),
+        ((0, 0, 0, 2), False, 10.05),
+        ((0, 0, 0, -1), False, 10.05),
+        ((0, 0, math.sin(math.pi / 4), math.cos(math.pi / 4)), False, 5.0 - 0.95),  # a quarter turn
+    ],
 )
-def test_an_orientation_that_was_never_set_is_none(tmp_path: Path, orientation: tuple[float, ...], noted: bool) -> None:
-    imported = placed(tmp_path, (5.0, 0.0, 0.0), tuple(map(float, orientation)))
-    assert imported.map.segments.midpoints[:, 0].max() == pytest.approx(5.0 + 5.05, abs=0.01)
-    assert ("orientation" in {note.code for note in imported.report.assumed}) == noted
-
-
-def test_a_turned_grid_is_turned(tmp_path: Path) -> None:
-    half = math.pi / 4
-    imported = placed(tmp_path, (0.0, 0.0, 0.0), (0.0, 0.0, math.sin(half), math.cos(half)))
-    assert imported.map.segments.midpoints[:, 0].max() < 0.0
+def test_the_orientation_of_a_grid(
+    recording: Recording, orientation: tuple[float, ...], noted: bool, right: float
+) -> None:
+    recording.put("/map", BEGUN, grid_bytes(MAP, (5.0, 0.0, 0.0), tuple(map(float, orientation))), GRID)
+    imported = read_map(recording.done())
+    assert imported.map.segments.midpoints[:, 0].max() == pytest.approx(right, abs=0.01)
+    assert ("orientation" in notes(imported)) == noted
 
 
 @pytest.mark.parametrize(
@@ -119,15 +114,18 @@ def test_a_turned_grid_is_turned(tmp_path: Path) -> None:
     ],
 )
 def test_an_origin_that_is_none_is_refused(
-    tmp_path: Path, position: tuple[float, float, float], orientation: tuple[float, ...], message: str
+    recording: Recording, position: tuple[float, float, float], orientation: tuple[float, ...], message: str
 ) -> None:
+    recording.put("/map", BEGUN, grid_bytes(MAP, position, orientation), GRID)
     with pytest.raises(MalformedFileError, match=message):
-        placed(tmp_path, position, orientation)
+        read_map(recording.done())
 
 
-def test_a_costmap_alone_is_named(tmp_path: Path) -> None:
+def test_a_costmap_alone_is_named(recording: Recording) -> None:
     with pytest.raises(MalformedFileError, match=r"no wall found: .*; /local_costmap/costmap is a costmap"):
-        read(tmp_path, {"/local_costmap/costmap": COSTS})
-    thin = np.where((COSTS > 0) & (COSTS < 100), 0, COSTS)
-    imported = read(tmp_path, {"/costmap": thin})
-    assert "costmap" in {note.code for note in imported.report.assumed}
+        read(recording, {"/local_costmap/costmap": COSTS})
+
+
+def test_a_costmap_without_a_rim_is_a_map_with_a_note(recording: Recording) -> None:
+    imported = read(recording, {"/costmap": np.where((COSTS > 0) & (COSTS < 100), 0, COSTS)})
+    assert "costmap" in notes(imported)

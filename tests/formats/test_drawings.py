@@ -10,76 +10,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ezdxf import units
-from ezdxf.document import Drawing as Document
 from ezdxf.filemanagement import new
 
-from formats import (
-    ImportedMap,
-    ImportOptions,
-    IncompleteFileError,
-    InvalidOptionError,
-    TooLargeError,
-    read_map,
-)
+from formats import ImportedMap, ImportOptions, IncompleteFileError, InvalidOptionError, TooLargeError, read_map
+
+from .drawn import feature, geojson, saved, svg, written
+from .reading import counts, notes, rows
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
-
-
+AROUND = [[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]]
 COPIES = {"row_count": 30_000, "column_count": 30_000, "row_spacing": 1, "column_spacing": 1}
-
-
-def rows(imported: ImportedMap) -> list[list[float]]:
-    rounded: list[list[float]] = (np.round(imported.map.segments.endpoints, 3) + 0.0).tolist()
-    return rounded
-
-
-def lines_of(points: list[tuple[float, float]]) -> list[list[float]]:
-    return [[*a, *b] for a, b in zip(points, points[1:] + points[:1], strict=True)]
-
-
-def notes(imported: ImportedMap) -> dict[str, int]:
-    r = imported.report
-    return {note.code: note.count for note in (*r.read, *r.merged, *r.dropped, *r.assumed)}
-
-
-def dxf(tmp_path: Path, document: Document) -> Path:
-    path = tmp_path / "plan.dxf"
-    document.saveas(path)
-    return path
-
-
-def closed(document: Document, points: list[tuple[float, float]], layer: str = "0") -> None:
-    document.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
-
-
-def text(tmp_path: Path, name: str, content: str) -> Path:
-    path = tmp_path / name
-    path.write_text(content)
-    return path
 
 
 def test_the_unit_of_a_dxf_is_its_own_or_the_callers(tmp_path: Path) -> None:
     document = new(units=units.MM)
-    closed(document, [(1e3 * x, 1e3 * y) for x, y in SQUARE])
-    assert rows(read_map(dxf(tmp_path, document))) == lines_of(SQUARE)
+    document.modelspace().add_lwpolyline([(1e3 * x, 1e3 * y) for x, y in SQUARE], close=True)
+    assert rows(read_map(saved(tmp_path, document))) == AROUND
     document.header["$INSUNITS"] = 0
     with pytest.raises(IncompleteFileError, match="set the option units"):
-        read_map(dxf(tmp_path, document))
-    assert rows(read_map(dxf(tmp_path, document), ImportOptions(units="mm"))) == lines_of(SQUARE)
-    assert rows(read_map(dxf(tmp_path, document), ImportOptions(units=0.001))) == lines_of(SQUARE)
-
-
-def test_layers_are_chosen_by_pattern_and_hidden_ones_left_out(tmp_path: Path) -> None:
-    document = new(units=units.M)
-    closed(document, SQUARE, "A-WALL-INT")
-    closed(document, [(x / 2, y / 2) for x, y in SQUARE], "A-FURN")
-    hidden = document.layers.add("A-WALL-OLD")
-    closed(document, [(x + 9, y) for x, y in SQUARE], "A-WALL-OLD")
-    hidden.off()
-    imported = read_map(dxf(tmp_path, document), ImportOptions(layers=("*wall*",)))
-    assert rows(imported) == lines_of(SQUARE)
-    assert notes(imported)["hidden_layer"] == 1
-    assert notes(imported)["other_layer"] == 1
+        read_map(saved(tmp_path, document))
+    assert rows(read_map(saved(tmp_path, document), ImportOptions(units="mm"))) == AROUND
+    assert rows(read_map(saved(tmp_path, document), ImportOptions(units=0.001))) == AROUND
 
 
 def test_blocks_are_taken_apart_where_they_stand(tmp_path: Path) -> None:
@@ -91,18 +42,18 @@ def test_blocks_are_taken_apart_where_they_stand(tmp_path: Path) -> None:
     outer.add_blockref("WALL", (0, 1))
     document.modelspace().add_blockref("TWO", (10, 20), dxfattribs={"rotation": 90})
     # Turned by a quarter: (x, y) becomes (10 - y, 20 + x).
-    assert rows(read_map(dxf(tmp_path, document))) == [[10, 20, 10, 22], [9, 20, 9, 22]]
+    assert rows(read_map(saved(tmp_path, document))) == [[10, 20, 10, 22], [9, 20, 9, 22]]
 
 
 def test_arcs_become_chords_within_a_centimetre_and_text_is_dropped(tmp_path: Path) -> None:
     document = new(units=units.M)
     document.modelspace().add_arc((0, 0), radius=5, start_angle=0, end_angle=90)
     document.modelspace().add_text("Hall")
-    imported = read_map(dxf(tmp_path, document))
+    imported = read_map(saved(tmp_path, document))
     segments = imported.map.segments
     assert segments.lengths.sum() == pytest.approx(2.5 * math.pi, rel=2e-3)
     assert np.hypot(*segments.midpoints.T).min() > 5 - 0.01
-    assert notes(imported)["entity_text"] == 1
+    assert counts(imported)["entity_text"] == 1
 
 
 def test_a_block_in_itself_and_too_many_copies_are_refused(tmp_path: Path) -> None:
@@ -114,15 +65,12 @@ def test_a_block_in_itself_and_too_many_copies_are_refused(tmp_path: Path) -> No
     document.blocks.new("B12").add_line((0, 0), (1, 0))
     document.modelspace().add_blockref("B0", (0, 0))
     with pytest.raises(TooLargeError, match="8 blocks in one another"):
-        read_map(dxf(tmp_path, document))
+        read_map(saved(tmp_path, document))
     many = new(units=units.M)
     many.blocks.new("E")
     many.modelspace().add_blockref("E", (0, 0), dxfattribs=COPIES)
     with pytest.raises(TooLargeError, match="copies of a block"):
-        read_map(dxf(tmp_path, many))
-
-
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 10">{}</svg>'
+        read_map(saved(tmp_path, many))
 
 
 def test_an_svg_is_read_upright_with_its_transforms(tmp_path: Path) -> None:
@@ -132,66 +80,49 @@ def test_an_svg_is_read_upright_with_its_transforms(tmp_path: Path) -> None:
         '<defs><line x1="0" y1="0" x2="9" y2="9"/></defs><text>Hall</text>'
         '<line style="display: none" x1="0" y1="0" x2="5" y2="5"/>'
     )
-    imported = read_map(text(tmp_path, "a.svg", SVG.format(body)), ImportOptions(units="m"))
+    imported = read_map(svg(tmp_path, body), ImportOptions(units="m"))
     assert rows(imported) == [
         [10, 0, 12, -4],
         [0, 0, 4, 0], [4, 0, 4, -3], [4, -3, 0, -3], [0, -3, 0, 0],
         [0, -5, 2, -5], [2, -5, 2, -6], [2, -6, 0, -5],
         [0, -7, 1, -7], [1, -7, 1, -8],
     ]  # fmt: skip
-    assert notes(imported)["hidden"] == 1
-    chosen = read_map(text(tmp_path, "a.svg", SVG.format(body)), ImportOptions(units="cm", layers=("WALL*",)))
+    assert counts(imported)["hidden"] == 1
+    chosen = read_map(svg(tmp_path, body), ImportOptions(units="cm", layers=("WALL*",)))
     assert rows(chosen) == [[0.1, 0.0, 0.12, -0.04]]
 
 
 def test_curves_of_an_svg_become_chords(tmp_path: Path) -> None:
     body = '<path d="M5 0 A5 5 0 0 1 0 5"/>'
-    segments = read_map(text(tmp_path, "a.svg", SVG.format(body)), ImportOptions(units="m")).map.segments
+    segments = read_map(svg(tmp_path, body), ImportOptions(units="m")).map.segments
     # Sixteen chords of a quarter of a circle with radius 5.
     np.testing.assert_allclose(segments.lengths, 2 * 5 * math.sin(math.pi / 64), rtol=1e-6)
 
 
-def feature(kind: str, coordinates: object, layer: str = "wall") -> dict[str, object]:
-    return {"type": "Feature", "properties": {"layer": layer}, "geometry": {"type": kind, "coordinates": coordinates}}
-
-
 def test_geojson_is_read_as_metres_by_an_explicit_flag_alone(tmp_path: Path) -> None:
-    features = [
-        feature("Polygon", [[*SQUARE, SQUARE[0]]]),
-        feature("MultiLineString", [[[9, 0], [9, 1, 7]]]),
-        feature("LineString", [[0, 0], [1, 1]], "furniture"),
-        feature("Point", [1, 1]),
-    ]
-    path = text(tmp_path, "a.geojson", json.dumps({"type": "FeatureCollection", "features": features}))
+    path = geojson(
+        tmp_path,
+        feature([[*SQUARE, SQUARE[0]]], "Polygon", layer="wall"),
+        feature([[[9, 0], [9, 1, 7]]], "MultiLineString", layer="wall"),
+        feature([[0, 0], [1, 1]], layer="furniture"),
+        feature([1, 1], "Point", layer="wall"),
+    )
     with pytest.raises(IncompleteFileError, match="degrees"):
         read_map(path)
     imported = read_map(path, ImportOptions(local_metres=True, layers=("wall",)))
-    assert rows(imported) == [*lines_of(SQUARE), [9, 0, 9, 1]]
+    assert rows(imported) == [*AROUND, [9, 0, 9, 1]]
     assert not imported.map.oriented
-    assert notes(imported)["entity_point"] == 1
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        "0,0,4,0\n4,0,4,3\n",
-        "x1;y1;x2;y2\n0;0;4;0\n4;0;4;3",
-        "name\ty2\tx2\ty1\tx1\nw\t0\t4\t0\t0\nw\t3\t4\t0\t4\n",
-        "# a comment\n\n0 0 4 0\n4 0 4 3\n",
-    ],
-)
-def test_csv_is_read_whatever_parts_it(tmp_path: Path, table: str) -> None:
-    assert rows(read_map(text(tmp_path, "a.csv", table))) == [[0, 0, 4, 0], [4, 0, 4, 3]]
+    assert counts(imported)["entity_point"] == 1
 
 
 def test_lines_drawn_twice_are_merged_and_specks_dropped(tmp_path: Path) -> None:
-    imported = read_map(text(tmp_path, "a.csv", "0,0,4,0\n4,0,0,0\n0,0,4,0\n1,1,1,1.001\n"))
+    imported = read_map(written(tmp_path, "a.csv", "0,0,4,0\n4,0,0,0\n0,0,4,0\n1,1,1,1.001\n"))
     assert rows(imported) == [[0, 0, 4, 0]]
-    assert notes(imported) == {"doubles": 2, "short": 1, "segments": 1, "directions": 0}
+    assert counts(imported) == {"doubles": 2, "short": 1, "segments": 1, "directions": 0}
 
 
 def test_centre_lines_become_two_faces_apart_by_the_thickness(tmp_path: Path) -> None:
-    path = text(tmp_path, "a.csv", "0,0,4,0\n")
+    path = written(tmp_path, "a.csv", "0,0,4,0\n")
     imported = read_map(path, ImportOptions(drawn="centres", thickness=0.2))
     # Free space on the left of each: the upper face runs along +x, the lower one back, and both ends are closed.
     assert rows(imported) == [[0, 0.1, 4, 0.1], [4, -0.1, 0, -0.1], [0, -0.1, 0, 0.1], [4, 0.1, 4, -0.1]]
@@ -202,22 +133,24 @@ def test_directions_are_found_from_a_place_inside(tmp_path: Path) -> None:
     # A room drawn without regard to direction within the outline of its walls, 0.3 m thick, and a partition.
     inner = "0,0,4,0\n4,3,4,0\n4,3,0,3\n0,0,0,3\n"
     outer = "-0.3,-0.3,4.3,-0.3\n4.3,-0.3,4.3,3.3\n4.3,3.3,-0.3,3.3\n-0.3,3.3,-0.3,-0.3\n"
-    path = text(tmp_path, "a.csv", inner + outer + "2,0,2,2\n")
+    path = written(tmp_path, "a.csv", inner + outer + "2,0,2,2\n")
     imported = read_map(path, ImportOptions(point=((1.0, 1.0),)))
     assert imported.map.oriented
     found = {tuple(row) for row in rows(imported)}
     assert {(0, 0, 4, 0), (4, 0, 4, 3), (4, 3, 0, 3), (0, 3, 0, 0), (2, 0, 2, 2), (2, 2, 2, 0)} <= found
     assert len(found) == 6 + 2 * 4  # the outline cannot be reached: both directions
-    assert notes(imported)["not_reached"] == 4
+    assert counts(imported)["not_reached"] == 4
     with pytest.raises(InvalidOptionError, match=r"point\[1\]: lies on a line or outside"):
         read_map(path, ImportOptions(point=((1.0, 1.0), (50.0, 1.0))))
 
 
 def test_directions_mean_what_the_caller_says(tmp_path: Path) -> None:
-    path = text(tmp_path, "a.csv", "0,0,4,0\n")
+    path = written(tmp_path, "a.csv", "0,0,4,0\n")
     assert not read_map(path).map.oriented
     assert read_map(path, ImportOptions(oriented=True)).map.oriented
-    path = text(tmp_path, "a.json", '{"segments": [[0, 0, 4, 0]], "sigma": 0.03, "frame_id": "hq", "meta": {"a": "b"}}')
+    path = written(
+        tmp_path, "a.json", '{"segments": [[0, 0, 4, 0]], "sigma": 0.03, "frame_id": "hq", "meta": {"a": "b"}}'
+    )
     own = read_map(path).map
     assert (own.oriented, own.sigma, own.frame_id, own.meta) == (True, 0.03, "hq", {"a": "b"})
     assert not read_map(path, ImportOptions(oriented=False)).map.oriented
@@ -242,13 +175,11 @@ Lines = Sequence[Sequence[float]]
 
 
 def csv(tmp_path: Path, lines: Lines) -> Path:
-    path = tmp_path / "plan.csv"
-    path.write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
-    return path
+    return written(tmp_path, "plan.csv", "".join(",".join(map(str, line)) + "\n" for line in lines))
 
 
-def assumed(imported: ImportedMap) -> dict[str, str]:
-    return {note.code: note.message for note in imported.report.assumed}
+def assumed(imported: ImportedMap) -> list[str]:
+    return list(notes(imported, "assumed"))
 
 
 def thickness(imported: ImportedMap, lines: Lines = HOUSE) -> list[float]:
@@ -270,9 +201,9 @@ def test_lines_that_meet_in_the_middle_of_others_are_centre_lines(tmp_path: Path
     imported = read_map(csv(tmp_path, HOUSE))
     assert imported.map.oriented
     assert thickness(imported) == [0.2] * len(HOUSE)
-    assert list(assumed(imported)) == ["centres", "thickness_usual"]
-    assert "0.2 m thick" in assumed(imported)["thickness_usual"]
-    assert "drawn to faces" in assumed(imported)["centres"]
+    assert assumed(imported) == ["centres", "thickness_usual"]
+    assert "0.2 m thick" in notes(imported)["thickness_usual"].message
+    assert "drawn to faces" in notes(imported)["centres"].message
     # Outside four faces, four in a room, in the two that the door parts five, and two ends at the door.
     assert len(imported.map.segments) == 4 + 4 + 2 * 5 + 2
     corners = {tuple(point) for point in imported.map.segments.endpoints.round(4).reshape(-1, 2).tolist()}
@@ -295,7 +226,7 @@ def test_lines_that_meet_in_the_middle_of_others_are_centre_lines(tmp_path: Path
 )  # fmt: skip
 def test_faces_are_not_taken_for_centre_lines(tmp_path: Path, lines: Lines) -> None:
     imported = read_map(csv(tmp_path, lines))
-    assert list(assumed(imported)) == ["directions"]
+    assert assumed(imported) == ["directions"]
     assert len(imported.map.segments) == len(lines)
 
 
@@ -322,16 +253,14 @@ def test_walls_that_go_on_straight_are_drawn_once(tmp_path: Path) -> None:
 
 
 def test_a_map_of_our_own_stays_as_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "own.json"
-    path.write_text(json.dumps({"segments": HOUSE, "oriented": False}))
-    imported = read_map(path)
+    imported = read_map(written(tmp_path, "own.json", json.dumps({"segments": HOUSE, "oriented": False})))
     assert (len(imported.map.segments), imported.map.oriented) == (len(HOUSE), False)
 
 
 def test_a_thickness_that_is_given(tmp_path: Path) -> None:
     imported = read_map(csv(tmp_path, HOUSE), ImportOptions(thickness=0.3))
     assert thickness(imported) == [0.3] * len(HOUSE)
-    assert list(assumed(imported)) == ["centres", "thickness_given"]
+    assert assumed(imported) == ["centres", "thickness_given"]
 
 
 def test_widths_of_polylines_old_and_new(tmp_path: Path) -> None:
@@ -340,46 +269,34 @@ def test_widths_of_polylines_old_and_new(tmp_path: Path) -> None:
     space.add_lwpolyline([(0, 0), (800, 0), (800, 600), (0, 600)], close=True, dxfattribs={"const_width": 36})
     space.add_lwpolyline([(0, 300, 12, 12), (800, 300, 12, 12)])
     space.add_polyline2d([(500, 300), (500, 600)], dxfattribs={"default_start_width": 10, "default_end_width": 10})
-    document.saveas(tmp_path / "plan.dxf")
-    imported = read_map(tmp_path / "plan.dxf")
+    imported = read_map(saved(tmp_path, document))
     assert thickness(imported, [*OUTLINE, [0, 3, 8, 3], [5, 3, 5, 6]]) == [0.36] * 4 + [0.12, 0.1]
-    assert list(assumed(imported)) == ["centres", "thickness_drawn"]
+    assert assumed(imported) == ["centres", "thickness_drawn"]
+
+
+def drawn_in_svg(lines: Lines, how: str = "") -> str:
+    return "".join(f'<line {how} x1="{a}" y1="{b}" x2="{c}" y2="{d}"/>' for a, b, c, d in lines)
 
 
 def test_lines_of_an_svg_as_wide_as_walls(tmp_path: Path) -> None:
-    body = "".join(f'<line x1="{a}" y1="{b}" x2="{c}" y2="{d}"/>' for a, b, c, d in OUTLINE)
-    x1, y1, x2, y2 = INNER[0]
-    inner = f'<line style="fill:none;stroke-width:0.3px" x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}"/>'
-    rest = "".join(f'<line stroke-width="5%" x1="{a}" y1="{b}" x2="{c}" y2="{d}"/>' for a, b, c, d in INNER[1:])
-    path = tmp_path / "plan.svg"
-    path.write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg"><g transform="scale(100)">'
-        f'<g stroke-width="0.4">{body}</g>{inner}{rest}</g></svg>'
+    inner = drawn_in_svg(INNER[:1], 'style="fill:none;stroke-width:0.3px"') + drawn_in_svg(
+        INNER[1:], 'stroke-width="5%"'
     )
-    imported = read_map(path, ImportOptions(units="cm"))
+    body = f'<g transform="scale(100)"><g stroke-width="0.4">{drawn_in_svg(OUTLINE)}</g>{inner}</g>'
+    imported = read_map(svg(tmp_path, body, ""), ImportOptions(units="cm"))
     upright = [[x1, -y1, x2, -y2] for x1, y1, x2, y2 in HOUSE]
     assert thickness(imported, upright) == [0.4] * 4 + [0.3, 0.4, 0.4]  # those without a number get the median
-    assert "2 lines without a width" in assumed(imported)["thickness_drawn"]
+    assert "2 lines without a width" in notes(imported)["thickness_drawn"].message
 
 
 @pytest.mark.parametrize("pen", [0.001, 3.0])
 def test_a_pen_is_no_wall(tmp_path: Path, pen: float) -> None:
-    body = "".join(f'<line x1="{a}" y1="{b}" x2="{c}" y2="{d}"/>' for a, b, c, d in HOUSE)
-    path = tmp_path / "plan.svg"
-    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" stroke-width="{pen}">{body}</svg>')
-    assert list(assumed(read_map(path, ImportOptions(units="m")))) == ["centres", "thickness_usual"]
+    path = svg(tmp_path, drawn_in_svg(HOUSE), f'stroke-width="{pen}"')
+    assert assumed(read_map(path, ImportOptions(units="m"))) == ["centres", "thickness_usual"]
 
 
 def test_the_thickness_that_a_geojson_has(tmp_path: Path) -> None:
-    def feature(line: Sequence[float], told: dict[str, object]) -> dict[str, object]:
-        return {
-            "type": "Feature",
-            "properties": told,
-            "geometry": {"type": "LineString", "coordinates": [line[:2], line[2:]]},
-        }
-
-    features = [feature(line, {"thickness": 0.24}) for line in OUTLINE]
-    features += [feature(line, {"width": 0.1, "thickness": "thin"}) for line in INNER]
-    path = tmp_path / "plan.geojson"
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    assert thickness(read_map(path, ImportOptions(local_metres=True))) == [0.24] * 4 + [0.1] * 3
+    features = [feature([line[:2], line[2:]], thickness=0.24) for line in OUTLINE]
+    features += [feature([line[:2], line[2:]], width=0.1, thickness="thin") for line in INNER]
+    imported = read_map(geojson(tmp_path, *features), ImportOptions(local_metres=True))
+    assert thickness(imported) == [0.24] * 4 + [0.1] * 3

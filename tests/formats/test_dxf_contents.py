@@ -13,24 +13,20 @@ from ezdxf.xclip import XClip
 
 from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, TooLargeError, read_map
 
+from .drawn import saved, written
+from .reading import notes
+
 ROOM = [(0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (3.0, 4.0), (3.0, 6.0), (0.0, 6.0)]
 
 
 def drawn(*, to: tuple[float, float] = (0.0, 0.0)) -> Document:
     document = new(units=units.M)
-    for (x1, y1), (x2, y2) in zip(ROOM, ROOM[1:] + ROOM[:1], strict=True):
-        document.modelspace().add_line((x1 + to[0], y1 + to[1]), (x2 + to[0], y2 + to[1]))
+    document.modelspace().add_lwpolyline([(x + to[0], y + to[1]) for x, y in ROOM], close=True)
     return document
 
 
-def read(tmp_path: Path, document: Document, *, fmt: str = "asc") -> ImportedMap:
-    document.saveas(tmp_path / "plan.dxf", fmt=fmt)
-    return read_map(tmp_path / "plan.dxf", ImportOptions(drawn="faces"))
-
-
-def notes(found: ImportedMap) -> dict[str, tuple[str, int]]:
-    report = found.report
-    return {n.code: (n.message, n.count) for n in (*report.read, *report.dropped, *report.assumed)}
+def read(tmp_path: Path, document: Document) -> ImportedMap:
+    return read_map(saved(tmp_path, document), ImportOptions(drawn="faces"))
 
 
 @pytest.mark.parametrize("version", ["R12", "R2000", "R2007", "R2018"])
@@ -40,21 +36,20 @@ def test_binary_files(tmp_path: Path, version: str) -> None:
     block.add_line((0, 0), (3000, 0))
     document.modelspace().add_blockref("WING", (0, 1000))
     document.modelspace().add_arc((0, 0), 2000, 0, 90)
-    found = []
-    for fmt in ("asc", "bin"):
-        document.saveas(tmp_path / "plan.dxf", fmt=fmt)
-        found.append(read_map(tmp_path / "plan.dxf", ImportOptions(units="mm")).map.segments.endpoints)
-    assert len(found[0]) > 5
-    assert (found[0] == found[1]).all()
+    text, binary = (
+        read_map(saved(tmp_path, document, fmt), ImportOptions(units="mm")).map.segments.endpoints
+        for fmt in ("asc", "bin")
+    )
+    assert len(text) > 5
+    assert (text == binary).all()
 
 
 @pytest.mark.parametrize("kept", [23, 300, 5_000])
 def test_binary_files_that_are_cut_off(tmp_path: Path, kept: int) -> None:
-    drawn().saveas(tmp_path / "plan.dxf", fmt="bin")
-    content = (tmp_path / "plan.dxf").read_bytes()
-    (tmp_path / "plan.dxf").write_bytes(content[:kept])
+    path = saved(tmp_path, drawn(), "bin")
+    path.write_bytes(path.read_bytes()[:kept])
     with pytest.raises(MalformedFileError, match=r"is not a DXF|has no lines"):
-        read_map(tmp_path / "plan.dxf", ImportOptions(units="m"))
+        read_map(path, ImportOptions(units="m"))
 
 
 @pytest.mark.parametrize("size", [1e10, 1e15, 1e300])
@@ -89,7 +84,7 @@ def test_multilines(tmp_path: Path) -> None:
     found = read(tmp_path, document)
     lengths = sorted(found.map.segments.lengths.round(3).tolist())
     assert lengths == [2.0, 2.0, 4.0, 4.3, 5.0, 5.3]  # its upper element runs through the points
-    assert notes(found)["entity_mline"][1] == 2
+    assert notes(found)["entity_mline"].count == 2
 
 
 def test_a_closed_multiline_on_a_frozen_layer(tmp_path: Path) -> None:
@@ -98,7 +93,8 @@ def test_a_closed_multiline_on_a_frozen_layer(tmp_path: Path) -> None:
     document.modelspace().add_mline(ROOM, close=True, dxfattribs={"layer": "OLD"})
     found = read(tmp_path, document)
     assert len(found.map.segments) == 6
-    assert notes(found)["hidden_layer"] == ("entities and blocks on layers that are off or frozen: OLD", 1)
+    note = notes(found)["hidden_layer"]
+    assert (note.message, note.count) == ("entities and blocks on layers that are off or frozen: OLD", 1)
 
 
 def refused(tmp_path: Path, document: Document) -> str:
@@ -141,35 +137,37 @@ def test_other_contents_are_named_with_their_counts(tmp_path: Path) -> None:
 
 
 def test_objects_of_other_programs(tmp_path: Path) -> None:
-    document = new(units=units.M)
-    document.saveas(tmp_path / "plan.dxf")
-    proxy = (
-        "  0\nACAD_PROXY_ENTITY\n  5\nFF{}\n100\nAcDbEntity\n  8\nA-WALL\n100\nAcDbProxyEntity\n 90\n498\n 91\n500\n"
+    path, proxy = (
+        saved(tmp_path, new(units=units.M)),
+        "  0\nACAD_PROXY_ENTITY\n  5\nFF{}\n100\nAcDbEntity\n  8\nA-WALL\n",
     )
-    text = (tmp_path / "plan.dxf").read_text()
-    head, section, tail = text.partition("ENTITIES\n")
-    (tmp_path / "plan.dxf").write_text(head + section + proxy.format(1) + proxy.format(2) + tail)
+    head, section, tail = path.read_text().partition("ENTITIES\n")
+    path.write_text(head + section + proxy.format(1) + proxy.format(2) + tail)
     with pytest.raises(MalformedFileError, match=r"ACAD_PROXY_ENTITY is not read: .*EXPORTTOAUTOCAD.* \(2\)"):
-        read_map(tmp_path / "plan.dxf")
+        read_map(path)
 
 
-@pytest.mark.parametrize("far", [(0.0, 0.0), (450_000.0, 5_400_000.0), (352_500.0, 5_400_000.0)])
-def test_a_stray_line_is_left_out_and_named(tmp_path: Path, far: tuple[float, float]) -> None:
-    document = drawn(to=(350_000.0, 5_400_000.0))
-    document.modelspace().add_line(far, (far[0] + 2, far[1]), dxfattribs={"layer": "SCRATCH"})
+UTM = (350_000.0, 5_400_000.0)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "code", "told"),
+    [
+        ((0.0, 0.0), (2.0, 0.0), "far_lines", "1 on SCRATCH at (1, 0) m"),
+        ((450_000.0, 5_400_000.0), (450_002.0, 5_400_000.0), "far_lines", "1 on SCRATCH at (450001, 5.4e+06) m"),
+        ((352_500.0, 5_400_000.0), (352_502.0, 5_400_000.0), "far_lines", "1 on SCRATCH at (352501, 5.4e+06) m"),
+        ((0.0, 0.0), UTM, "long_lines", "1 on SCRATCH"),
+    ],
+)
+def test_a_stray_line_is_left_out_and_named(
+    tmp_path: Path, begin: tuple[float, float], end: tuple[float, float], code: str, told: str
+) -> None:
+    document = drawn(to=UTM)
+    document.modelspace().add_line(begin, end, dxfattribs={"layer": "SCRATCH"})
     found = read(tmp_path, document)
     assert len(found.map.segments) == 6
-    message, count = notes(found)["far_lines"]
-    assert f"1 on SCRATCH at ({far[0] + 1:.6g}, {far[1]:.6g}) m" in message
-    assert count == 1
-
-
-def test_a_line_from_the_origin_to_the_building(tmp_path: Path) -> None:
-    document = drawn(to=(350_000.0, 5_400_000.0))
-    document.modelspace().add_line((0, 0), (350_000, 5_400_000), dxfattribs={"layer": "AXIS"})
-    found = read(tmp_path, document)
-    assert len(found.map.segments) == 6
-    assert "1 on AXIS" in notes(found)["long_lines"][0]
+    assert told in notes(found)[code].message
+    assert notes(found)[code].count == 1
 
 
 def test_two_buildings_too_far_apart_are_refused_by_name(tmp_path: Path) -> None:
@@ -189,13 +187,13 @@ def test_buildings_of_one_site_stay_together(tmp_path: Path) -> None:
         document.modelspace().add_line((a[0] + 600, a[1]), (b[0] + 600, b[1]))
     found = read(tmp_path, document)
     assert len(found.map.segments) == 11
-    assert "594 m or more" in notes(found)["far_lines"][0]
+    assert "594 m or more" in notes(found)["far_lines"].message
 
 
 def test_many_tiny_entities_are_refused_before_they_are_parsed(tmp_path: Path) -> None:
-    (tmp_path / "plan.dxf").write_text("  0\nSECTION\n  2\nENTITIES\n" + "0\nLINE\n" * 800_000 + "0\nENDSEC\n0\nEOF\n")
+    content = "  0\nSECTION\n  2\nENTITIES\n" + "0\nLINE\n" * 800_000 + "0\nENDSEC\n0\nEOF\n"
     with pytest.raises(TooLargeError, match="entities and objects"):
-        read_map(tmp_path / "plan.dxf")
+        read_map(written(tmp_path, "plan.dxf", content))
 
 
 @pytest.mark.parametrize("nested", [False, True])
@@ -243,20 +241,6 @@ def test_the_control_frame_of_a_smoothed_polyline_is_no_wall(tmp_path: Path) -> 
     assert read(tmp_path, document).map.segments.endpoints[:, [1, 3]].max() == 0.5
 
 
-def test_layers_of_walls_are_found_in_blocks(tmp_path: Path) -> None:
-    document = new(units=units.M)
-    inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
-    inner.add_line((0, 0), (4, 0), dxfattribs={"layer": "P$0$A-WALL"})
-    inner.add_line((0, 1), (4, 1), dxfattribs={"layer": "P$0$A-FURN"})
-    inner.add_line((0, 2), (4, 2))
-    outer.add_blockref("INNER", (0, 0), dxfattribs={"layer": "P$0$X"})
-    document.modelspace().add_blockref("OUTER", (0, 0))
-    found = read(tmp_path, document)
-    assert found.map.segments.endpoints.tolist() == [[0, 0, 4, 0]]
-    assert notes(found)["other_layer"][1] == 2
-    assert "P$0$A-FURN" in notes(found)["layers"][0]
-
-
 PLAN = [(0, 0, 8, 0), (8, 0, 8, 5), (8, 5, 3.5, 5), (2.6, 5, 0, 5), (0, 5, 0, 0), (4, 0, 4, 2), (4, 2.9, 4, 5)]
 US_FOOT = 1200 / 3937
 IN_METRES = {  # of $INSUNITS
@@ -271,9 +255,8 @@ def noted(tmp_path: Path, units: int, drawn_in: float, options: ImportOptions | 
     for line in PLAN:
         x1, y1, x2, y2 = (c / drawn_in for c in line)
         document.modelspace().add_line((x1, y1), (x2, y2))
-    document.saveas(tmp_path / "plan.dxf")
-    report = read_map(tmp_path / "plan.dxf", options or ImportOptions()).report
-    return {note.code: note.message for note in (*report.read, *report.assumed)}
+    found = read_map(saved(tmp_path, document), options or ImportOptions())
+    return {code: note.message for code, note in notes(found).items()}
 
 
 @pytest.mark.parametrize("units", IN_METRES)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ezdxf import units
@@ -12,152 +12,130 @@ from ezdxf.filemanagement import new
 
 from formats import ImportedMap, ImportOptions, read_map
 
-ALL = ImportOptions(layers=("*",))
+from .drawn import saved
+from .reading import notes
+
 ROOM = ((0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (0.0, 4.0))
+INVISIBLE = {"invisible": 1}
+COPIES = {"row_count": 2, "column_count": 3, "row_spacing": 0.5, "column_spacing": 2}
+
+# What stands in a block or in the model: a line of so many metres or a block, its layer, and other attributes.
+Part = tuple[float | str, str] | tuple[float | str, str, dict[str, Any]]
 
 
-def plan(*layers: str) -> Document:
-    """A room on the layer A, and other layers."""
+def plan(blocks: dict[str, list[Part]], model: list[Part]) -> Document:
+    """Return a drawing of a room on the layer A, and of these blocks and parts."""
     document = new(units=units.M)
-    for layer in ("A", *layers):
+    for layer in ("A", "HIDDEN", "SHOWN"):
         document.layers.add(layer)
     document.modelspace().add_lwpolyline(ROOM, close=True, dxfattribs={"layer": "A"})
+    spaces: list[tuple[Any, list[Part]]] = [(document.blocks.new(name), parts) for name, parts in blocks.items()]
+    for space, parts in [*spaces, (document.modelspace(), model)]:
+        for y, (what, layer, *more) in enumerate(parts):
+            attributes = {"layer": layer} | (more[0] if more else {})
+            if isinstance(what, str):
+                space.add_blockref(what, (0.5, 0.5 + y), dxfattribs=attributes)
+            else:
+                space.add_line((0, y), (what, y), dxfattribs=attributes)
     return document
 
 
-def read(tmp_path: Path, document: Document, options: ImportOptions | None = None) -> ImportedMap:
-    document.saveas(tmp_path / "plan.dxf")
-    return read_map(tmp_path / "plan.dxf", options or ImportOptions())
+def read(tmp_path: Path, document: Document, *layers: str) -> ImportedMap:
+    return read_map(saved(tmp_path, document), ImportOptions(layers=layers, drawn="faces"))
 
 
-def lengths(tmp_path: Path, document: Document) -> list[float]:
-    """Lengths of the lines that are read next to the room, decimetres."""
-    found = sorted(round(10 * length) for length in read(tmp_path, document, ALL).map.segments.lengths)
-    for length in (40, 40, 70, 70):
+def lengths(imported: ImportedMap) -> list[float]:
+    """Return the lengths of the lines that are read next to the room, metres."""
+    found = sorted(imported.map.segments.lengths.round(3).tolist())
+    for length in (4, 4, 7, 7):
         found.remove(length)
     return found
 
 
-def dropped(tmp_path: Path, document: Document) -> dict[str, tuple[str, int]]:
-    report = read(tmp_path, document, ALL).report
-    return {note.code: (note.message, note.count) for note in report.dropped}
+@pytest.mark.parametrize(
+    ("blocks", "model", "hidden", "shown", "frozen", "off"),
+    [
+        pytest.param(
+            {"DESK": [(1, "0"), (2, "SHOWN"), (3, "hidden")]}, [("DESK", "HIDDEN")], "HIDDEN", [1, 2, 3], [], [2],
+            id="a block: what is off hides what is on layer 0 of the block",
+        ),
+        pytest.param(
+            {"INNER": [(1, "0")], "MIDDLE": [("INNER", "0")]}, [("MIDDLE", "HIDDEN"), ("MIDDLE", "SHOWN")],
+            "HIDDEN", [1, 1], [1], [1], id="layer 0 goes through blocks in blocks",
+        ),
+        pytest.param(
+            {"INNER": [(1, "0"), (2, "SHOWN")], "OUTER": [("INNER", "HIDDEN")]}, [("OUTER", "SHOWN")],
+            "HIDDEN", [1, 2], [], [2], id="a reference within a block",
+        ),
+        pytest.param(
+            {"DESK": [(1, "0")]}, [(2, "0"), ("DESK", "SHOWN"), ("DESK", "0")], "0", [1, 1, 2], [1], [1],
+            id="layer 0 itself",
+        ),
+        pytest.param({"DESK": [(1, "0")]}, [("DESK", "HIDDEN", COPIES)], "HIDDEN", [1] * 6, [], [], id="rows"),
+    ],
+)  # fmt: skip
+def test_what_is_on_a_hidden_layer(
+    tmp_path: Path,
+    blocks: dict[str, list[Part]],
+    model: list[Part],
+    hidden: str,
+    shown: list[float],
+    frozen: list[float],
+    off: list[float],
+) -> None:
+    document = plan(blocks, model)
+    assert lengths(read(tmp_path, document, "*")) == shown
+    layer = document.layers.get(hidden)
+    layer.off()
+    assert lengths(read(tmp_path, document, "*")) == off
+    layer.on()
+    layer.freeze()
+    found = read(tmp_path, document, "*")
+    assert lengths(found) == frozen
+    assert hidden in notes(found)["hidden_layer"].message
 
 
-def hide(document: Document, layer: str, how: str) -> None:
-    found = document.layers.get(layer)
-    found.freeze() if how == "frozen" else found.off()
-
-
-@pytest.mark.parametrize(("how", "left"), [("frozen", []), ("off", [20])])
-def test_a_block_on_a_hidden_layer(tmp_path: Path, how: str, left: list[int]) -> None:
-    """A frozen layer hides all of it, one that is off what is on layer 0 of the block."""
-    document = plan("HIDDEN", "SHOWN")
-    block = document.blocks.new("DESK")
-    block.add_line((0, 0), (1, 0))
-    block.add_line((0, 1), (2, 1), dxfattribs={"layer": "SHOWN"})
-    block.add_line((0, 2), (3, 2), dxfattribs={"layer": "hidden"})
-    document.modelspace().add_blockref("DESK", (1, 1), dxfattribs={"layer": "HIDDEN"})
-    assert lengths(tmp_path, document) == [10, 20, 30]
-    hide(document, "HIDDEN", how)
-    assert lengths(tmp_path, document) == left
-    message, count = dropped(tmp_path, document)["hidden_layer"]
-    assert "HIDDEN" in message
-    assert count == (1 if how == "frozen" else 2)
-
-
-@pytest.mark.parametrize("how", ["frozen", "off"])
-def test_layer_0_goes_through_blocks_in_blocks(tmp_path: Path, how: str) -> None:
-    document = plan("HIDDEN", "SHOWN")
-    document.blocks.new("INNER").add_line((0, 0), (1, 0))
-    document.blocks.new("MIDDLE").add_blockref("INNER", (0, 0))
-    document.modelspace().add_blockref("MIDDLE", (1, 1), dxfattribs={"layer": "HIDDEN"})
-    document.modelspace().add_blockref("MIDDLE", (1, 2), dxfattribs={"layer": "SHOWN"})
-    assert lengths(tmp_path, document) == [10, 10]
-    hide(document, "HIDDEN", how)
-    assert lengths(tmp_path, document) == [10]
-
-
-@pytest.mark.parametrize(("how", "left"), [("frozen", []), ("off", [20])])
-def test_a_hidden_reference_within_a_block(tmp_path: Path, how: str, left: list[int]) -> None:
-    document = plan("HIDDEN", "SHOWN")
-    inner = document.blocks.new("INNER")
-    inner.add_line((0, 0), (1, 0))
-    inner.add_line((0, 0), (2, 0), dxfattribs={"layer": "SHOWN"})
-    document.blocks.new("OUTER").add_blockref("INNER", (0, 0), dxfattribs={"layer": "HIDDEN"})
-    document.modelspace().add_blockref("OUTER", (1, 1), dxfattribs={"layer": "SHOWN"})
-    hide(document, "HIDDEN", how)
-    assert lengths(tmp_path, document) == left
-
-
-@pytest.mark.parametrize("how", ["frozen", "off"])
-def test_a_hidden_layer_0(tmp_path: Path, how: str) -> None:
-    """An entity on layer 0 of a block is on the layer of its reference, and hidden where that is layer 0 itself."""
-    document = plan("SHOWN")
-    document.blocks.new("DESK").add_line((0, 0), (1, 0))
-    document.modelspace().add_line((0, 1), (2, 1))
-    document.modelspace().add_blockref("DESK", (1, 1), dxfattribs={"layer": "SHOWN"})
-    document.modelspace().add_blockref("DESK", (1, 2))
-    assert lengths(tmp_path, document) == [10, 10, 20]
-    hide(document, "0", how)
-    assert lengths(tmp_path, document) == [10]
+def test_what_is_hidden_is_counted(tmp_path: Path) -> None:
+    """A block on a frozen layer once, entities of a block on a layer that is off each."""
+    document = plan({"DESK": [(1, "0"), (2, "SHOWN"), (3, "hidden")]}, [("DESK", "HIDDEN")])
+    document.layers.get("HIDDEN").off()
+    assert notes(read(tmp_path, document, "*"))["hidden_layer"].count == 2
+    document.layers.get("HIDDEN").freeze()
+    assert notes(read(tmp_path, document, "*"))["hidden_layer"].count == 1
 
 
 def test_invisible_entities_and_blocks(tmp_path: Path) -> None:
     """Dynamic blocks hide their other states so."""
-    document = plan()
-    block = document.blocks.new("DOOR")
-    block.add_line((0, 0), (1, 0))
-    block.add_line((0, 0), (2, 0), dxfattribs={"invisible": 1})
-    document.modelspace().add_blockref("DOOR", (1, 1))
-    document.modelspace().add_blockref("DOOR", (2, 2), dxfattribs={"invisible": 1})
-    document.modelspace().add_lwpolyline([(0, 0), (3, 0)], dxfattribs={"invisible": 1})
-    assert lengths(tmp_path, document) == [10]
-    assert dropped(tmp_path, document)["invisible"][1] == 3
-
-
-def test_rows_of_a_block_on_a_frozen_layer(tmp_path: Path) -> None:
-    document = plan("HIDDEN")
-    document.blocks.new("DESK").add_line((0, 0), (1, 0))
-    rows = {"layer": "HIDDEN", "row_count": 2, "column_count": 3, "row_spacing": 0.5, "column_spacing": 2}
-    document.modelspace().add_blockref("DESK", (0.5, 0.5), dxfattribs=rows)
-    assert lengths(tmp_path, document) == [10] * 6
-    hide(document, "HIDDEN", "frozen")
-    assert lengths(tmp_path, document) == []
+    doors: list[Part] = [("DOOR", "0"), ("DOOR", "0", INVISIBLE), (3, "0", INVISIBLE)]
+    found = read(tmp_path, plan({"DOOR": [(1, "0"), (2, "0", INVISIBLE)]}, doors), "*")
+    assert lengths(found) == [1]
+    assert notes(found)["invisible"].count == 3
 
 
 def test_a_wall_layer_is_asked_for_by_the_layer_of_the_reference(tmp_path: Path) -> None:
-    document = plan("WALLS", "DESKS")
-    document.blocks.new("THING").add_line((0, 0), (1, 0))
-    document.modelspace().add_blockref("THING", (1, 1), dxfattribs={"layer": "WALLS"})
-    document.modelspace().add_blockref("THING", (1, 2), dxfattribs={"layer": "DESKS"})
-    found = read(tmp_path, document, ImportOptions(layers=("WALLS",)))
+    found = read(tmp_path, plan({"THING": [(1, "0")]}, [("THING", "SHOWN"), ("THING", "HIDDEN")]), "show*")
     assert len(found.map.segments) == 1
-    other = {note.code: note for note in found.report.dropped}
-    assert "A (1), DESKS (1)" in other["other_layer"].message
+    assert "A (1), HIDDEN (1)" in notes(found)["other_layer"].message
 
 
-def closed(document: Document, points: Iterable[tuple[float, float]], layer: str) -> None:
-    document.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+def two_rooms(first: str, second: str) -> Document:
+    document = new(units=units.M)
+    for x, layer in ((0, first), (9, second)):
+        document.modelspace().add_lwpolyline([(x + a, b) for a, b in ROOM], close=True, dxfattribs={"layer": layer})
+    return document
 
 
 def test_layers_whose_names_say_wall_are_taken_alone(tmp_path: Path) -> None:
-    document = new(units=units.M)
-    closed(document, ROOM, "Außenwand")
-    closed(document, [(x + 9, y) for x, y in ROOM], "A-FURN")
+    document = two_rooms("Außenwand", "A-FURN")
     imported = read(tmp_path, document)
     assert len(imported.map.segments) == 4
-    (said,) = [note.message for note in imported.report.assumed if note.code == "layers"]
-    assert said.startswith("walls are on Außenwand, by their names, and not on A-FURN")
-    assert len(read(tmp_path, document, ImportOptions(layers=("*",))).map.segments) == 8
-    document.layers.add("A-FURN")
-    document.layers.get("A-FURN").off()
-    assert "layers" not in str(read(tmp_path, document).report.assumed)
+    assert notes(imported)["layers"].message.startswith("walls are on Außenwand, by their names, and not on A-FURN")
+    assert len(read(tmp_path, document, "*").map.segments) == 8
+    document.layers.add("A-FURN").off()
+    assert "layers" not in notes(read(tmp_path, document))
 
 
 def test_all_layers_are_taken_and_named_where_none_says_wall(tmp_path: Path) -> None:
-    document = new(units=units.M)
-    closed(document, ROOM, "1")
-    closed(document, [(x + 9, y) for x, y in ROOM], "2")
-    imported = read(tmp_path, document)
+    imported = read(tmp_path, two_rooms("1", "2"))
     assert len(imported.map.segments) == 8
-    assert "lines of all layers are walls: 1, 2" in str(imported.report.assumed)
+    assert "lines of all layers are walls: 1, 2" in notes(imported)["layers"].message

@@ -9,62 +9,58 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from formats import MalformedFileError, read_log
-from formats.report import ImportReport
+from formats import Log, MalformedFileError, read_log
 from vectorization import LaserScan
 
 from .bags import BEGUN, SECOND, USUAL, Laser, Recording, scan_bytes
+from .reading import counts, notes
 
 FLT_MAX = float(np.finfo(np.float32).max)
 MIXED = (2.0,) * 89 + (math.inf, 0.0)  # two beams without a return, as one driver and another write them
 
 
-def read(tmp_path: Path, *lasers: Laser) -> tuple[list[LaserScan], ImportReport]:
+def read(tmp_path: Path, *lasers: Laser) -> tuple[list[LaserScan], Log]:
     recording = Recording(tmp_path / "a.mcap")
     for k, laser in enumerate(lasers):
         recording.put("/scan", BEGUN + k, scan_bytes(BEGUN + k * SECOND, laser))
     log = read_log(recording.done())
-    return [scan.laser for scan in log], log.report
+    return [scan.laser for scan in log], log
 
 
-def assumed(report: ImportReport) -> dict[str, int]:
+def assumed(log: Log) -> dict[str, int]:
     """Return the counts of what was assumed of the scans; these recordings have no odometry."""
-    return {note.code: note.count for note in report.assumed if note.code != "no_odometry"}
-
-
-def message_of(report: ImportReport, code: str) -> str:
-    return next(note.message for note in report.assumed if note.code == code)
+    return {code: count for code, count in counts(log, "assumed").items() if code != "no_odometry"}
 
 
 @pytest.mark.parametrize("most", [0.0, -1.0, math.nan, math.inf, FLT_MAX, 1e6, 0.05])
 def test_a_greatest_range_that_says_nothing_leaves_readings_and_no_free_space(tmp_path: Path, most: float) -> None:
-    lasers, report = read(tmp_path, *[USUAL.but(ranges=MIXED, range_max=most)] * 3)
+    lasers, log = read(tmp_path, *[USUAL.but(ranges=MIXED, range_max=most)] * 3)
     for laser in lasers:
         np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.nan,) * 2)
-    assert assumed(report) == {"range_max": 3}
-    assert f"range_max is {np.float32(most):g} m" in message_of(report, "range_max")
+    assert assumed(log) == {"range_max": 3}
+    assert f"range_max is {np.float32(most):g} m" in notes(log)["range_max"].message
 
 
 @pytest.mark.parametrize("least", [math.nan, -1.0, math.inf, -math.inf])
 def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, least: float) -> None:
-    (laser,), report = read(tmp_path, USUAL.but(ranges=MIXED, range_min=least))
+    (laser,), log = read(tmp_path, USUAL.but(ranges=MIXED, range_min=least))
     np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
-    assert assumed(report) == {"range_min": 1}
+    assert assumed(log) == {"range_min": 1}
 
 
 @pytest.mark.parametrize("fields", [{}, {"range_min": 0.0}, {"range_max": 1000.0}])
 def test_limits_that_are_usual_are_believed_without_a_word(tmp_path: Path, fields: dict[str, float]) -> None:
-    (laser,), report = read(tmp_path, USUAL.but(ranges=MIXED, **fields))
+    (laser,), log = read(tmp_path, USUAL.but(ranges=MIXED, **fields))
     np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
-    assert assumed(report) == {}
+    assert assumed(log) == {}
 
 
 @pytest.mark.parametrize("fields", [{"range_max": 1.0}, {"range_min": 3.0}])
 def test_limits_that_leave_no_range_are_named(tmp_path: Path, fields: dict[str, float]) -> None:
-    (_,), report = read(tmp_path, USUAL.but(**fields))
-    assert assumed(report) == {"no_range_within": 1}
-    assert "range_min" in message_of(report, "no_range_within")
-    assert "range_max" in message_of(report, "no_range_within")
+    (_,), log = read(tmp_path, USUAL.but(**fields))
+    assert assumed(log) == {"no_range_within": 1}
+    assert "range_min" in notes(log)["no_range_within"].message
+    assert "range_max" in notes(log)["no_range_within"].message
 
 
 CLOCKWISE = USUAL.but(angle_min=math.pi / 2, angle_max=-math.pi / 2, angle_increment=-math.pi / 90)
@@ -85,21 +81,21 @@ STEP = math.pi / 90
     ],
 )
 def test_angles_that_agree_within_a_beam_are_taken(tmp_path: Path, laser: Laser) -> None:
-    (found,), report = read(tmp_path, laser)
+    (found,), log = read(tmp_path, laser)
     assert found.angle_increment == pytest.approx(laser.angle_increment)
-    assert not assumed(report)
+    assert not assumed(log)
 
 
 @pytest.mark.parametrize("step", [0.007, 0.03, 0.1])
 def test_an_end_of_the_field_of_view_as_angle_max_is_a_note(tmp_path: Path, step: float) -> None:
     """velodyne_laserscan makes as many bins as fit into a turn, and sets angle_max to pi."""
     bins = int(math.tau / step)
-    (found,), report = read(tmp_path, Laser((2.0,) * bins, -math.pi, math.pi, step))
+    (found,), log = read(tmp_path, Laser((2.0,) * bins, -math.pi, math.pi, step))
     assert found.angles[-1] == pytest.approx(-math.pi + (bins - 1) * step, abs=1e-4)
     off = (math.tau - step * (bins - 1)) / step
-    assert f"({off:.3g} beams)" in (message_of(report, "angle_max") if off > 1.5 else f"({off:.3g} beams)")
+    assert f"({off:.3g} beams)" in (notes(log)["angle_max"].message if off > 1.5 else f"({off:.3g} beams)")
     filtered = Laser((2.0,) * 1070, -2.35, -2.35 + 0.004363 * 1080, 0.004363)
-    assert "2.7 degrees" in message_of(read(tmp_path, filtered)[1], "angle_max")
+    assert "2.7 degrees" in notes(read(tmp_path, filtered)[1])["angle_max"].message
 
 
 @pytest.mark.parametrize(
@@ -122,9 +118,9 @@ def test_an_end_of_the_field_of_view_as_angle_max_is_a_note(tmp_path: Path, step
     ],
 )
 def test_angles_that_contradict_each_other_are_refused_by_name(tmp_path: Path, laser: Laser) -> None:
-    lasers, report = read(tmp_path, USUAL, laser, laser)
+    lasers, log = read(tmp_path, USUAL, laser, laser)
     assert len(lasers) == 1
-    (note,) = [note for note in report.dropped if note.code == "broken_scan"]
+    note = notes(log)["broken_scan"]
     assert note.count == 2
     assert all(name in note.message for name in ("angle_min", "angle_max", "angle_increment"))
     with pytest.raises(MalformedFileError, match=r"none of its 2 scans can be used; the first of them: .*angle_"):
@@ -132,9 +128,9 @@ def test_angles_that_contradict_each_other_are_refused_by_name(tmp_path: Path, l
 
 
 def test_a_scan_without_ranges_is_left_out(tmp_path: Path) -> None:
-    lasers, report = read(tmp_path, USUAL, USUAL.but(ranges=()))
+    lasers, log = read(tmp_path, USUAL, USUAL.but(ranges=()))
     assert len(lasers) == 1
-    assert {note.code: note.count for note in report.dropped}["broken_scan"] == 1
+    assert counts(log)["broken_scan"] == 1
 
 
 def stamped(tmp_path: Path, stamps: Sequence[int]) -> tuple[list[int], dict[str, int]]:
@@ -142,7 +138,7 @@ def stamped(tmp_path: Path, stamps: Sequence[int]) -> tuple[list[int], dict[str,
     for k, stamp in enumerate(stamps):
         recording.put("/scan", BEGUN + k * SECOND, scan_bytes(stamp))
     log = read_log(recording.done())
-    return [scan.stamp_ns for scan in log], assumed(log.report)
+    return [scan.stamp_ns for scan in log], assumed(log)
 
 
 def test_stamps_that_nobody_set_are_those_of_the_recorder(tmp_path: Path) -> None:
@@ -171,7 +167,7 @@ def test_a_text_log_may_begin_with_a_byte_order_mark(tmp_path: Path, mark: bytes
     path.write_bytes(mark + b"FLASER 3 1.0 2.0 3.0 0 0 0 0 0 0 7.5 host 7.5\n" * 2)
     log = read_log(path)
     assert len(list(log)) == 2
-    assert assumed(log.report)["stamp_repeated"] == 1
+    assert assumed(log)["stamp_repeated"] == 1
     path.write_text("FLASER 1 1.0 0 0 0 0 0 0 7.5 host 7.5\n", encoding="utf-16")
     with pytest.raises(MalformedFileError, match="UTF-16; save it as UTF-8"):
         list(read_log(path))

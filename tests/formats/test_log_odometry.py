@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from formats import IncompleteFileError, LoggedScan, LogOptions, read_log
+from formats import IncompleteFileError, LoggedScan, LogOptions, Note, read_log
 from registration import RigidTransform
 
-from .bags import FOUR_BEAMS, SECOND, UP, Robots, codes, fixed, read
+from .bags import FOUR_BEAMS, SECOND, UP, Robots, read, yawed
+from .reading import counts, notes
 
 TENTH = SECOND // 10
 BEGUN = 100 * SECOND
@@ -31,16 +32,16 @@ class Recorded(Robots):
 
     now = 0
 
-    def write(self, topic: str, kind: str, ns: int, data: bytes) -> None:
-        super().write(topic, kind, self.now, data)
+    def write(self, topic: str, kind: str, ns: int, data: bytes) -> Robots:
+        return super().write(topic, kind, self.now, data)
 
 
 def recorded(
     folder: Path, values: Sequence[Value], scans: Sequence[tuple[int, int]], *, messages: bool
-) -> tuple[list[LoggedScan], dict[str, int], str]:
+) -> tuple[list[LoggedScan], dict[str, Note]]:
     """Write values of odometry, as transforms or as messages, and scans; return what is read, and its notes."""
     bag = Recorded("mcap", folder)
-    fixed(bag, "base_link", "laser")
+    bag.fixed("base_link", "laser")
     for bag.now, stamp, x in sorted([*values, *((*one, math.nan) for one in scans)], key=lambda one: one[0]):
         if math.isnan(x):
             bag.scan(stamp)
@@ -49,7 +50,7 @@ def recorded(
         else:
             bag.transform("/tf", stamp, "odom", "base_link", (x, 0.0, 0.0))
     found, log = read(bag)
-    return found, codes(log), " ".join(note.message for note in log.report.assumed)
+    return found, notes(log)
 
 
 def at(*tenths: float, back: int = 0, late: int = 0) -> list[tuple[int, int]]:
@@ -65,15 +66,15 @@ def xs(found: Sequence[LoggedScan]) -> list[float | None]:
 def test_odometry_is_unknown_in_a_gap(tmp_path: Path, messages: bool, seconds: float, known: bool) -> None:
     lost = round(10 * seconds)
     values = [*drive(0, 21), *drive(20 + lost, 40 + lost)]
-    found, notes, told = recorded(tmp_path, values, at(5.5, 20.5, 30.5 + lost), messages=messages)
+    found, noted = recorded(tmp_path, values, at(5.5, 20.5, 30.5 + lost), messages=messages)
     assert xs(found) == pytest.approx([0.55, 2.05 if known else None, 3.05 + seconds])
     assert [one.part for one in found] == [0, 0, 0]
     assert found[2].unknown_s == pytest.approx(0.0 if known else seconds)
-    assert ("odometry_gap" in notes, "no_pose" in notes) == (not known, not known)
-    assert known or f"missing for up to {seconds:.1f} s" in told
+    assert ("odometry_gap" in noted, "no_pose" in noted) == (not known, not known)
+    assert known or f"missing for up to {seconds:.1f} s" in noted["odometry_gap"].message
     (tmp_path / "outside").mkdir()
-    _, notes, _ = recorded(tmp_path / "outside", values, at(5.5, 30.5 + lost), messages=messages)
-    assert "odometry_gap" not in notes  # no scan is in it
+    _, noted = recorded(tmp_path / "outside", values, at(5.5, 30.5 + lost), messages=messages)
+    assert "odometry_gap" not in noted  # no scan is in it
 
 
 @pytest.mark.parametrize("messages", [False, True])
@@ -88,19 +89,20 @@ def test_a_clock_that_is_set_back_begins_a_part_of_the_log(tmp_path: Path, messa
     back = round(seconds * SECOND)
     values = [*drive(0, 41), *drive(41, 80, back=back, speed=-0.5)]
     scans = [*at(10.5, 30.5), *at(50.5, 70.5, back=back)]
-    found, notes, told = recorded(tmp_path, values, scans, messages=messages)
+    found, noted = recorded(tmp_path, values, scans, messages=messages)
     assert xs(found) == pytest.approx([1.05, 3.05, -2.525, -3.525])
     assert [one.part for one in found] == [0, 0, 1, 1]
-    assert notes["odometry_parts"] == 0
-    assert "each of 2 parts" in told
+    assert noted["odometry_parts"].count == 0
+    assert "each of 2 parts" in noted["odometry_parts"].message
 
 
 @pytest.mark.parametrize("messages", [False, True])
 def test_two_publishers_that_contradict_each_other_are_named(tmp_path: Path, messages: bool) -> None:
     other = [(received + TENTH // 5, stamp + TENTH // 5, x - 1.0) for received, stamp, x in drive(20, 60)]
-    found, notes, told = recorded(tmp_path, [*drive(0, 60), *other], at(5, 30, 30.1, 30.5, 50), messages=messages)
+    found, noted = recorded(tmp_path, [*drive(0, 60), *other], at(5, 30, 30.1, 30.5, 50), messages=messages)
     assert xs(found) == [0.5, None, None, None, None]
-    assert notes["odometry_jumps"] > 70
+    assert noted["odometry_jumps"].count > 70
+    told = noted["odometry_jumps"].message
     assert f"on {'/odom' if messages else '/tf'}, the first 1.0" in told
     assert "0.020 s at stamp 102.0" in told
 
@@ -115,10 +117,12 @@ def test_odometry_that_is_reset_begins_a_part(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seconds", [0.8, 99.0, -0.8])
 def test_a_laser_with_another_clock_is_named(tmp_path: Path, seconds: float) -> None:
     scans = at(20, 30, back=round(seconds * SECOND))
-    found, notes, told = recorded(tmp_path, drive(0, 60), scans, messages=False)
+    found, noted = recorded(tmp_path, drive(0, 60), scans, messages=False)
     assert xs(found) == [None, None]
-    assert notes["clocks"] == 2
-    assert f"{abs(seconds):.1f} s {'behind' if seconds > 0 else 'ahead of'} those of odometry" in told
+    assert noted["clocks"].count == 2
+    assert (
+        f"{abs(seconds):.1f} s {'behind' if seconds > 0 else 'ahead of'} those of odometry" in noted["clocks"].message
+    )
 
 
 def test_a_carmen_log_has_parts_as_well(tmp_path: Path) -> None:
@@ -132,52 +136,45 @@ def turning(bag: Robots, *, rate: float, flip: bool = False) -> None:
     """A robot that turns and drives, at 0.5 rad/s and 0.4 m/s along its own x axis; a transform 1 / rate seconds."""
     for k in range(-10, 11):
         t = k / rate
-        half, x, y = 0.25 * t, 0.8 * math.sin(0.5 * t), 0.8 * (1.0 - math.cos(0.5 * t))
-        at = BEGUN + round(t * SECOND)
-        bag.transform("/tf", at, "odom", "base_link", (x, y, 0.0), (0.0, 0.0, math.sin(half), math.cos(half)))
+        x, y = 0.8 * math.sin(0.5 * t), 0.8 * (1.0 - math.cos(0.5 * t))
+        bag.transform("/tf", BEGUN + round(t * SECOND), "odom", "base_link", (x, y, 0.0), yawed(0.5 * t))
     bag.transform("/tf_static", 0, "base_link", "laser", (0.2, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0) if flip else UP)
 
 
-@pytest.mark.parametrize("flip", [False, True])
-def test_a_scan_that_takes_time_has_the_motion_of_its_sensor(tmp_path: Path, flip: bool) -> None:
-    bag = Robots("mcap", tmp_path)
+@pytest.mark.parametrize(
+    ("flip", "mount", "expected"),
+    [
+        (False, None, (0.4, 0.1, 0.5)),  # the sensor is 0.2 m ahead of the axis that the robot turns about
+        (True, None, (0.4, -0.1, -0.5)),
+        (False, RigidTransform(0.0, 0.3, math.pi / 2), (0.0, -0.25, 0.5)),
+    ],
+)
+def test_a_scan_that_takes_time_has_the_motion_of_its_sensor(
+    bag: Robots, flip: bool, mount: RigidTransform | None, expected: tuple[float, float, float]
+) -> None:
     turning(bag, rate=20.0, flip=flip)
     bag.scan(BEGUN)
-    (scan,), log = read(bag)
+    (scan,), log = read(bag, LogOptions(mount=mount))
     motion = scan.laser.motion
     assert motion is not None
     assert motion.time_increment == pytest.approx(0.001)
-    # The sensor is 0.2 m ahead of the axis that the robot turns about; upside down, left is right.
-    expected = (0.4, -0.1, -0.5) if flip else (0.4, 0.1, 0.5)
     assert (motion.vx, motion.vy, motion.omega) == pytest.approx(expected, abs=6e-3)
-    assert "motion" not in codes(log)
-
-
-def test_a_given_mount_says_how_the_sensor_moves(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
-    turning(bag, rate=20.0)
-    bag.scan(BEGUN)
-    (scan,), _ = read(bag, LogOptions(mount=RigidTransform(0.0, 0.3, math.pi / 2)))
-    motion = scan.laser.motion
-    assert motion is not None
-    assert (motion.vx, motion.vy, motion.omega) == pytest.approx((0.0, -0.25, 0.5), abs=6e-3)
+    assert "motion" not in notes(log)
 
 
 @pytest.mark.parametrize("rate", [0.5, 0.0])
-def test_a_motion_that_odometry_does_not_say_is_not_known(tmp_path: Path, rate: float) -> None:
-    bag = Robots("mcap", tmp_path)
+def test_a_motion_that_odometry_does_not_say_is_not_known(bag: Robots, rate: float) -> None:
     if rate:
         turning(bag, rate=rate)
     bag.scan(BEGUN)
     (scan,), log = read(bag)
     assert scan.laser.motion is None
     assert scan.time_increment == pytest.approx(0.001)
-    assert codes(log)["motion"] == 1
+    assert counts(log)["motion"] == 1
 
 
-def test_a_robot_that_stands_has_a_motion_of_zero(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
-    fixed(bag, "base_link", "laser")
+def test_a_robot_that_stands_has_a_motion_of_zero(bag: Robots) -> None:
+    bag.fixed("base_link", "laser")
     for k in range(4):
         bag.says(k * SECOND, 0.0)
     bag.scan(SECOND)
@@ -188,22 +185,20 @@ def test_a_robot_that_stands_has_a_motion_of_zero(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("scan_time", "expected"), [(0.1, 0.025), (0.0, 0.05), (math.nan, 0.05), (30.0, 0.05)])
-def test_a_time_increment_in_another_unit_is_replaced(tmp_path: Path, scan_time: float, expected: float) -> None:
-    bag = Robots("mcap", tmp_path)
+def test_a_time_increment_in_another_unit_is_replaced(bag: Robots, scan_time: float, expected: float) -> None:
     bag.scan(1, laser=FOUR_BEAMS.but(ranges=(1.0,) * 4, time_increment=100.0, scan_time=scan_time))
     (scan,), log = read(bag)
     assert scan.time_increment == pytest.approx(expected)
-    assert codes(log)["time_increment"] == 1
+    assert counts(log)["time_increment"] == 1
 
 
 @pytest.mark.parametrize("by_tf", [False, True])
 @pytest.mark.parametrize(("scale", "shift", "known"), [(1.0, 0.0, True), (0.5, 0.0, False), (1.0, 1.0, False)])
 def test_two_sources_that_contradict_each_other_are_named(
-    tmp_path: Path, by_tf: bool, scale: float, shift: float, known: bool
+    bag: Robots, by_tf: bool, scale: float, shift: float, known: bool
 ) -> None:
     """The second source has another speed, or is moved by a metre in between."""
-    bag = Robots("mcap", tmp_path)
-    fixed(bag, "base_link", "laser")
+    bag.fixed("base_link", "laser")
     for k in range(100):
         ns, x = BEGUN + k * TENTH, 0.1 * k
         if by_tf:
@@ -216,14 +211,14 @@ def test_two_sources_that_contradict_each_other_are_named(
     found, log = read(bag)
     assert (found[0].pose is not None) == known
     assert (found[1].pose is not None) == (scale == 1.0)
-    told = [note.message for note in log.report.assumed if note.code == "odometry_contradicts"]
-    assert len(told) == (not known)
-    assert known or all(one in told[0] for one in ("tf" if by_tf else "/odom", "/wheels", "within 2.0 s", "stamp 10"))
+    assert ("odometry_contradicts" in notes(log)) is not known
+    told = "" if known else notes(log)["odometry_contradicts"].message
+    assert known or all(one in told for one in ("tf" if by_tf else "/odom", "/wheels", "within 2.0 s", "stamp 10"))
     for source, factor in (("odom" if by_tf else "/odom", 1.0), ("/wheels", scale)):
-        assert known or f"--odom {source}" in told[0]
+        assert known or f"--odom {source}" in told
         chosen = read_log(bag.path, LogOptions(odometry=source))
         first = 4.5 * factor + 0.2 + shift * (source == "/wheels")  # the laser is 0.2 m ahead
         assert [scan.pose and scan.pose.x for scan in chosen] == pytest.approx([first, first + 4.5 * factor])
-        assert "odometry_contradicts" not in codes(chosen)
+        assert "odometry_contradicts" not in notes(chosen)
     with pytest.raises(IncompleteFileError, match=r"no odometry from /rtk: expected a topic .*, found .*/wheels"):
         list(read_log(bag.path, LogOptions(odometry="/rtk")))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from formats import (
     FormatError,
     ImportOptions,
     IncompleteFileError,
-    LoggedScan,
     LogOptions,
     MalformedFileError,
     UnsupportedFormatError,
@@ -23,6 +21,7 @@ from formats import (
 from registration import RigidTransform
 
 from .bags import FOUR_BEAMS, GRID, KINDS, SECOND, Robots, near, yawed
+from .reading import counts, notes
 
 FLASER = "FLASER 4 1.0 2.0 81.91 3.0 10 20 1.5 9 20 0 100.25 host 100.25\n"
 ROBOTLASER = (
@@ -45,14 +44,7 @@ def test_flaser_looks_over_half_a_turn_and_says_where_the_laser_was(tmp_path: Pa
     assert scan.stamp_ns == 100_250_000_000
     assert near(scan.pose, 10, 20, 1.5)
     assert near(scan.mount, 1, 0, 1.5)
-    assert {n.code: n.count for n in log.report.read} == {"scans": 1}
-    assert {n.code: n.count for n in log.report.dropped} == {"message_param": 1, "message_odom": 1}
-
-
-def test_an_odd_number_of_beams_has_one_at_either_end(tmp_path: Path) -> None:
-    ranges = " ".join(["1.0"] * 181)
-    (scan,) = read_log(written(tmp_path, f"FLASER 181 {ranges} 0 0 0 0 0 0 1 host 1\n"))
-    np.testing.assert_allclose(np.degrees(scan.laser.angles[[0, 90, 180]]), [-90, 0, 90], atol=1e-9)
+    assert counts(log, "read", "dropped") == {"scans": 1, "message_param": 1, "message_odom": 1}
 
 
 FIELD, STEP = "PARAM laser_front_laser_fov", "PARAM laser_front_laser_resolution"
@@ -78,8 +70,8 @@ def test_the_field_of_view_of_flaser(
     log = read_log(written(tmp_path, f"{params}FLASER {beams} {'1.0 ' * beams} 0 0 0 0 0 0 1 host 1\n"))
     (scan,) = log
     np.testing.assert_allclose(np.degrees(scan.laser.angles[[0, -1]]), [first, last], atol=0.01)
-    found = [n.message for n in log.report.assumed if n.code == "field_of_view"]
-    assert (said is None and not found) or (said is not None and said in found[0])
+    assert ("field_of_view" in notes(log)) is (said is not None)
+    assert said is None or said in notes(log)["field_of_view"].message
 
 
 @pytest.mark.parametrize(
@@ -92,14 +84,13 @@ def test_an_unknown_number_of_beams_needs_a_param(tmp_path: Path, params: str, r
         list(read_log(written(tmp_path, params + scan)))
     log = read_log(written(tmp_path, f"{FIELD} 240\n{scan}"))
     assert [found.pose for found in log] == [RigidTransform(1.0, 0.0, 0.0)]
-    assert "no_odometry" not in {note.code for note in log.report.assumed}
+    assert "no_odometry" not in notes(log)
 
 
 def test_settings_that_are_used_are_not_dropped(tmp_path: Path) -> None:
     log = read_log(written(tmp_path, f"{FIELD} 180\nPARAM robot_length 0.5 1 host 1\n{FLASER}"))
     list(log)
-    assert {n.code: n.count for n in log.report.read} == {"settings": 1, "scans": 1}
-    assert {n.code: n.count for n in log.report.dropped} == {"message_param": 1}
+    assert counts(log, "read", "dropped") == {"settings": 1, "scans": 1, "message_param": 1}
 
 
 def test_a_greatest_range_of_flaser_is_no_return(tmp_path: Path) -> None:
@@ -120,11 +111,9 @@ def test_robotlaser_has_its_angles_and_poses_behind_the_remissions(tmp_path: Pat
 def test_broken_lines_are_dropped_and_counted(tmp_path: Path) -> None:
     content = "FLASER 5 1.0\nFLASER -1 2\nFLASER x\n" + FLASER + "FLASER 1 nan nan nan nan 0 0 0 1 host 1\nnothing\n"
     log = read_log(written(tmp_path, content))
-    assert len(list(log)) == 1
-    counts = {n.code: n.count for n in log.report.dropped}
-    assert counts == {"broken_line": 4, "other_lines": 1}
-    assert len(list(log)) == 1  # read again from the beginning
-    assert {n.code: n.count for n in log.report.dropped} == counts
+    for _ in range(2):  # the second time again from the beginning
+        assert len(list(log)) == 1
+        assert counts(log, "read", "dropped") == {"scans": 1, "broken_line": 4, "other_lines": 1}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -151,19 +140,9 @@ def test_a_bag_gives_scans_where_tf_has_the_sensor(tmp_path: Path, kind: str) ->
     assert first.time_increment == pytest.approx(0.001)
     np.testing.assert_array_equal(first.laser.cleaned, [1.0, math.inf, math.nan, 2.0])
     assert log.report.format == {"bag": "rosbag1", "sqlite3": "rosbag2", "mcap": "rosbag2"}[kind]
-    counts = {n.code: n.count for n in (*log.report.read, *log.report.dropped)}
-    assert counts == {"scans": 4, "transforms": 4, "no_pose": 1}
+    assert counts(log, "read", "dropped") == {"scans": 4, "transforms": 4, "no_pose": 1}
     in_map = next(iter(read_log(bag.path, LogOptions(odometry="map"))))
     assert near(in_map.pose, 101.5, 0.1, 0.0)
-
-
-def test_a_single_mcap_is_read_without_its_folder(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
-    bag.scan(SECOND)
-    (file,) = bag.done().glob("*.mcap")
-    log = read_log(file)
-    assert [scan.pose for scan in log] == [None]
-    assert log.report.format == "mcap"
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -176,8 +155,7 @@ def test_odometry_stands_in_where_tf_says_nothing(tmp_path: Path, kind: str) -> 
     assert near(scan.pose, 2.0, 0.0, 0.0)
 
 
-def test_the_topic_with_most_scans_is_taken_and_broken_scans_are_dropped(tmp_path: Path) -> None:
-    bag = Robots("mcap", tmp_path)
+def test_the_topic_with_most_scans_is_taken_and_broken_scans_are_dropped(bag: Robots) -> None:
     bag.scan(1, "/rear")
     for ns in (2, 3):
         bag.scan(ns, "/front")
@@ -185,8 +163,8 @@ def test_the_topic_with_most_scans_is_taken_and_broken_scans_are_dropped(tmp_pat
     path = bag.done()
     log = read_log(path)
     assert [scan.topic for scan in log] == ["/front"] * 2
-    assert {n.code: n.count for n in log.report.dropped}["broken_scan"] == 1
-    assert "/rear" in next(n.message for n in log.report.assumed if n.code == "topic")
+    assert counts(log)["broken_scan"] == 1
+    assert "/rear" in notes(log)["topic"].message
     assert [scan.topic for scan in read_log(path, LogOptions(topic="/rear"))] == ["/rear"]
     with pytest.raises(IncompleteFileError, match="no LaserScan on /none"):
         list(read_log(path, LogOptions(topic="/none")))
@@ -211,15 +189,6 @@ def test_a_grid_in_a_bag_is_a_map(tmp_path: Path, kind: str) -> None:
         read_map(bag.path, ImportOptions(topic="/other"))
 
 
-def scans_of(path: Path) -> list[LoggedScan]:
-    return list(read_log(path))
-
-
-def cut(path: Path) -> None:
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-
-
 @pytest.mark.parametrize("kind", ["mcap", "sqlite3"])
 def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
     bag = Robots(kind, tmp_path)
@@ -232,33 +201,27 @@ def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
     for elsewhere in (f"../{held.name}", str(tmp_path / held.name)):
         metadata.write_text(told.replace(held.name, elsewhere))
         with pytest.raises(MalformedFileError, match="missing"):
-            scans_of(path)
+            list(read_log(path))
 
 
 @pytest.mark.parametrize(
-    ("kind", "spoilt", "how", "error", "message"),
+    ("kind", "message"),
     [
-        ("bag", "robot.bag", cut, MalformedFileError, "is a broken bag: .*; .* `rosbag reindex` repairs it"),
-        (
-            "mcap",
-            "robot_mcap/robot_mcap.mcap",
-            cut,
-            MalformedFileError,
-            "is a broken bag: .*; .* `mcap recover` repairs",
-        ),
-        ("sqlite3", "robot_sqlite3/robot_sqlite3.db3", cut, MalformedFileError, "is a broken bag: [^;]*$"),
+        ("bag", "is a broken bag: .*; .* `rosbag reindex` repairs it"),
+        ("mcap", "is a broken bag: .*; .* `mcap recover` repairs"),
+        ("sqlite3", "is a broken bag: [^;]*$"),
     ],
 )
-def test_broken_bags_are_refused_in_one_line(
-    tmp_path: Path, kind: str, spoilt: str, how: Callable[[Path], None], error: type[FormatError], message: str
-) -> None:
+def test_broken_bags_are_refused_in_one_line(tmp_path: Path, kind: str, message: str) -> None:
     bag = Robots(kind, tmp_path)
     for k in range(200):
         bag.scan(k * SECOND)
     path = bag.done()
-    how(tmp_path / spoilt)
-    with pytest.raises(error, match=message) as caught:
-        scans_of(path)
+    file = path if path.is_file() else next(one for one in path.iterdir() if one.name != "metadata.yaml")
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    with pytest.raises(MalformedFileError, match=message) as caught:
+        list(read_log(path))
     assert "\n" not in str(caught.value)
 
 
@@ -275,7 +238,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str, message: str) -> N
     (tmp_path / "a.pcap").write_bytes(b"")
     (tmp_path / "a.log").write_bytes(b"PARAM a b\n")
     with pytest.raises(FormatError, match=message):
-        scans_of(tmp_path / name)
+        list(read_log(tmp_path / name))
 
 
 @pytest.mark.parametrize("folder", ["100%", "a%2f..", "what?", "no#1"])

@@ -8,6 +8,9 @@ import pytest
 
 from formats import FormatError, ImportOptions, MalformedFileError, TooLargeError, UnsupportedFormatError, read_map
 
+from .drawn import feature, geojson, written
+from .reading import notes, rows
+
 LONG = pytest.mark.long
 OPTIONS = ImportOptions(local_metres=True, units="m", drawn="faces")
 FEATURES = b'{"type": "FeatureCollection", "features": [%s]}'
@@ -29,18 +32,8 @@ LINE = b'{"type": "LineString", "coordinates": %s}'
         ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
         ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
         ("a.svg", SVG.format('<path d="' + "M0 0" * 1_100_000 + '"/>'), TooLargeError, "characters of paths"),
-        (
-            "a.svg",
-            SVG.format('<line x1="nan" y1="0" x2="1" y2="1"/>'),
-            MalformedFileError,
-            "is 'nan', expected a number",
-        ),
-        (
-            "a.svg",
-            SVG.format('<line x1="1e" y1="0" x2="1" y2="1"/>'),
-            MalformedFileError,
-            "line 1: x1 of a line element",
-        ),
+        ("a.svg", SVG.format('<line x1="nan" x2="1"/>'), MalformedFileError, "is 'nan', expected a number"),
+        ("a.svg", SVG.format('<line x1="1e" x2="1"/>'), MalformedFileError, "line 1: x1 of a line element"),
         ("a.svg", SVG.format("<text/>"), MalformedFileError, "has no lines"),
         ("a.geojson", "[1, 2]", MalformedFileError, "is not GeoJSON"),
         ("a.geojson", '{"type": "LineString", "coordinates": [["a", 1], [2, 3]]}', MalformedFileError, "not a number"),
@@ -90,28 +83,26 @@ LINE = b'{"type": "LineString", "coordinates": %s}'
 def test_refused_in_one_line_that_names_the_file(
     tmp_path: Path, name: str, content: str | bytes, kind: type[FormatError], message: str
 ) -> None:
-    (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
     with pytest.raises(kind) as caught:
-        read_map(tmp_path / name, OPTIONS)
+        read_map(written(tmp_path, name, content), OPTIONS)
     assert any(part in str(caught.value) for part in message.split("|")), str(caught.value)
     assert str(caught.value).startswith(f"{name}: ")
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["a.json", "a.geojson", "a.csv"])
-def test_a_byte_order_mark(tmp_path: Path, name: str) -> None:
-    content = {
-        "a.json": b"[[0, 0, 4, 0]]",
-        "a.geojson": LINE % b"[[0, 0], [4, 0]]",
-        "a.csv": b"x1,y1,x2,y2\r\n0,0,4,0\r\n",
-    }[name]
-    (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + content)
-    assert read_map(tmp_path / name, OPTIONS).map.segments.endpoints.tolist() == [[0, 0, 4, 0]]
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.json", b"[[0, 0, 4, 0]]"),
+        ("a.geojson", LINE % b"[[0, 0], [4, 0]]"),
+        ("a.csv", b"x1,y1,x2,y2\r\n0,0,4,0\r\n"),
+    ],
+)
+def test_a_byte_order_mark(tmp_path: Path, name: str, content: bytes) -> None:
+    assert rows(read_map(written(tmp_path, name, b"\xef\xbb\xbf" + content), OPTIONS)) == [[0, 0, 4, 0]]
 
 
-def test_widths_that_are_no_lengths_are_none(tmp_path: Path) -> None:
-    feature = b'{"type": "Feature", "properties": {"width": %s}, "geometry": ' + LINE % b"[[0, 0], [4, 0]]" + b"}"
-    for width in (b"true", b"-1", b"1e300", b'"wide"', b"{}"):
-        (tmp_path / "a.geojson").write_bytes(feature % width)
-        found = read_map(tmp_path / "a.geojson", ImportOptions(local_metres=True, drawn="centres"))
-        assert "thickness_usual" in {note.code for note in found.report.assumed}
+@pytest.mark.parametrize("width", [True, -1, 1e300, "wide", {}])
+def test_widths_that_are_no_lengths_are_none(tmp_path: Path, width: object) -> None:
+    path = geojson(tmp_path, feature([[0, 0], [4, 0]], width=width))
+    assert "thickness_usual" in notes(read_map(path, ImportOptions(local_metres=True, drawn="centres")))

@@ -10,49 +10,25 @@ from typing import Any
 import pytest
 from ezdxf.filemanagement import new
 
-from formats import FormatError, ImportedMap, ImportOptions, IncompleteFileError, InvalidOptionError, read_map
-from formats.errors import MalformedFileError
+from formats import FormatError, ImportOptions, IncompleteFileError, InvalidOptionError, MalformedFileError, read_map
+
+from .drawn import feature, geojson, saved, svg, written
+from .reading import notes, rows
 
 METRES = ImportOptions(local_metres=True, drawn="faces")
 FACES = ImportOptions(drawn="faces", units="m")
 RING = [[0, 0], [7, 0], [7, 5], [0, 5], [0, 0]]
 
 
-def rows(imported: ImportedMap) -> list[list[float]]:
-    return [[round(float(v), 6) for v in row] for row in imported.map.segments.endpoints]
-
-
-def noted(imported: ImportedMap) -> dict[str, str]:
-    report = imported.report
-    return {note.code: note.message for note in (*report.read, *report.dropped, *report.assumed)}
-
-
-def feature(y: float, *z: float, **properties: Any) -> dict[str, Any]:
-    members = {"feature_type": properties.pop("feature_type")} if "feature_type" in properties else {}
-    line = {"type": "LineString", "coordinates": [[0, y, *z], [4, y, *z]]}
-    return {"type": "Feature", "properties": properties, "geometry": line} | members
-
-
-def geojson(tmp_path: Path, *features: dict[str, Any], crs: str | None = None) -> Path:
-    root: dict[str, Any] = {"type": "FeatureCollection", "features": features}
-    if crs is not None:
-        root["crs"] = {"type": "name", "properties": {"name": crs}}
-    (tmp_path / "a.geojson").write_text(json.dumps(root))
-    return tmp_path / "a.geojson"
+def line(y: float, *z: float, **properties: Any) -> dict[str, Any]:
+    return feature([[0, y, *z], [4, y, *z]], **properties)
 
 
 def drawn(tmp_path: Path, *lines: tuple[tuple[float, ...], tuple[float, ...]]) -> Path:
-    document = new()
-    document.header["$INSUNITS"] = 6
+    document = new(units=6)
     for begin, end in lines:
         document.modelspace().add_line(begin, end)
-    document.saveas(tmp_path / "a.dxf")
-    return tmp_path / "a.dxf"
-
-
-def svg(tmp_path: Path, body: str) -> Path:
-    (tmp_path / "a.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9">{body}</svg>')
-    return tmp_path / "a.svg"
+    return saved(tmp_path, document)
 
 
 def storeys(tmp_path: Path, kind: str) -> Path:
@@ -60,16 +36,14 @@ def storeys(tmp_path: Path, kind: str) -> Path:
     if kind == "heights":
         return drawn(tmp_path, ((0, 1, 0), (4, 1, 0)), ((0, 2, 3.2), (4, 2, 3.2)), ((0, 3, 4.1), (4, 3, 4.1)))
     if kind == "svg":
-        line = '<line x2="4" y1="{0}" y2="{0}" stroke="black"/>'
-        groups = [("Level 0", "-1"), ("Level 3.2", "-2"), ("Level 3.2", "-3")]
-        text = "".join(f'<g id="{name}">{line.format(y)}</g>' for name, y in groups)
-        return svg(tmp_path, text.replace("Level 3.2", "1st floor"))
+        groups = (("Level 0", -1), ("1st floor", -2), ("1st floor", -3))
+        text = '<g id="{0}"><line x2="4" y1="{1}" y2="{1}" stroke="black"/></g>'
+        return svg(tmp_path, "".join(text.format(*group) for group in groups))
     if kind == "csv":
-        (tmp_path / "a.csv").write_text("x1,y1,x2,y2,Level\n0,1,4,1,0\n0,2,4,2,3.2\n0,3,4,3,3.2\n")
-        return tmp_path / "a.csv"
+        return written(tmp_path, "a.csv", "x1,y1,x2,y2,Level\n0,1,4,1,0\n0,2,4,2,3.2\n0,3,4,3,3.2\n")
     if kind == "z":
-        return geojson(tmp_path, feature(1, 0), feature(2, 3.2), feature(3, 3.2))
-    return geojson(tmp_path, feature(1, **{kind: "0"}), feature(2, **{kind: 3.2}), feature(3, **{kind: "-3;3.2"}))
+        return geojson(tmp_path, line(1, 0), line(2, 3.2), line(3, 3.2))
+    return geojson(tmp_path, line(1, **{kind: "0"}), line(2, **{kind: 3.2}), line(3, **{kind: "-3;3.2"}))
 
 
 @pytest.mark.parametrize(
@@ -83,7 +57,7 @@ def test_several_floors_are_a_question_that_an_option_answers(tmp_path: Path, ki
     imported = read_map(path, replace(options, level=upper.upper()))
     assert sorted(row[1] for row in rows(imported)) == [2, 3]
     assert imported.map.meta["level"] == upper
-    assert noted(imported)["other_level"]
+    assert "other_level" in notes(imported)
     with pytest.raises(InvalidOptionError, match=r"found another name"):
         read_map(path, replace(options, level="7"))
 
@@ -92,10 +66,10 @@ def test_one_floor_is_no_question(tmp_path: Path) -> None:
     frame = [(a, b) for z in (0, 2.7) for a, b in (((0, 0, z), (4, 0, z)), ((4, 0, z), (4, 3, z)))]
     posts = [((x, y, 0), (x, y, 2.7)) for x, y in ((0, 0), (4, 0), (4, 3))]
     assert len(rows(read_map(drawn(tmp_path, *frame, *posts), FACES))) == 2
-    assert len(rows(read_map(geojson(tmp_path, feature(1, level="0-2"), feature(2, level="0;1;2")), METRES))) == 2
-    assert len(rows(read_map(geojson(tmp_path, feature(1, level="2"), feature(2)), METRES))) == 2
+    assert len(rows(read_map(geojson(tmp_path, line(1, level="0-2"), line(2, level="0;1;2")), METRES))) == 2
+    assert len(rows(read_map(geojson(tmp_path, line(1, level="2"), line(2)), METRES))) == 2
     with pytest.raises(InvalidOptionError, match="names no levels"):
-        read_map(geojson(tmp_path, feature(1)), ImportOptions(local_metres=True, level="0"))
+        read_map(geojson(tmp_path, line(1)), ImportOptions(local_metres=True, level="0"))
 
 
 def test_a_section_is_no_plan(tmp_path: Path) -> None:
@@ -104,8 +78,8 @@ def test_a_section_is_no_plan(tmp_path: Path) -> None:
 
 
 OSM = [
-    feature(1, indoor="wall"), feature(2, highway="footway"), feature(3, door="hinged"), feature(4, indoor="area"),
-    feature(5, feature_type="opening"), feature(6, door="no", material=1), feature(7, category="IfcDoor", level=2),
+    line(1, indoor="wall"), line(2, highway="footway"), line(3, door="hinged"), line(4, indoor="area"),
+    line(5) | {"feature_type": "opening"}, line(6, door="no", material=1), line(7, category="IfcDoor", level=2),
 ]  # fmt: skip
 
 
@@ -124,7 +98,7 @@ def test_what_no_laser_sees_is_left_out_and_properties_choose(
 ) -> None:
     imported = read_map(geojson(tmp_path, *OSM), ImportOptions(local_metres=True, drawn="faces", where=where))
     assert [row[1] for row in rows(imported)] == kept
-    message = noted(imported)[code]
+    message = notes(imported)[code].message
     assert all(part in message for part in said.split(", "))
 
 
@@ -132,30 +106,39 @@ def test_properties_of_dxf_csv_and_svg_choose_too(tmp_path: Path) -> None:
     document = new()
     for y, color in ((1, 1), (2, 3)):
         document.modelspace().add_line((0, y), (4, y), dxfattribs={"color": color})
-    document.saveas(tmp_path / "b.dxf")
-    (tmp_path / "b.csv").write_text("name,x1,y1,x2,y2,color\na,0,1,4,1,1\nb,0,2,4,2,3\n")
-    svg(tmp_path, "".join(f'<line x2="4" y1="-{y}" y2="-{y}" stroke="black" color="{2 * y - 1}"/>' for y in (1, 2)))
-    for name in ("b.dxf", "b.csv", "a.svg"):
-        imported = read_map(tmp_path / name, ImportOptions(units="m", drawn="faces", where=("color=3",)))
+    table = written(tmp_path, "a.csv", "name,x1,y1,x2,y2,color\na,0,1,4,1,1\nb,0,2,4,2,3\n")
+    lines = (f'<line x2="4" y1="-{y}" y2="-{y}" stroke="black" color="{2 * y - 1}"/>' for y in (1, 2))
+    for path in (saved(tmp_path, document), table, svg(tmp_path, "".join(lines))):
+        imported = read_map(path, replace(FACES, where=("color=3",)))
         assert rows(imported) == [[0, 2, 4, 2]]
 
 
+ONE, TWO = [[0, 0, 7, 2.5]], [[0, 0, 4, 0], [4, 0, 4, 3]]
+
+
 @pytest.mark.parametrize(
-    ("text", "metres"),
+    ("text", "expected"),
     [
-        ("0,00;0,00;7,00;2,50\n", 1), ("0,0 0,0 7,0 2,5\n", 1), ('"0,0","0,0","7,0","2,5"', 1),
-        ("x1;y1;x2;y2\n0,0;0;7;2,5\n", 1), ("sep=;\nx1;y1;x2;y2\n0;0;7;2.5\n", 1), ("0,0,7,2.5,A-WALL\n", 1),
-        ("start_x,start_y,end_x,end_y\n0,0,7,2.5\n", 1), ("x0,y0,x1,y1\n0,0,7,2.5\n", 1),
-        ("id,X1 [mm],Y1 [mm],X2 [mm],Y2 [mm]\n9,0,0,7,2.5\n", 1e-3), ("A\t0\t0\t7\t2.5\n", 1),
+        ("0,00;0,00;7,00;2,50\n", ONE), ("0,0 0,0 7,0 2,5\n", ONE), ('"0,0","0,0","7,0","2,5"', ONE),
+        ("x1;y1;x2;y2\n0,0;0;7;2,5\n", ONE), ("sep=;\nx1;y1;x2;y2\n0;0;7;2.5\n", ONE), ("0,0,7,2.5,A-WALL\n", ONE),
+        ("start_x,start_y,end_x,end_y\n0,0,7,2.5\n", ONE), ("x0,y0,x1,y1\n0,0,7,2.5\n", ONE),
+        ("x1_mm,y1_mm,x2_mm,y2_mm\n0,0,7000,2500\n", ONE), ("A\t0\t0\t7\t2.5\n", ONE),
+        ("x1;y1;x2;y2\n0;\u22120;7;2.5\n", ONE), ("% walls\nP1X|P1Y|P2X|P2Y\n0|0|7|2.5\n|||\n", ONE),
+        ("x1,y1,x2,y2,Layer\n0,0,7,2.5,A-WALL\n0,3,2,3,A-FURN\n", ONE), ("0,0,7,2.5,wall\n0,3,2,3,door\n", ONE),
+        ("0,0,4,0\n4,0,4,3\n", TWO), ("x1;y1;x2;y2\n0;0;4;0\n4;0;4;3", TWO),
+        ("name\ty2\tx2\ty1\tx1\nw\t0\t4\t0\t0\nw\t3\t4\t0\t4\n", TWO),
+        ("# a comment\n\n0 0 4 0\n4 0 4 3\n", TWO),
     ],
 )  # fmt: skip
-def test_tables_of_spreadsheets(tmp_path: Path, text: str, metres: float) -> None:
-    (tmp_path / "a.csv").write_text(text)
-    options = ImportOptions() if metres == 1 else ImportOptions(units="m")
-    assert rows(read_map(tmp_path / "a.csv", options)) == [[0, 0, 7, 2.5]]
-    if metres != 1:
-        with pytest.raises(FormatError, match=r"no line of 0.01 m"):
-            read_map(tmp_path / "a.csv")
+def test_tables_of_spreadsheets_and_programs(tmp_path: Path, text: str, expected: list[list[float]]) -> None:
+    assert rows(read_map(written(tmp_path, "a.csv", text))) == expected
+
+
+def test_a_unit_in_the_names_of_columns_makes_a_wall_too_short_unless_an_option_states_metres(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "id,X1 [mm],Y1 [mm],X2 [mm],Y2 [mm]\n9,0,0,7,2.5\n")
+    assert rows(read_map(path, ImportOptions(units="m"))) == ONE
+    with pytest.raises(FormatError, match=r"no line of 0.01 m"):
+        read_map(path)
 
 
 @pytest.mark.parametrize(
@@ -168,15 +151,13 @@ def test_tables_of_spreadsheets(tmp_path: Path, text: str, metres: float) -> Non
     ],
 )  # fmt: skip
 def test_a_table_that_is_not_clear_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "a.csv").write_text(text)
     with pytest.raises(FormatError) as caught:
-        read_map(tmp_path / "a.csv")
+        read_map(written(tmp_path, "a.csv", text))
     assert said in str(caught.value)
 
 
 def placed(x: float, y: float, scale: float = 1.0) -> dict[str, Any]:
-    ring = [[x + scale * a, y + scale * b] for a, b in RING]
-    return {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    return feature([[[x + scale * a, y + scale * b] for a, b in RING]], "Polygon")
 
 
 @pytest.mark.parametrize(
@@ -200,7 +181,8 @@ def placed(x: float, y: float, scale: float = 1.0) -> dict[str, Any]:
 def test_the_coordinate_system_of_a_geojson(
     tmp_path: Path, where: tuple[float, float, float], crs: str | None, options: dict[str, Any], said: str | None
 ) -> None:
-    path = geojson(tmp_path, placed(*where), crs=crs)
+    members = {} if crs is None else {"crs": {"type": "name", "properties": {"name": crs}}}
+    path = geojson(tmp_path, placed(*where), **members)
     if said is not None:
         with pytest.raises(IncompleteFileError) as caught:
             read_map(path, ImportOptions(**options))
@@ -208,46 +190,46 @@ def test_the_coordinate_system_of_a_geojson(
         return
     imported = read_map(path, ImportOptions(drawn="faces", **options))
     assert sum(imported.map.segments.lengths) == pytest.approx(24.0, abs=1e-4)
-    assert ("crs" in noted(imported)) == bool(options)
+    assert ("crs" in notes(imported)) == bool(options)
 
 
 def test_features_on_lines_of_their_own(tmp_path: Path) -> None:
-    (tmp_path / "a.geojson").write_text("\n".join(f"\x1e{json.dumps(feature(y))}" for y in (1, 2)))
-    assert len(rows(read_map(tmp_path / "a.geojson", METRES))) == 2
+    path = written(tmp_path, "a.geojson", "\n".join(f"\x1e{json.dumps(line(y))}" for y in (1, 2)))
+    assert len(rows(read_map(path, METRES))) == 2
 
 
 def test_an_option_that_says_nothing_of_a_file_is_refused(tmp_path: Path) -> None:
-    path = geojson(tmp_path, feature(1))
-    (tmp_path / "a.json").write_text("[[0, 0, 1, 0]]")
     for file, options in (
-        (path, ImportOptions(surface=0.0)),
-        (tmp_path / "a.json", ImportOptions(level="1")),
+        (geojson(tmp_path, line(1)), ImportOptions(surface=0.0)),
+        (written(tmp_path, "a.json", "[[0, 0, 1, 0]]"), ImportOptions(level="1")),
         (tmp_path / "a.yaml", ImportOptions(where=("a=b",))),
     ):
         with pytest.raises(InvalidOptionError, match="omit it"):
             read_map(file, options)
 
 
-def dashed(tmp_path: Path, kind: str) -> Path:
-    """Return a drawing of three lines. Two have dashes: one has its own style, one that of its layer or group."""
-    if kind == "svg":
-        styled = '<line x1="0" y1="2" x2="5" y2="2" stroke="red" style="stroke-dasharray: 4 2"/>'
-        plain = '<line x1="0" y1="0" x2="5" y2="0" stroke="red" stroke-dasharray="none"/>'
-        inner = '<g stroke-dasharray="3"><line x1="0" y1="4" x2="5" y2="4" stroke="red"/></g>'
-        return svg(tmp_path, plain + styled + inner)
+def with_dashes() -> Any:
     document = new(setup=True)
     document.linetypes.add("HIDDEN", [0.3, 0.2, -0.1])
     document.layers.add("BEAMS", linetype="HIDDEN")
+    return document
+
+
+def dashed(tmp_path: Path, kind: str) -> Path:
+    """Return a drawing of three lines. Two have dashes: one has its own style, one that of its layer or group."""
+    if kind == "svg":
+        line = '<line x2="5" y1="{0}" y2="{0}" stroke="red" {1}/>'
+        styles = 'stroke-dasharray="none"', 'style="stroke-dasharray: 4 2"'
+        plain, styled = (line.format(2 * k, style) for k, style in enumerate(styles))
+        return svg(tmp_path, f'{plain}{styled}<g stroke-dasharray="3">{line.format(4, "")}</g>')
+    document = with_dashes()
     for y, attributes in enumerate(({}, {"linetype": "DASHED2"}, {"layer": "BEAMS"})):
         document.modelspace().add_line((0.0, 2.0 * y), (5.0, 2.0 * y), dxfattribs=attributes)
-    document.saveas(tmp_path / "plan.dxf")
-    return tmp_path / "plan.dxf"
+    return saved(tmp_path, document)
 
 
 def test_lines_of_a_block_are_dashed_as_its_reference(tmp_path: Path) -> None:
-    document = new(setup=True)
-    document.linetypes.add("HIDDEN", [0.3, 0.2, -0.1])
-    document.layers.add("BEAMS", linetype="DASHED")
+    document = with_dashes()
     inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
     inner.add_line((0.0, 0.0), (5.0, 0.0), dxfattribs={"linetype": "ByBlock"})
     inner.add_line((0.0, 1.0), (5.0, 1.0))  # as the layer of the reference
@@ -255,10 +237,8 @@ def test_lines_of_a_block_are_dashed_as_its_reference(tmp_path: Path) -> None:
     outer.add_blockref("INNER", (0.0, 0.0), {"linetype": "BYBLOCK"})
     for k, attributes in enumerate(({}, {"linetype": "HIDDEN"}, {"layer": "BEAMS"}, {"linetype": "BYBLOCK"})):
         document.modelspace().add_blockref("OUTER", (0.0, 10.0 * k), attributes)
-    document.saveas(tmp_path / "plan.dxf")
-    found = read_map(tmp_path / "plan.dxf", ImportOptions(units="m", drawn="faces"))
-    seen = sorted({round(float(y)) for y in found.map.segments.endpoints[:, 1]})
-    assert seen == [0, 1, 2, 11, 12, 22, 30, 31, 32]
+    found = read_map(saved(tmp_path, document), FACES)
+    assert sorted({round(y) for _, y, *_ in rows(found)}) == [0, 1, 2, 11, 12, 22, 30, 31, 32]
 
 
 @pytest.mark.parametrize(
@@ -271,7 +251,7 @@ def test_dashed_lines_are_left_out_and_can_be_chosen(
     path = dashed(tmp_path, kind)
     found = read_map(path, ImportOptions(units="m"))
     assert len(found.map.segments) == 1
-    note = next(one for one in found.report.dropped if one.code == "not_seen")
+    note = notes(found)["not_seen"]
     assert note.count == 2
     assert all(one in note.message for one in told)
     assert "set the option where" in note.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from formats import ImportedMap, ImportOptions, InvalidOptionError, MalformedFileError, read_map
+
+from .reading import counts, notes
 
 Pixels = NDArray[np.uint8]
 
@@ -42,11 +45,11 @@ def imported(
     options: ImportOptions | None = None,
     *,
     name: str = "map.png",
-    said: str = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+    said: str = "",
     **saved: Any,
 ) -> ImportedMap:
     picture.transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(folder / name, **saved)
-    (folder / "map.yaml").write_text(f"image: {name}\nresolution: 0.1\norigin: [0, 0, 0]\n{said}")
+    (folder / "map.yaml").write_text(f"image: {name}\nresolution: 0.1\norigin: [0, 0, 0]\n{said or thresholds()}")
     return read_map(folder / "map.yaml", options or ImportOptions())
 
 
@@ -58,15 +61,17 @@ def walls(found: ImportedMap) -> set[tuple[int, float, float]]:
     return {(int(a), round(float(o), 2), float(n)) for a, o, n, exact in rows if exact > 1.0}
 
 
-def counts(found: ImportedMap) -> dict[str, int]:
-    return {note.code: note.count for note in found.report.read if note.code.endswith("_cells")}
+def cells(found: ImportedMap) -> list[int]:
+    """Return how many are free, occupied and unknown."""
+    return [counts(found)[f"{kind}_cells"] for kind in ("free", "occupied", "unknown")]
 
 
-def assumed(found: ImportedMap) -> dict[str, str]:
-    return {note.code: note.message for note in found.report.assumed}
+def is_the_hall(found: ImportedMap) -> bool:
+    return walls(found) == THREE_WALLS and cells(found) == [60_000, 802, 420 * 640 - 60_802]
 
 
-CELLS = {"free_cells": 60_000, "occupied_cells": 802, "unknown_cells": 420 * 640 - 60_802}
+def thresholds(free: float = 0.196, occupied: float = 0.65, *, negate: int = 0) -> str:
+    return f"negate: {negate}\noccupied_thresh: {occupied}\nfree_thresh: {free}\n"
 
 
 @pytest.mark.parametrize("free_thresh", [0.1, 0.196, 0.1961, 0.2, 0.25, 0.5])
@@ -74,37 +79,31 @@ CELLS = {"free_cells": 60_000, "occupied_cells": 802, "unknown_cells": 420 * 640
 def test_unknown_cells_are_those_of_the_value_that_tools_write(
     tmp_path: Path, unknown: int, free_thresh: float
 ) -> None:
-    said = f"negate: 0\noccupied_thresh: 0.65\nfree_thresh: {free_thresh}\n"
-    found = imported(tmp_path, Image.fromarray(shades(FREE, unknown, WALL)), said=said)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
+    found = imported(tmp_path, Image.fromarray(shades(FREE, unknown, WALL)), said=thresholds(free_thresh))
+    assert is_the_hall(found)
     freed = (255 - unknown) / 255 < free_thresh
-    assert ("unknown_grey" in assumed(found)) == freed
+    assert ("unknown_grey" in notes(found)) == freed
     if freed:
-        assert f"cells of grey value {unknown} are unknown" in assumed(found)["unknown_grey"]
-        assert "option unknown" in assumed(found)["unknown_grey"]
+        assert f"cells of grey value {unknown} are unknown" in notes(found)["unknown_grey"].message
+        assert "option unknown" in notes(found)["unknown_grey"].message
 
 
-@pytest.mark.parametrize("occupied_thresh", [0.15, 0.4, 0.5, 0.65, 0.9, 0.999])
-@pytest.mark.parametrize("unknown", [205, 128])
-def test_no_threshold_makes_unknown_cells_walls(tmp_path: Path, unknown: int, occupied_thresh: float) -> None:
-    said = f"negate: 0\noccupied_thresh: {occupied_thresh}\nfree_thresh: 0.1\n"
-    found = imported(tmp_path, Image.fromarray(shades(FREE, unknown, WALL)), said=said)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
-
-
-@pytest.mark.parametrize(("free", "unknown", "wall"), [(255, 230, 127), (255, 153, 0), (250, 180, 60), (240, 210, 20)])
-def test_other_values_stand_out_of_the_picture(tmp_path: Path, free: int, unknown: int, wall: int) -> None:
-    found = imported(tmp_path, Image.fromarray(shades(free, unknown, wall)))
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
-
-
-@pytest.mark.parametrize(("free", "unknown", "wall"), [(0, 205, 254), (1, 50, 255), (0, 128, 255), (0, 55, 254)])
-@pytest.mark.parametrize("free_thresh", [0.1, 0.25])
-def test_negated_pictures(tmp_path: Path, free: int, unknown: int, wall: int, free_thresh: float) -> None:
-    """Inverted as a whole, or with unknown cells left at 205, which negated is 0.804: occupied by every threshold."""
-    said = f"negate: 1\noccupied_thresh: 0.65\nfree_thresh: {free_thresh}\n"
-    found = imported(tmp_path, Image.fromarray(shades(free, unknown, wall)), said=said)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
+@pytest.mark.parametrize(
+    ("said", "greys"),
+    [
+        *((thresholds(0.1, occupied), (FREE, 205, WALL)) for occupied in (0.15, 0.4, 0.5, 0.65, 0.9, 0.999)),
+        *((thresholds(0.1, occupied), (FREE, 128, WALL)) for occupied in (0.15, 0.4, 0.5, 0.65, 0.9, 0.999)),
+        # Other values stand out of the picture.
+        *(("", greys) for greys in ((255, 230, 127), (255, 153, 0), (250, 180, 60), (240, 210, 20), (205, 128, 0))),
+        # Inverted as a whole, or with unknown cells left at 205, which negated is 0.804: occupied by every threshold.
+        *((thresholds(0.1, negate=1), greys) for greys in ((0, 205, 254), (1, 50, 255), (0, 128, 255), (0, 55, 254))),
+        *((thresholds(0.25, negate=1), greys) for greys in ((0, 205, 254), (1, 50, 255), (0, 128, 255), (0, 55, 254))),
+    ],
+)
+def test_neither_thresholds_nor_grey_values_make_unknown_cells_walls(
+    tmp_path: Path, said: str, greys: tuple[int, int, int]
+) -> None:
+    assert is_the_hall(imported(tmp_path, Image.fromarray(shades(*greys)), said=said))
 
 
 def sixteen_bits(up: Pixels) -> Image.Image:
@@ -125,10 +124,8 @@ def see_through(up: Pixels) -> Image.Image:
 
 
 def grey_and_alpha(up: Pixels) -> Image.Image:
-    alpha = np.where(up == UNKNOWN, 0, 255).astype(np.uint8)
-    return Image.merge(
-        "LA", [Image.fromarray(np.where(up == UNKNOWN, 254, up).astype(np.uint8)), Image.fromarray(alpha)]
-    )
+    grey, alpha = np.where(up == UNKNOWN, 254, up), np.where(up == UNKNOWN, 0, 255)
+    return Image.merge("LA", [Image.fromarray(one.astype(np.uint8)) for one in (grey, alpha)])
 
 
 def coloured(up: Pixels) -> Image.Image:
@@ -139,11 +136,9 @@ def coloured(up: Pixels) -> Image.Image:
 
 
 @pytest.mark.parametrize("drawn", [sixteen_bits, palette, see_through, grey_and_alpha, coloured])
-@pytest.mark.parametrize("said", ["mode: trinary\nfree_thresh: 0.25\n", "mode: scale\nfree_thresh: 0.25\n"])
-def test_kinds_of_pictures(tmp_path: Path, drawn: object, said: str) -> None:
-    assert callable(drawn)
-    found = imported(tmp_path, drawn(sheet()), said="negate: 0\noccupied_thresh: 0.65\n" + said)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
+@pytest.mark.parametrize("mode", ["trinary", "scale"])
+def test_kinds_of_pictures(tmp_path: Path, drawn: Callable[[Pixels], Image.Image], mode: str) -> None:
+    assert is_the_hall(imported(tmp_path, drawn(sheet()), said=f"{thresholds(0.25)}mode: {mode}\n"))
 
 
 @pytest.mark.parametrize("kind", ["L", "I;16"])
@@ -153,19 +148,21 @@ def test_a_transparent_grey_value(tmp_path: Path, kind: str) -> None:
     picture = Image.fromarray(up if kind == "L" else up.astype(np.uint16))
     if kind == "I;16":
         picture = Image.fromarray(np.where(up == 255, 65_535, up).astype(np.uint16))
-    found = imported(tmp_path, picture, transparency=254)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
+    assert is_the_hall(imported(tmp_path, picture, transparency=254))
+
+
+def thick_sheet() -> Image.Image:
+    thick = sheet()
+    thick[96:99, 149:450] = thick[301:304, 149:450] = thick[96:304, 146:149] = WALL
+    return Image.fromarray(thick)
 
 
 @pytest.mark.parametrize("quality", [50, pytest.param(75, marks=LONG), 95])
 @pytest.mark.parametrize("name", ["map.png", "map.jpg"])
 def test_noise_of_a_compression(tmp_path: Path, quality: int, name: str) -> None:
-    thick = sheet()
-    thick[96:99, 149:450] = thick[301:304, 149:450] = thick[96:304, 146:149] = WALL
     packed = io.BytesIO()
-    Image.fromarray(thick).save(packed, "JPEG", quality=quality)
-    said = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
-    found = imported(tmp_path, Image.open(packed), said=said, name=name)
+    thick_sheet().save(packed, "JPEG", quality=quality)
+    found = imported(tmp_path, Image.open(packed), said=thresholds(0.25), name=name)
     assert {direction for direction, _, _ in walls(found)} == {0, 180, 270}
     assert len(walls(found)) == 3
     assert found.map.segments.lengths.sum() == pytest.approx(80.0, abs=1.0)
@@ -174,11 +171,9 @@ def test_noise_of_a_compression(tmp_path: Path, quality: int, name: str) -> None
 @pytest.mark.parametrize("factor", [2, pytest.param(3, marks=LONG), pytest.param(4, marks=LONG)])
 @pytest.mark.parametrize("filtered", [Image.Resampling.BILINEAR, Image.Resampling.LANCZOS])
 def test_blurred_edges_of_a_resized_picture(tmp_path: Path, factor: int, filtered: Image.Resampling) -> None:
-    thick = sheet()
-    thick[96:99, 149:450] = thick[301:304, 149:450] = thick[96:304, 146:149] = WALL
-    small = Image.fromarray(thick)
+    small = thick_sheet()
     large = small.resize((small.width * factor, small.height * factor), filtered)
-    found = imported(tmp_path, large, said="negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    found = imported(tmp_path, large, said=thresholds(0.25))
     # Where a wall ends, free, occupied and unknown blur into one another: pieces of a metre.
     long = {(direction, length) for direction, _, length in walls(found) if length > 2.0}
     assert long == {(0, 30.0 * factor), (180, 30.0 * factor), (270, 20.0 * factor)}
@@ -189,35 +184,30 @@ def test_gradients_follow_the_thresholds(tmp_path: Path) -> None:
     up = np.tile(np.linspace(255, 120, 300).astype(np.uint8), (200, 1))
     up[:20] = up[-20:] = 0
     found = imported(tmp_path, Image.fromarray(up))
-    assert "unknown_grey" not in assumed(found)
+    assert "unknown_grey" not in notes(found)
     # A few cells of the edges are decided.
-    assert counts(found)["free_cells"] == pytest.approx(int((up > 205).sum()), abs=50)
+    assert cells(found)[0] == pytest.approx(int((up > 205).sum()), abs=50)
 
 
 @pytest.mark.parametrize(
-    ("free", "unknown", "wall", "kind"),
-    [(205, 128, 0, None), (205, 205, 0, "free"), (255, 255, 205, "occupied"), (255, 255, 128, "occupied")],
+    ("greys", "kind"), [((205, 205, 0), "free"), ((255, 255, 205), "occupied"), ((255, 255, 128), "occupied")]
 )
 def test_a_usual_value_that_is_the_lightest_or_the_darkest(
-    tmp_path: Path, free: int, unknown: int, wall: int, kind: str | None
+    tmp_path: Path, greys: tuple[int, int, int], kind: str
 ) -> None:
-    found = imported(tmp_path, Image.fromarray(shades(free, unknown, wall)))
+    found = imported(tmp_path, Image.fromarray(shades(*greys)))
     assert walls(found) >= THREE_WALLS
-    if kind is None:
-        assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
-    else:
-        assert f"are the only ones that are {kind}" in assumed(found)["unknown_grey"]
-        assert "option unknown" in assumed(found)["unknown_grey"]
+    assert f"are the only ones that are {kind}" in notes(found)["unknown_grey"].message
+    assert "option unknown" in notes(found)["unknown_grey"].message
 
 
 def test_the_caller_says_which_cells_are_unknown(tmp_path: Path) -> None:
     picture = Image.fromarray(shades(255, 222, 0))
-    said = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.4\n"
-    found = imported(tmp_path, picture, ImportOptions(unknown=222), said=said)
-    assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
-    assert "unknown_grey" not in assumed(found)
+    found = imported(tmp_path, picture, ImportOptions(unknown=222), said=thresholds(0.4))
+    assert is_the_hall(found)
+    assert "unknown_grey" not in notes(found)
     free = imported(tmp_path, Image.fromarray(shades(254, 205, 0)), ImportOptions(unknown="none"))
-    assert counts(free) == {"free_cells": 420 * 640 - 802, "occupied_cells": 802, "unknown_cells": 0}
+    assert cells(free) == [420 * 640 - 802, 802, 0]
     for wrong in (256, -1, "grey", True):
         with pytest.raises(InvalidOptionError, match="unknown: expected none, or a grey value"):
             ImportOptions(unknown=wrong)  # type: ignore[arg-type]
