@@ -8,20 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from registration import (
-    InvalidArgumentError,
-    MeasuredSegments,
-    RegistrationOptions,
-    RigidTransform,
-    Segments,
-    register,
-)
+from registration import InvalidArgumentError, MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 
-from .scenes import (
-    ROOM,
-    diagonal,
-    room,
-)
+from .scenes import ROOM, diagonal, room
 
 
 @pytest.mark.parametrize(
