@@ -8,13 +8,12 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from association import (
-    AssociationDiagnostics,
     AssociationOptions,
     AssociationResult,
     Beams,
@@ -29,6 +28,7 @@ from association import (
 from registration import MeasuredSegments, RigidTransform, Segments
 from vectorization import LaserScan, Motion, vectorize
 
+T = TypeVar("T")
 Floats = NDArray[np.float64]
 Truth = NDArray[np.intp]
 
@@ -229,35 +229,23 @@ def answer_of(
     return associate(index, scan, prior, AssociationOptions(**options), deadline)
 
 
-def pose_in(result: AssociationResult) -> RigidTransform:
-    """Return the pose of an answer that has one."""
-    assert result.pose is not None
-    return result.pose
+def known(value: T | None) -> T:
+    """Return what an answer must have."""
+    assert value is not None
+    return value
 
 
-def diagnostics_in(result: AssociationResult) -> AssociationDiagnostics:
-    assert result.diagnostics is not None
-    return result.diagnostics
-
-
-def covariance_in(result: AssociationResult) -> Floats:
-    assert result.covariance is not None
-    return result.covariance
-
-
-def probability_in(result: AssociationResult) -> float:
-    assert result.probability is not None
-    return result.probability
-
-
-def same_pose(a: RigidTransform, b: RigidTransform, distance: float = 0.1, angle: float = 0.0175) -> bool:
+def same_pose(
+    one: RigidTransform | None, other: RigidTransform | None, distance: float = 0.1, angle: float = 0.0175
+) -> bool:
+    a, b = known(one), known(other)
     turn = math.remainder(a.theta - b.theta, math.tau)
     return math.hypot(a.x - b.x, a.y - b.y) <= distance and abs(turn) <= angle
 
 
 def is_wrong(result: AssociationResult, truth: RigidTransform) -> bool:
     """Return whether an answer is usable and more than 0.3 m or 3 degrees off."""
-    return result.usable and not same_pose(pose_in(result), truth, 0.3, math.radians(3.0))
+    return result.usable and not same_pose(result.pose, truth, 0.3, math.radians(3.0))
 
 
 def as_json(result: AssociationResult) -> str:
@@ -266,9 +254,9 @@ def as_json(result: AssociationResult) -> str:
 
 def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
     """Return the squared error of an answer's pose, normalized by its covariance: a chi-square of three."""
-    found = pose_in(result)
+    found = known(result.pose)
     error = np.array([found.x - truth.x, found.y - truth.y, math.remainder(found.theta - truth.theta, math.tau)])
-    return float(error @ np.linalg.solve(covariance_in(result), error))
+    return float(error @ np.linalg.solve(known(result.covariance), error))
 
 
 def warning_codes(result: AssociationResult) -> list[str]:

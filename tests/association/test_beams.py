@@ -29,12 +29,10 @@ from .scenes import (
     Floats,
     answer_of,
     box,
-    diagnostics_in,
     equal_rooms,
     index_of,
+    known,
     pose,
-    pose_in,
-    probability_in,
     ranges,
     same_pose,
     scan_of,
@@ -47,8 +45,8 @@ from .scenes import (
 
 def best_of_two_rooms(walls: Floats, scan: Scan, at: RigidTransform) -> AssociationResult:
     result = answer_of(index_of(walls), scan)
-    assert same_pose(pose_in(result), at)
-    assert (diagnostics_in(result).margin or 0.0) > 0.5
+    assert same_pose(result.pose, at)
+    assert (known(result.diagnostics).margin or 0.0) > 0.5
     return result
 
 
@@ -90,9 +88,9 @@ def test_beams_show_where_along_a_corridor() -> None:
     beams = ranges(walls, at, sigma=1e-4).beams
     with_beams = answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0), beams=beams))
     assert blind.status is Status.DEGENERATE
-    assert not with_beams.usable or same_pose(pose_in(with_beams), at)
-    assert abs(pose_in(blind).x - at.x) > 0.5
-    assert same_pose(pose_in(with_beams), at, 0.1, 0.1)
+    assert not with_beams.usable or same_pose(with_beams.pose, at)
+    assert abs(known(blind.pose).x - at.x) > 0.5
+    assert same_pose(with_beams.pose, at, 0.1, 0.1)
 
 
 # --- Points of a map --------------------------------------------------------------------------------------------------
@@ -121,11 +119,11 @@ def test_points_tell_equal_rooms_apart() -> None:
     scan = ranges(truth, at, 1, beams=1440)
     assert not answer_of(bare, scan).usable
     found = answer_of(pointed, scan)
-    assert same_pose(pose_in(found), at)
+    assert same_pose(found.pose, at)
     other = next(one for one in found.alternatives if same_pose(one.pose, INSIDE))
-    assert probability_in(found) > 2.0 * (other.probability or 0.0)
+    assert known(found.probability) > 2.0 * (other.probability or 0.0)
     blind = answer_of(pointed, without_beams(scan))
-    assert diagnostics_in(blind).margin == pytest.approx(0.0, abs=1e-6)
+    assert known(blind.diagnostics).margin == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_beam_that_passes_a_point_is_no_evidence() -> None:
@@ -134,7 +132,7 @@ def test_a_beam_that_passes_a_point_is_no_evidence() -> None:
     scan = ranges(equal_rooms(2), at, 1)
     bare, pointed = (answer_of(one, scan) for one in (index_of(equal_rooms(2)), with_points(equal_rooms(2), LEGS)))
     assert (pointed.status, pointed.usable) == (bare.status, bare.usable)
-    assert diagnostics_in(pointed).margin == pytest.approx(diagnostics_in(bare).margin, abs=1.0)
+    assert known(pointed.diagnostics).margin == pytest.approx(known(bare.diagnostics).margin, abs=1.0)
 
 
 def test_points_are_never_a_base_or_a_pair() -> None:
@@ -163,7 +161,7 @@ def test_points_move_with_the_map() -> None:
     moved = by.apply(equal_rooms(2).reshape(-1, 2)).reshape(-1, 4)
     one, other = answer_of(with_points(equal_rooms(2), LEGS), scan), answer_of(with_points(moved, by.apply(LEGS)), scan)
     assert (one.status, one.usable) == (other.status, other.usable)
-    assert same_pose(by.compose(pose_in(one)), pose_in(other), 1e-6, 1e-6)
+    assert same_pose(by.compose(known(one.pose)), other.pose, 1e-6, 1e-6)
     assert one.probability == pytest.approx(other.probability, abs=0.005)
 
 
@@ -171,7 +169,7 @@ def test_a_map_without_directions_has_its_points() -> None:
     at = pose(INSIDE.x + SHIFT[0], INSIDE.y, INSIDE.theta)
     scan = ranges(furnished(equal_rooms(2), LEGS), at, 1, beams=1440)
     found = answer_of(with_points(equal_rooms(2), LEGS), scan, oriented=False)
-    assert same_pose(pose_in(found), at)
+    assert same_pose(found.pose, at)
 
 
 def test_points_of_several_maps_lie_on_their_own() -> None:
@@ -181,9 +179,9 @@ def test_points_of_several_maps_lie_on_their_own() -> None:
     scan = ranges(furnished(ROOM, legs), INSIDE, 1, beams=1440)
     found = associate_on_maps(maps, scan)
     assert found.map_id == "legs"
-    assert same_pose(pose_in(found), INSIDE)
+    assert same_pose(found.pose, INSIDE)
     alone = associate(with_points(ROOM, legs), scan)
-    assert same_pose(pose_in(found), pose_in(alone), 1e-6, 1e-6)
+    assert same_pose(found.pose, alone.pose, 1e-6, 1e-6)
 
 
 @pytest.mark.parametrize(

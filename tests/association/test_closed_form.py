@@ -16,12 +16,10 @@ from .scenes import (
     Floats,
     answer_of,
     carried,
-    covariance_in,
-    diagnostics_in,
     equal_rooms,
     index_of,
+    known,
     pose,
-    pose_in,
     ring,
     same_pose,
     scan_of,
@@ -63,7 +61,7 @@ def test_a_room_of_four_walls_and_a_scan_from_a_known_pose() -> None:
     for sigma in (0.0, 0.02, None):
         result = answer_of_four(seen_of_four(), sigma)
         assert (result.status, result.usable) == (Status.OK, True)
-        assert same_pose(pose_in(result), AT, 1e-9, 1e-9)
+        assert same_pose(result.pose, AT, 1e-9, 1e-9)
         assert [(pair.scan, pair.map) for pair in result.correspondences] == [(k, k) for k in range(4)]
         assert result.unmatched_scan == ()
         assert result.missing_map == ()
@@ -71,17 +69,17 @@ def test_a_room_of_four_walls_and_a_scan_from_a_known_pose() -> None:
             assert (pair.offset, pair.angle) == pytest.approx((0.0, 0.0), abs=1e-9)
             assert pair.overlap == pytest.approx(1.0, abs=1e-9)
             assert pair.alternatives == ()
-        assert diagnostics_in(result).inlier_fraction == pytest.approx(1.0)
-        assert diagnostics_in(result).pairs == 4
-        assert diagnostics_in(result).dof == 5
-        assert diagnostics_in(result).chi2 == pytest.approx(0.0, abs=1e-9)
+        assert known(result.diagnostics).inlier_fraction == pytest.approx(1.0)
+        assert known(result.diagnostics).pairs == 4
+        assert known(result.diagnostics).dof == 5
+        assert known(result.diagnostics).chi2 == pytest.approx(0.0, abs=1e-9)
 
 
 def test_residuals_are_those_of_the_formulas() -> None:
     """Of the contract: ``n_map . (R m_scan + t) - p_map`` and ``wrap(angle(d_map) - angle(d_scan) - theta)``."""
     ends = seen_of_four(np.array([0.01, -0.004, 0.006, -0.012]))
     result = answer_of_four(ends, 0.02)
-    at = pose_in(result)
+    at = known(result.pose)
     for pair in result.correspondences:
         begin, end = FOUR[pair.map].reshape(2, 2)
         d = (end - begin) / np.hypot(*(end - begin))
@@ -120,7 +118,7 @@ def cramer_rao(map_sigma: float) -> Floats:
 @pytest.mark.parametrize("map_sigma", [0.0, 0.02])
 def test_the_covariance_is_the_cramer_rao_bound(map_sigma: float) -> None:
     """Of an exact map; where walls are off one by one it is not below the bound, in any direction."""
-    found = covariance_in(answer_of_four(seen_of_four(), map_sigma))
+    found = known(answer_of_four(seen_of_four(), map_sigma).covariance)
     ratios = np.linalg.eigvals(np.linalg.solve(cramer_rao(map_sigma), found)).real
     assert ratios.min() >= 0.98
     if map_sigma == 0.0:
@@ -148,8 +146,8 @@ def test_the_pose_is_the_least_squares_estimate() -> None:
         jacobian = np.stack(columns, axis=1)
         x = x - np.linalg.lstsq(jacobian, residuals(x))[0]
     result = answer_of_four(ends)
-    assert same_pose(pose_in(result), RigidTransform(*x.tolist()), 1e-6, 1e-6)
-    assert diagnostics_in(result).chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
+    assert same_pose(result.pose, RigidTransform(*x.tolist()), 1e-6, 1e-6)
+    assert known(result.diagnostics).chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
 
 
 def overlap_at(wall: Floats, segment: Floats, at: RigidTransform) -> float:
@@ -167,7 +165,9 @@ def test_overlaps_are_those_at_the_pose_that_is_returned(estimator: str) -> None
         ends = seen(ROOM, INSIDE, noise=0.04, cut=0.1, seed=seed)[0]
         result = answer_of(index_of(ROOM), scan_of(ends, 0.04), min_overlap=0.2, estimator=estimator)
         for pair in result.correspondences:
-            assert pair.overlap == pytest.approx(overlap_at(ROOM[pair.map], ends[pair.scan], pose_in(result)), abs=1e-9)
+            assert pair.overlap == pytest.approx(
+                overlap_at(ROOM[pair.map], ends[pair.scan], known(result.pose)), abs=1e-9
+            )
             compared += 1
     assert compared >= 24
 
@@ -204,7 +204,7 @@ def test_a_map_that_is_stated_to_be_exact_keeps_its_steps(step: float, sigma: fl
     walls = np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], hall])
     ends = np.array([[5.0, step, 7.8, step], [8.0, 0.5, 8.0, 4.5], [7.5, 5.0, 3.4, 5.0], [3.0, 5.2, 3.0, 6.8]])
     at = pose(5.0, 2.0, 0.3)
-    found = pose_in(answer_of(index_of(walls, sigma), scan_of(carried(ends, at.inverse()), 0.005)))
+    found = known(answer_of(index_of(walls, sigma), scan_of(carried(ends, at.inverse()), 0.005)).pose)
     assert (found.x, found.y, found.theta) == pytest.approx((at.x, at.y, at.theta), abs=3e-4 + sigma)
 
 
@@ -228,15 +228,13 @@ def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> 
     result = answer_of(index_of(ROOM, sigma), scan)
     pairs = [[one.scan, one.map] for one in result.correspondences]
     again = register(Segments.from_array(ROOM), scan.measured, pairs, sigma, RegistrationOptions())
-    assert diagnostics_in(result).corrections is None
-    assert again.pose is not None
-    assert same_pose(again.pose, pose_in(result), 1e-6, 1e-6)
-    assert again.diagnostics.dof == diagnostics_in(result).dof
+    assert known(result.diagnostics).corrections is None
+    assert same_pose(again.pose, result.pose, 1e-6, 1e-6)
+    assert again.diagnostics.dof == known(result.diagnostics).dof
     if sigma > 0.0:
         return
-    assert again.covariance is not None
-    np.testing.assert_allclose(again.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
-    assert again.diagnostics.chi2 == pytest.approx(diagnostics_in(result).chi2, rel=1e-6)
+    np.testing.assert_allclose(known(again.covariance), known(result.covariance), rtol=1e-6, atol=1e-12)
+    assert again.diagnostics.chi2 == pytest.approx(known(result.diagnostics).chi2, rel=1e-6)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03, None])
@@ -252,6 +250,5 @@ def test_an_equal_room_has_the_same_numbers(sigma: float | None) -> None:
     for name in ("rotation", "translation"):
         expected = getattr(diagnostics.ambiguity, name)
         assert getattr(other.ambiguity, name) == pytest.approx(expected, rel=1e-6)
-    assert other.covariance is not None
-    np.testing.assert_allclose(other.covariance, covariance_in(result), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(known(other.covariance), known(result.covariance), rtol=1e-6, atol=1e-12)
     assert diagnostics.margin == pytest.approx(0.0, abs=1e-6)

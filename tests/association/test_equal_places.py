@@ -17,14 +17,12 @@ from .scenes import (
     Floats,
     answer_of,
     box,
-    diagnostics_in,
     drawn_room,
     equal_rooms,
     index_of,
     is_wrong,
+    known,
     pose,
-    pose_in,
-    probability_in,
     ranges,
     reason_codes,
     ring,
@@ -76,7 +74,7 @@ def test_equal_rooms_are_not_usable(rooms: int) -> None:
         result = answer_of(index, scan, max_alternatives=20)
         assert (result.status, result.usable) == (Status.AMBIGUOUS, False)
         assert "similar_place" in reason_codes(result)
-        assert probability_in(result) <= 1.05 / min(rooms, 3)
+        assert known(result.probability) <= 1.05 / min(rooms, 3)
         assert "about as well" in result.message
         assert not answer_of(index, scan, on_map=1.0).usable, "which does not decide between rooms of the map"
 
@@ -100,7 +98,7 @@ def test_each_equal_room_is_listed(rooms: int) -> None:
     ends = seen(equal_rooms(rooms)[len(ROOM) : 2 * len(ROOM)], at, noise=0.01, seed=1)[0]
     result = answer_of(index_of(equal_rooms(rooms)), scan_of(ends), max_alternatives=20)
     assert result.status is Status.AMBIGUOUS
-    poses = [pose_in(result), *(a.pose for a in result.alternatives)]
+    poses = [known(result.pose), *(a.pose for a in result.alternatives)]
     for k in range(rooms):
         assert any(same_pose(p, pose(3.0 + 12.0 * k, 2.0, 0.3)) for p in poses), f"room {k}"
 
@@ -172,9 +170,9 @@ def test_one_thing_more_or_less_leaves_other_rooms_usable() -> None:
 def test_a_square_room_has_four_answers() -> None:
     result = answer_of(index_of(SQUARE), scan_of(seen(SQUARE, pose(2.0, 1.5, 0.4))[0]))
     assert (result.status, result.usable, len(result.alternatives)) == (Status.AMBIGUOUS, False, 3)
-    assert probability_in(result) == pytest.approx(0.25, abs=0.05)
-    assert diagnostics_in(result).margin == pytest.approx(0.0, abs=1e-6)
-    assert diagnostics_in(result).runner_up == pytest.approx(1.0)
+    assert known(result.probability) == pytest.approx(0.25, abs=0.05)
+    assert known(result.diagnostics).margin == pytest.approx(0.0, abs=1e-6)
+    assert known(result.diagnostics).runner_up == pytest.approx(1.0)
     assert result.message.startswith("3 other poses fit the scan about as well.")
 
 
@@ -189,12 +187,12 @@ def test_a_rectangular_room_may_be_turned_by_half(sent: str) -> None:
         scan = scan if sent == "ranges" else without_beams(scan)
         result = answer_of(index, scan)
         assert (result.status, result.usable) == (Status.AMBIGUOUS, False)
-        found = [pose_in(result), *(other.pose for other in result.alternatives)]
+        found = [known(result.pose), *(other.pose for other in result.alternatives)]
         assert any(same_pose(one, at) for one in found)
         assert any(same_pose(one, turn.compose(at)) for one in found)
         with_prior = answer_of(index, scan, HardPrior(at, 1.0, 0.8))
         assert with_prior.usable
-        assert same_pose(pose_in(with_prior), at)
+        assert same_pose(with_prior.pose, at)
 
 
 def test_a_niche_that_was_closed_does_not_turn_a_rectangular_room_round() -> None:

@@ -21,17 +21,15 @@ from .scenes import (
     answer_of,
     as_json,
     carried,
-    covariance_in,
-    diagnostics_in,
     drawn,
     drawn_room,
     ends_of,
     equal_rooms,
     in_frame,
     index_of,
+    known,
     mounted,
     pose,
-    pose_in,
     ranges,
     same_pose,
     scan_of,
@@ -87,13 +85,14 @@ def test_a_rigid_motion_of_the_map_moves_the_answer(seed: int, x: float, y: floa
     assert_same_verdict(here, there)
     if not leads(here):
         return
-    assert same_pose(by.compose(pose_in(here)), pose_in(there), 1e-6, 1e-6)
+    assert same_pose(by.compose(known(here.pose)), there.pose, 1e-6, 1e-6)
     if here.covariance is not None:
         turned = turn_of(by) @ here.covariance @ turn_of(by).T
-        assert_covariances(turned, covariance_in(there), 1e-3)
+        assert_covariances(turned, known(there.covariance), 1e-3)
     if here.unobservable is not None:
-        assert there.unobservable is not None
-        assert abs((turn_of(by)[:2, :2] @ here.unobservable) @ there.unobservable) == pytest.approx(1.0, abs=1e-6)
+        assert abs((turn_of(by)[:2, :2] @ here.unobservable) @ known(there.unobservable)) == pytest.approx(
+            1.0, abs=1e-6
+        )
 
 
 def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransform, *, as_view: bool) -> None:
@@ -103,10 +102,10 @@ def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransfor
     assert_same_verdict(here, there)
     if not leads(here):
         return
-    assert same_pose(pose_in(there).compose(mount), pose_in(here), 1e-6, 1e-6)
+    assert same_pose(known(there.pose).compose(mount), here.pose, 1e-6, 1e-6)
     if there.covariance is not None:
-        by = derivative(pose_in(there), mount)
-        assert_covariances(covariance_in(here), by @ there.covariance @ by.T, 1e-3)
+        by = derivative(known(there.pose), mount)
+        assert_covariances(known(here.covariance), by @ there.covariance @ by.T, 1e-3)
     assert [(one.scan, one.map) for one in here.correspondences] == [(o.scan, o.map) for o in there.correspondences]
     assert [one.code for one in here.reasons] == [one.code for one in there.reasons]
     assert [one.code for one in here.warnings] == [one.code for one in there.warnings]
@@ -152,7 +151,7 @@ def test_the_order_of_segments_does_not_matter(seed: int) -> None:
     other = answer_of(index_of(walls[of_map]), scan_of(ends[of_scan]))
     assert_same_verdict(one, other)
     if leads(one):
-        assert same_pose(pose_in(one), pose_in(other), 1e-6, 1e-7)
+        assert same_pose(one.pose, other.pose, 1e-6, 1e-7)
         pairs = {(int(of_scan[c.scan]), int(of_map[c.map])) for c in other.correspondences}
         assert pairs == {(c.scan, c.map) for c in one.correspondences}
 
@@ -168,7 +167,7 @@ def assert_hardly_moved(one: AssociationResult, other: AssociationResult) -> Non
     """Compare answers to the same walls, cut in another way."""
     assert_same_verdict(one, other, 0.02)
     if leads(one):
-        assert same_pose(pose_in(one), pose_in(other), 1e-3, 1e-3)
+        assert same_pose(one.pose, other.pose, 1e-3, 1e-3)
 
 
 @given(SEEDS)
@@ -280,9 +279,9 @@ def test_without_directions_reversed_segments_change_nothing(stated_by: str, see
     one, other = searched(walls, ends), searched(turned_about(rng, walls), turned_about(rng, ends))
     assert_same_verdict(one, other)
     if leads(one):
-        assert same_pose(pose_in(one), pose_in(other), 1e-6, 1e-6)
+        assert same_pose(one.pose, other.pose, 1e-6, 1e-6)
         if one.covariance is not None:
-            assert_covariances(one.covariance, covariance_in(other), 1e-4)
+            assert_covariances(one.covariance, known(other.covariance), 1e-4)
         assert [(c.scan, c.map) for c in one.correspondences] == [(c.scan, c.map) for c in other.correspondences]
 
 
@@ -300,7 +299,7 @@ def test_a_reversed_segment_is_another_side_where_directions_mean_something() ->
     corner = np.array([[-3.0, -1.0, 4.5, -1.0], [4.5, -1.0, 4.5, 1.5]])
     both = np.vstack([corner, corner[:, [2, 3, 0, 1]]])
     one, other = (answer_of(index, scan_of(ends)) for ends in (corner, both))
-    assert diagnostics_in(other).score > diagnostics_in(one).score + 5.0
+    assert known(other.diagnostics).score > known(one.diagnostics).score + 5.0
 
 
 def test_pieces_do_not_distinguish_similar_rooms() -> None:
@@ -336,7 +335,7 @@ def test_a_prior_moves_with_the_map() -> None:
         other = answer_of(index_of(carried(rooms, by)), scan, moved)
         assert one.usable
         assert_same_verdict(one, other)
-        assert same_pose(by.compose(pose_in(one)), pose_in(other), 1e-6, 1e-6)
+        assert same_pose(by.compose(known(one.pose)), other.pose, 1e-6, 1e-6)
 
 
 def test_a_distorted_map_may_be_turned() -> None:
@@ -352,8 +351,8 @@ def test_a_distorted_map_may_be_turned() -> None:
             one = answer_of(index_of(carried(walls, by), 0.02), scan)
             plain = plain or one
             assert_same_verdict(plain, one)
-            assert same_pose(by.compose(pose_in(plain)), pose_in(one), 1e-6, 1e-6)
-            assert_covariances(turn_of(by) @ covariance_in(plain) @ turn_of(by).T, covariance_in(one), 1e-3)
+            assert same_pose(by.compose(known(plain.pose)), one.pose, 1e-6, 1e-6)
+            assert_covariances(turn_of(by) @ known(plain.covariance) @ turn_of(by).T, known(one.covariance), 1e-3)
 
 
 def test_coordinates_far_from_the_origin_lose_no_accuracy() -> None:
@@ -361,9 +360,9 @@ def test_coordinates_far_from_the_origin_lose_no_accuracy() -> None:
     shift = np.array([5e6, 4.2e6])
     ends = seen(ROOM, INSIDE, noise=0.01, seed=3)[0]
     near, far = (answer_of(index_of(walls), scan_of(ends)) for walls in (ROOM, ROOM + np.tile(shift, 2)))
-    back = pose(pose_in(far).x - shift[0], pose_in(far).y - shift[1], pose_in(far).theta)
-    assert same_pose(pose_in(near), back, 2e-8, 1e-8)
-    np.testing.assert_allclose(covariance_in(near), covariance_in(far), rtol=1e-5, atol=1e-12)
+    back = pose(known(far.pose).x - shift[0], known(far.pose).y - shift[1], known(far.pose).theta)
+    assert same_pose(near.pose, back, 2e-8, 1e-8)
+    np.testing.assert_allclose(known(near.covariance), known(far.covariance), rtol=1e-5, atol=1e-12)
 
 
 @pytest.mark.parametrize("copies", [2, 3])

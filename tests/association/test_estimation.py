@@ -19,14 +19,12 @@ from .scenes import (
     Turning,
     answer_of,
     carried,
-    covariance_in,
-    diagnostics_in,
     drawn_room,
     index_of,
     is_wrong,
+    known,
     maze,
     pose,
-    pose_in,
     ranges,
     same_pose,
     scan_of,
@@ -88,7 +86,7 @@ class Trials:
     @property
     def deviations(self) -> Floats:
         """Stated deviations of the position of the usable answers, metres."""
-        return np.array([math.sqrt(covariance_in(one)[:2, :2].trace()) for one in self.answers if one.usable])
+        return np.array([math.sqrt(known(one.covariance)[:2, :2].trace()) for one in self.answers if one.usable])
 
     @property
     def wrong(self) -> int:
@@ -147,7 +145,7 @@ def test_a_rotation_during_the_scan_is_estimated(rate: float) -> None:
     assert (found <= WITHIN_95).mean() >= 0.85
     for one in trials.answers:
         if one.usable:
-            assert diagnostics_in(one).turn_rate == pytest.approx(rate, abs=0.2)
+            assert known(one.diagnostics).turn_rate == pytest.approx(rate, abs=0.2)
             assert "turned" in warning_codes(one)
 
 
@@ -160,7 +158,7 @@ def test_a_rotation_that_is_not_estimated_is_not_usable() -> None:
 @pytest.mark.parametrize("how", [{}, {"turning": Turning(QUARTER, stated=True)}], ids=["at rest", "stated"])
 def test_without_a_rotation_none_is_reported(how: dict[str, Any]) -> None:
     for one in tried(count=20, **how).answers:
-        assert diagnostics_in(one).turn_rate is None
+        assert known(one.diagnostics).turn_rate is None
         assert "turned" not in warning_codes(one)
 
 
@@ -206,7 +204,7 @@ def test_the_pose_is_where_a_map_to_another_scale_has_it(factor: float) -> None:
     for seed in range(4):
         found = of_maze(factor, seed)
         assert found.usable
-        assert same_pose(pose_in(found), there, 0.03, 0.01)
+        assert same_pose(found.pose, there, 0.03, 0.01)
         assert squared_error(found, there) < 16.3
         assert found.unmatched_scan == ()
         assert "map_scale" in warning_codes(found)
@@ -244,7 +242,7 @@ def test_no_usable_answer_hides_a_greater_factor(factor: float) -> None:
         there = pose(factor * at.x, factor * at.y, at.theta)
         for one in (scan, without_beams(scan)):
             found = answer_of(index_of(factor * room), one)
-            assert not found.usable or same_pose(pose_in(found), there, 0.05, 0.02)
+            assert not found.usable or same_pose(found.pose, there, 0.05, 0.02)
 
 
 @pytest.mark.parametrize("factor", [0.98, 1.02])

@@ -19,13 +19,11 @@ from .scenes import (
     SQUARE,
     Floats,
     answer_of,
-    covariance_in,
     equal_rooms,
     index_of,
+    known,
     maze,
     pose,
-    pose_in,
-    probability_in,
     ranges,
     reason_codes,
     same_pose,
@@ -115,7 +113,7 @@ def test_a_prior_decides_between_the_four_ways_round_of_a_square(prior: SoftPrio
     assert answer_of(index, scan).status is Status.AMBIGUOUS
     result = answer_of(index, scan, prior)
     assert (result.status, result.usable) == (Status.OK, True)
-    assert same_pose(pose_in(result), at, 1e-9, 1e-9), "a prior is never fused into the pose"
+    assert same_pose(result.pose, at, 1e-9, 1e-9), "a prior is never fused into the pose"
 
 
 def test_a_prior_changes_neither_pose_nor_covariance() -> None:
@@ -124,8 +122,8 @@ def test_a_prior_changes_neither_pose_nor_covariance() -> None:
     sharp = SoftPrior(pose(INSIDE.x + 0.02, INSIDE.y, INSIDE.theta), np.diag([1e-4, 1e-4, 1e-5]))
     for prior in (sharp, HardPrior(pose(2.7, 2.7, 0.6), 1.0, 0.4)):
         result = answer_of(ROOM_INDEX, scan, prior)
-        assert same_pose(pose_in(result), pose_in(plain), 1e-9, 1e-9)
-        np.testing.assert_allclose(covariance_in(result), covariance_in(plain), rtol=1e-6)
+        assert same_pose(result.pose, plain.pose, 1e-9, 1e-9)
+        np.testing.assert_allclose(known(result.covariance), known(plain.covariance), rtol=1e-6)
 
 
 def test_a_prior_is_weighed_against_the_scan() -> None:
@@ -134,8 +132,8 @@ def test_a_prior_is_weighed_against_the_scan() -> None:
     scan = scan_of(seen(ROOM, INSIDE, noise=0.02, seed=1)[0])
     there = pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta)
     wide, sharp = (SoftPrior(there, np.diag([s**2, s**2, 1.0])) for s in (8.0, 1.0))
-    assert same_pose(pose_in(answer_of(index, scan, wide)), INSIDE)
-    assert same_pose(pose_in(answer_of(index, scan, sharp)), there)
+    assert same_pose(answer_of(index, scan, wide).pose, INSIDE)
+    assert same_pose(answer_of(index, scan, sharp).pose, there)
 
 
 @pytest.mark.parametrize("hard", [True, False])
@@ -153,9 +151,9 @@ def test_a_prior_that_is_far_off_does_not_make_the_place_ambiguous() -> None:
     far = SoftPrior(pose(5.0, 2.5, 0.7), np.diag([0.01, 0.01, 0.01]))
     result = answer_of(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]), far)
     assert not result.usable
-    assert probability_in(result) <= 0.5
+    assert known(result.probability) <= 0.5
     assert warning_codes(result) == ["prior_contradicted"]
-    assert same_pose(pose_in(result), INSIDE, 1e-9, 1e-9)
+    assert same_pose(result.pose, INSIDE, 1e-9, 1e-9)
 
 
 def test_a_window_that_does_not_hold_the_truth_is_contradicted() -> None:
@@ -163,7 +161,7 @@ def test_a_window_that_does_not_hold_the_truth_is_contradicted() -> None:
     walls = np.array([[0, 0, 30, 0], [30, 0, 30, 2], [30, 2, 14, 2], [14, 2, 14, 5], [12, 5, 12, 2], [12, 2, 0, 2]])
     at = pose(13.0, 1.0, 0.1)
     scan = scan_of(seen(walls, at, noise=0.01, radius=9.0, seed=1)[0])
-    assert same_pose(pose_in(answer_of(index_of(walls), scan)), at)
+    assert same_pose(answer_of(index_of(walls), scan).pose, at)
     result = answer_of(index_of(walls), scan, HardPrior(pose(21.0, 1.0, 0.1), 2.0, 0.3))
     assert not result.usable
     assert "prior_contradicted" in reason_codes(result)
@@ -197,9 +195,9 @@ def test_of_a_family_of_poses_the_one_nearest_the_prior_is_returned() -> None:
     scan = scan_of(seen(CORRIDOR, pose(15.0, 0.8, 0.0))[0])
     result = answer_of(index_of(CORRIDOR), scan, SoftPrior(pose(11.0, 1.0, 0.0), np.eye(3)))
     assert result.status is Status.DEGENERATE
-    assert (pose_in(result).x, pose_in(result).y) == pytest.approx((11.0, 0.8), abs=1e-6)
+    assert (known(result.pose).x, known(result.pose).y) == pytest.approx((11.0, 0.8), abs=1e-6)
     assert result.message.startswith("The position along the direction")
-    assert pose_in(answer_of(index_of(CORRIDOR), scan)).x == pytest.approx(15.0, abs=1e-6)
+    assert known(answer_of(index_of(CORRIDOR), scan).pose).x == pytest.approx(15.0, abs=1e-6)
 
 
 def test_a_small_window_makes_the_search_short() -> None:

@@ -35,11 +35,9 @@ from registration import MeasuredSegments, RigidTransform, Segments
 from .scenes import (
     Floats,
     box,
-    covariance_in,
     drawn_room,
+    known,
     pose,
-    pose_in,
-    probability_in,
     ranges,
     reason_codes,
     ring,
@@ -93,7 +91,7 @@ def test_the_floor_is_found_among_floors_that_share_their_outer_walls() -> None:
             scores = [one.score for one in found.maps if one.score is not None]
             assert scores == sorted(scores, reverse=True)
             assert probabilities(found) <= 1.0 + 1e-9
-            right = found.map_id == name and same_pose(pose_in(found), TRUTH, 0.05)
+            right = found.map_id == name and same_pose(found.pose, TRUTH, 0.05)
             assert right or not found.usable
             assert not found.usable or f"on the map {name}" in found.message
             usable += found.usable
@@ -109,8 +107,8 @@ def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(number: in
     alone = associate(MapIndex.build(Segments.from_array(mapped[number])), seen_on(number))
     among = associate_on_maps(MapSet({str(k): part(one) for k, one in enumerate(mapped)}), seen_on(number))
     assert among.map_id == str(number)
-    assert same_pose(pose_in(among), pose_in(alone), 1e-6, 1e-6)
-    np.testing.assert_allclose(covariance_in(among), covariance_in(alone), rtol=1e-5)
+    assert same_pose(among.pose, alone.pose, 1e-6, 1e-6)
+    np.testing.assert_allclose(known(among.covariance), known(alone.covariance), rtol=1e-5)
     assert [(a.scan, a.map) for a in among.correspondences] == [(a.scan, a.map) for a in alone.correspondences]
     assert among.missing_map == alone.missing_map
     assert {len(mapped[number]) - 2, len(mapped[number]) - 1} & set(among.missing_map)
@@ -127,7 +125,7 @@ def test_equal_floors_are_ambiguous_and_both_are_listed() -> None:
     (reason,) = [one for one in found.reasons if one.code == "similar_place"]
     assert f"the map {other}" in reason.message
     assert f"on the map {other}" in found.message
-    assert probability_in(found) <= 0.5
+    assert known(found.probability) <= 0.5
 
 
 def test_a_floor_that_is_not_among_them_is_not_usable() -> None:
@@ -199,11 +197,9 @@ def test_weights_decide_between_equal_floors_and_are_not_fused() -> None:
     for name in ("a", "b"):
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(map_weights={name: 0.9999}))
         assert found.map_id == name
-        assert pose_in(found).x == pytest.approx(pose_in(plain).x, abs=1e-9)
+        assert known(found.pose).x == pytest.approx(known(plain.pose).x, abs=1e-9)
         first, second = found.maps
-        assert first.score is not None
-        assert second.score is not None
-        assert first.score - second.score == pytest.approx(math.log(0.9999 / 0.0001), abs=1e-6)
+        assert known(first.score) - known(second.score) == pytest.approx(math.log(0.9999 / 0.0001), abs=1e-6)
 
 
 def test_weights_do_not_overrule_the_scan() -> None:
@@ -219,12 +215,12 @@ def test_a_prior_is_on_its_map(hard: bool) -> None:
     for name in ("a", "b"):
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(prior, name))
         assert found.map_id == name
-        assert same_pose(pose_in(found), TRUTH)
+        assert same_pose(found.pose, TRUTH)
 
 
 def test_prior_and_weights_name_a_map_that_is_searched() -> None:
     prior = HardPrior(TRUTH, 1.0, 0.5)
-    for known, argument in [
+    for prior_or_weights, argument in [
         (KnownOfMaps(prior), "prior.map_id"),
         (KnownOfMaps(prior, "roof"), "prior.map_id"),
         (KnownOfMaps(map_weights={"roof": 0.5}), "map_weights.roof"),
@@ -234,7 +230,7 @@ def test_prior_and_weights_name_a_map_that_is_searched() -> None:
         (KnownOfMaps(map_weights=dict.fromkeys(NAMES, 0.0)), "map_weights"),
     ]:
         with pytest.raises(InvalidSearchError) as refused:
-            associate_on_maps(building(), seen_on(0), known)
+            associate_on_maps(building(), seen_on(0), prior_or_weights)
         assert refused.value.argument == argument
 
 
@@ -258,11 +254,10 @@ def test_alternatives_are_in_the_frames_of_their_maps() -> None:
     shift = np.array([1000.0, -2000.0])
     maps = MapSet({"a": part(floor(0)), "b": part(floor(0) + np.tile(shift, 2))})
     found = associate_on_maps(maps, seen_on(0))
-    places = {found.map_id: pose_in(found), found.alternatives[0].map_id: found.alternatives[0].pose}
+    places = {found.map_id: known(found.pose), found.alternatives[0].map_id: found.alternatives[0].pose}
     assert same_pose(places["a"], TRUTH, 0.05)
     assert same_pose(places["b"], pose(TRUTH.x + 1000.0, TRUTH.y - 2000.0, TRUTH.theta), 0.05)
     for one in found.maps:
-        assert one.pose is not None
         assert same_pose(one.pose, places[one.map_id], 0.05)
 
 
@@ -282,7 +277,7 @@ def test_one_map_alone_is_a_set_as_well() -> None:
     found = associate_on_maps(MapSet({"only": part(floor(2))}), seen_on(2))
     assert (found.map_id, found.status, len(found.maps)) == ("only", alone.status, 1)
     assert found.probability == pytest.approx(alone.probability, abs=1e-6)
-    assert same_pose(pose_in(found), pose_in(alone), 1e-6, 1e-6)
+    assert same_pose(found.pose, alone.pose, 1e-6, 1e-6)
 
 
 def test_the_order_of_the_maps_does_not_matter() -> None:
@@ -292,7 +287,7 @@ def test_the_order_of_the_maps_does_not_matter() -> None:
         one, two = (associate_on_maps(maps, seen_on(k)) for maps in (building(), other))
         assert (one.map_id, one.status, one.usable) == (two.map_id, two.status, two.usable)
         assert one.probability == pytest.approx(two.probability, abs=1e-6)
-        assert same_pose(pose_in(one), pose_in(two), 1e-6, 1e-6)
+        assert same_pose(one.pose, two.pose, 1e-6, 1e-6)
 
 
 def test_maps_without_directions_and_maps_with_them_may_be_mixed() -> None:
@@ -301,7 +296,7 @@ def test_maps_without_directions_and_maps_with_them_may_be_mixed() -> None:
     maps = MapSet({"a": part(floor(0)), "b": part(reversed_floor, oriented=False)})
     found = associate_on_maps(maps, seen_on(1), options=Options(oriented=False))
     assert found.map_id == "b"
-    assert same_pose(pose_in(found), TRUTH)
+    assert same_pose(found.pose, TRUTH)
 
 
 def test_views_of_a_drive_are_all_on_one_map() -> None:
@@ -311,6 +306,6 @@ def test_views_of_a_drive_are_all_on_one_map() -> None:
         building(), assemble([View(seen_on(4)), View(before, step, np.diag([1e-4, 1e-4, 1e-5]), 0)])
     )
     assert found.map_id == "floor-4"
-    assert same_pose(pose_in(found), TRUTH, 0.05)
+    assert same_pose(found.pose, TRUTH, 0.05)
     assert all(0 <= pair.map < len(floor(4)) for pair in found.correspondences)
     assert {pair.scan for pair in found.correspondences} & set(range(len(seen_on(4).measured), 1000))
