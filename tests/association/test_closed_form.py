@@ -125,31 +125,6 @@ def test_the_covariance_is_the_cramer_rao_bound(map_sigma: float) -> None:
         np.testing.assert_allclose(ratios, 1.0, atol=0.02)
 
 
-def test_the_pose_is_the_least_squares_estimate() -> None:
-    """Of an exact map: that of the residuals of all points, by Gauss-Newton with numeric derivatives."""
-    offsets = np.array([0.001, -0.0008, 0.0005, -0.0008])
-    ends = seen_of_four(offsets)
-    x = np.array([AT.x, AT.y, AT.theta])
-
-    def residuals(unknown: Floats) -> Floats:
-        at, out = RigidTransform(*unknown.tolist()), []
-        for k, count in enumerate(COUNTS.astype(int).tolist()):
-            d = (FOUR[k, 2:] - FOUR[k, :2]) / np.hypot(*(FOUR[k, 2:] - FOUR[k, :2]))
-            # Mean and spread of points that cover the segment evenly, as two points.
-            middle, half = 0.5 * (ends[k, :2] + ends[k, 2:]), (ends[k, 2:] - ends[k, :2]) / math.sqrt(12.0)
-            points = np.asarray(at.apply(np.stack([middle - half, middle + half])))
-            out.append(math.sqrt(0.5 * count) / SIGMA * ((points - FOUR[k, :2]) @ [-d[1], d[0]]))
-        return np.concatenate(out)
-
-    for _ in range(5):
-        columns = [(residuals(x + 1e-6 * e) - residuals(x - 1e-6 * e)) / 2e-6 for e in np.eye(3)]
-        jacobian = np.stack(columns, axis=1)
-        x = x - np.linalg.lstsq(jacobian, residuals(x))[0]
-    result = answer_of_four(ends)
-    assert same_pose(result.pose, RigidTransform(*x.tolist()), 1e-6, 1e-6)
-    assert known(result.diagnostics).chi2 == pytest.approx(float(residuals(x) @ residuals(x)), rel=1e-4)
-
-
 def overlap_at(wall: Floats, segment: Floats, at: RigidTransform) -> float:
     """Return the fraction of a scan segment's length that lies along a wall's."""
     d = (wall[2:] - wall[:2]) / np.hypot(*(wall[2:] - wall[:2]))
@@ -196,12 +171,19 @@ def test_a_segment_over_several_pieces_of_a_wall_names_them_all(oriented: bool) 
     assert floor.overlap == pytest.approx(0.98, abs=0.011)
 
 
+HALL = np.array([[8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 7], [3, 7, 0, 7], [0, 7, 0, 0]], dtype=float)
+
+
+def with_a_step(step: float) -> Floats:
+    """Return the walls of a hall, the lower one with a step of so many metres."""
+    return np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], HALL])
+
+
 @pytest.mark.parametrize("sigma", [0.0, 0.001, 0.003])
 @pytest.mark.parametrize("step", [0.012, 0.02, 0.028])
 def test_a_map_that_is_stated_to_be_exact_keeps_its_steps(step: float, sigma: float) -> None:
     """A scan of one side of a step in a wall is where that side is."""
-    hall = np.array([[8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 7], [3, 7, 0, 7], [0, 7, 0, 0]], dtype=float)
-    walls = np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], hall])
+    walls = with_a_step(step)
     ends = np.array([[5.0, step, 7.8, step], [8.0, 0.5, 8.0, 4.5], [7.5, 5.0, 3.4, 5.0], [3.0, 5.2, 3.0, 6.8]])
     at = pose(5.0, 2.0, 0.3)
     found = known(answer_of(index_of(walls, sigma), scan_of(carried(ends, at.inverse()), 0.005)).pose)
@@ -210,19 +192,18 @@ def test_a_map_that_is_stated_to_be_exact_keeps_its_steps(step: float, sigma: fl
 
 @pytest.mark.parametrize("low", [0.0, 0.01, 0.029, 0.05])
 def test_a_millimetre_more_of_a_step_changes_the_probability_little(low: float) -> None:
-    hall = np.array([[8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 7], [3, 7, 0, 7], [0, 7, 0, 0]], dtype=float)
-    ends = seen(np.vstack([[[0.4, 0.0, 7.6, 0.0]], hall[:4]]), pose(4.0, 2.5, 0.4), noise=0.005, cut=0.1, seed=3)[0]
-    found = []
-    for step in (low, low + 1e-3):
-        walls = np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], hall])
-        found.append(answer_of(index_of(walls), scan_of(ends, 0.01, (0.0, 0.0))))
-    assert found[1].probability == pytest.approx(found[0].probability, abs=0.1)
+    ends = seen(np.vstack([[[0.4, 0.0, 7.6, 0.0]], HALL[:4]]), pose(4.0, 2.5, 0.4), noise=0.005, cut=0.1, seed=3)[0]
+    one, other = (answer_of(index_of(with_a_step(step)), scan_of(ends, 0.01, (0.0, 0.0))) for step in (low, low + 1e-3))
+    assert other.probability == pytest.approx(one.probability, abs=0.1)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.001, 0.02])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> None:
-    """With the sigma of the map, each pair alone on its wall; of exact maps with covariance and chi-square."""
+    """With the sigma of the map, each pair alone on its wall; of exact maps with covariance and chi-square.
+
+    So the pose is the least-squares estimate, and the covariance that of its errors, as the tests of `register` show.
+    """
     ends = seen(ROOM, INSIDE, noise=0.01, cut=0.4, seed=seed)[0]
     scan = scan_of(ends, 0.01)
     result = answer_of(index_of(ROOM, sigma), scan)

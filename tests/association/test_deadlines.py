@@ -177,13 +177,6 @@ def test_a_search_that_another_thread_cancels_returns() -> None:
     assert raised.is_set()
 
 
-def test_a_search_beyond_its_deadline_returns_its_best_so_far() -> None:
-    """Of a search that would take minutes: it ends at a tenth of a second."""
-    index, scan = long_search()
-    result = associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(time.monotonic() + 0.1))
-    assert_incomplete(result)
-
-
 def test_several_maps_have_one_deadline() -> None:
     maps = MapSet({"a": MapPart(Segments.from_array(ROOM)), "b": MapPart(Segments.from_array(maze(1)))})
     found = associate_on_maps(maps, scan_of(seen(ROOM, INSIDE)[0]), deadline=Deadline(PASSED))

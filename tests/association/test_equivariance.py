@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -95,10 +96,44 @@ def test_a_rigid_motion_of_the_map_moves_the_answer(seed: int, x: float, y: floa
         )
 
 
-def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransform, *, as_view: bool) -> None:
-    """Compare a scan in the sensor's frame with the same data in a frame in which the sensor is at `mount`."""
+def of_ranges(seed: int) -> tuple[Floats, Scan]:
+    """Draw with biased ranges, a sensor that rotates and a map with errors, too: each has a correction of its own."""
+    walls, scan = drawn(12 * seed + seed % 4)
+    assert scan.beams is not None
+    return walls, scan
+
+
+def of_segments(seed: int) -> tuple[Floats, Scan]:
+    walls, ends = ends_of(seed)
+    return walls, scan_of(ends, viewpoint=(0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("question", "moved"),
+    [
+        (of_ranges, in_frame),
+        pytest.param(of_ranges, mounted, marks=MOUNT),
+        (of_segments, in_frame),
+        (of_segments, mounted),
+    ],
+)
+@example(3, 20.0, 0.5, 1.0)
+@example(1, 60.0, -2.5, -1.0)
+@given(SEEDS, LEVERS, ANGLES, ANGLES)
+@FEW
+def test_where_the_scan_frame_begins_does_not_matter(
+    question: Callable[[int], tuple[Floats, Scan]],
+    moved: Callable[[Scan, RigidTransform], Scan],
+    seed: int,
+    lever: float,
+    along: float,
+    theta: float,
+) -> None:
+    """Compare a scan in the sensor's frame with the same data in a frame in which the sensor is at a mount."""
+    walls, scan = question(seed)
+    mount = RigidTransform(lever * math.cos(along), lever * math.sin(along), theta)
     index = index_of(walls)
-    here, there = answer_of(index, scan), answer_of(index, (mounted if as_view else in_frame)(scan, mount))
+    here, there = answer_of(index, scan), answer_of(index, moved(scan, mount))
     assert_same_verdict(here, there)
     if not leads(here):
         return
@@ -109,35 +144,6 @@ def assert_mount_does_not_matter(walls: Floats, scan: Scan, mount: RigidTransfor
     assert [(one.scan, one.map) for one in here.correspondences] == [(o.scan, o.map) for o in there.correspondences]
     assert [one.code for one in here.reasons] == [one.code for one in there.reasons]
     assert [one.code for one in here.warnings] == [one.code for one in there.warnings]
-
-
-@pytest.mark.parametrize("as_view", [False, pytest.param(True, marks=MOUNT)])
-@example(3, 20.0, 0.5, 1.0)
-@example(1, 60.0, -2.5, -1.0)
-@given(SEEDS, LEVERS, ANGLES, ANGLES)
-@FEW
-def test_where_the_scan_frame_begins_does_not_matter_for_ranges(
-    as_view: bool, seed: int, lever: float, along: float, theta: float
-) -> None:
-    """With biased ranges, a sensor that rotates and a map with errors, too: each has a correction of its own."""
-    walls, scan = drawn(12 * seed + seed % 4)
-    assert scan.beams is not None
-    mount = RigidTransform(lever * math.cos(along), lever * math.sin(along), theta)
-    assert_mount_does_not_matter(walls, scan, mount, as_view=as_view)
-
-
-@pytest.mark.parametrize("as_view", [False, True])
-@example(3, 20.0, 0.5, 1.0)
-@example(1, 60.0, -2.5, -1.0)
-@given(SEEDS, LEVERS, ANGLES, ANGLES)
-@FEW
-def test_where_the_scan_frame_begins_does_not_matter_for_segments(
-    as_view: bool, seed: int, lever: float, along: float, theta: float
-) -> None:
-    """With the place of the sensor."""
-    walls, ends = ends_of(seed)
-    mount = RigidTransform(lever * math.cos(along), lever * math.sin(along), theta)
-    assert_mount_does_not_matter(walls, scan_of(ends, viewpoint=(0.0, 0.0)), mount, as_view=as_view)
 
 
 @given(SEEDS)

@@ -13,12 +13,9 @@ from association import AssociationResult
 from registration import RigidTransform
 
 from .scenes import (
-    INSIDE,
-    ROOM,
     Floats,
     Turning,
     answer_of,
-    carried,
     drawn_room,
     index_of,
     is_wrong,
@@ -160,29 +157,6 @@ def test_without_a_rotation_none_is_reported(how: dict[str, Any]) -> None:
     for one in tried(count=20, **how).answers:
         assert known(one.diagnostics).turn_rate is None
         assert "turned" not in warning_codes(one)
-
-
-def test_covariance_is_that_of_the_errors_of_segments() -> None:
-    """Of lines through noisy points: the mean normalized squared error of 200 is 3 within four of its deviations."""
-    rng, exact = np.random.default_rng(9), index_of(ROOM, 0.0)
-    local = carried(ROOM, INSIDE.inverse()).reshape(-1, 2, 2)
-    counts = np.maximum(2, (np.hypot(*(local[:, 1] - local[:, 0]).T) / 0.05).astype(int)).tolist()
-    total = 0.0
-    for _ in range(200):
-        noisy = [fitted(rng, begin, end, n) for (begin, end), n in zip(local, counts, strict=True)]
-        total += squared_error(answer_of(exact, scan_of(noisy)), INSIDE)
-    assert abs(total / 200 - 3.0) < 4.0 * math.sqrt(6.0 / 200)
-
-
-def fitted(rng: np.random.Generator, begin: Floats, end: Floats, count: int) -> list[float]:
-    """Measure points of a segment with 2 cm of noise, and fit a line to them."""
-    slope, offset = np.polyfit(np.linspace(-0.5, 0.5, count), rng.normal(scale=0.02, size=count), 1)
-    d = (end - begin) / np.hypot(*(end - begin))
-    n = np.array([-d[1], d[0]])
-    return [*(begin + (offset - slope / 2) * n), *(end + (offset + slope / 2) * n)]
-
-
-# --- The pairs of an answer, and what they were corrected by ----------------------------------------------------------
 
 
 # --- Maps to another scale --------------------------------------------------------------------------------------------

@@ -153,12 +153,6 @@ def test_the_last_bits_of_equal_lengths_do_not_order_walls(seed: int, oriented: 
         np.testing.assert_allclose(mine.rows["offset"], its.rows["offset"], atol=1e-9)
 
 
-def test_far_from_the_origin_nothing_is_lost() -> None:
-    near, far = index_of(ROOM), index_of(ROOM + 5e6)
-    for name in near.walls.rows.dtype.names or ():
-        np.testing.assert_allclose(far.walls.rows[name], near.walls.rows[name], atol=1e-8)
-
-
 def test_built_without_directions_it_is_its_own_undirected() -> None:
     segments = Segments.from_array(maze(1))
     index = MapIndex.build(segments, oriented=False)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from association import INCLUDED, AssociationOptions, InvalidSearchError, ReasonCode, Status
+from association import INCLUDED, AssociationOptions, InvalidSearchError, Status
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
 from .scenes import (
@@ -27,7 +27,6 @@ from .scenes import (
     pieces_of,
     pose,
     ranges,
-    reason_codes,
     same_pose,
     scan_of,
     seen,
@@ -114,9 +113,6 @@ def test_what_reaches_the_threshold_is_usable_unless_a_veto_applies(seed: int, l
     assert result.search.complete
     vetoed = result.status in (Status.DEGENERATE, Status.NO_MATCH)
     assert result.usable == (reached and not vetoed)
-    assert result.usable == (result.status is Status.OK)
-    assert bool(result.reasons) is not result.usable
-    assert set(reason_codes(result)) <= set(get_args(ReasonCode))
 
 
 def test_the_threshold_changes_nothing_else() -> None:
@@ -201,19 +197,17 @@ def test_more_confidence_takes_more_bases_and_is_reached() -> None:
     assert found[0].bases < found[2].bases
 
 
-def test_four_fifths_of_clutter() -> None:
-    for seed in range(3):
-        at = pose(11.0 + 2.0 * seed, 16.0, seed - 1.0)
-        ends, truth = seen(maze(1), at, noise=0.01, cut=0.2, clutter=48, seed=seed, radius=8.0)
-        assert (truth < 0).mean() > 0.75
-        assert same_pose(answer_of(MAZE, scan_of(ends)).pose, at)
-
-
 @pytest.mark.parametrize("seed", range(6))
-def test_partial_noisy_walls_among_clutter(seed: int) -> None:
-    """Walls seen in half, 2 cm of noise, and a third of the segments from no wall."""
+@pytest.mark.parametrize(
+    ("noise", "cut", "clutter", "radius"),
+    [
+        pytest.param(0.02, 0.5, 10, 9.0, id="walls seen in half, and a third of the segments from no wall"),
+        pytest.param(0.01, 0.2, 48, 8.0, id="four fifths of clutter"),
+    ],
+)
+def test_partial_noisy_walls_among_clutter(seed: int, noise: float, cut: float, clutter: int, radius: float) -> None:
     at = pose(12.0 + seed, 17.0 - seed, 1.1 * seed - 3.0)
-    ends, truth = seen(maze(1), at, noise=0.02, cut=0.5, clutter=10, seed=seed, radius=9.0)
+    ends, truth = seen(maze(1), at, noise=noise, cut=cut, clutter=clutter, seed=seed, radius=radius)
     result = answer_of(MAZE, scan_of(ends))
     assert same_pose(result.pose, at)
     found = {pair.scan for pair in result.correspondences}
@@ -274,7 +268,9 @@ def test_other_poses_come_best_first_and_no_more_than_requested(most: int) -> No
     assert len(rooms) == 1 + min(most, 3)
     if most == 50:
         assert round((result.alternatives[-1].pose.x - 3.0) / 12.0) == 3
-        assert result.alternatives[-1].inlier_fraction < result.alternatives[0].inlier_fraction
+        worst = result.alternatives[-1]
+        assert worst.inlier_fraction < result.alternatives[0].inlier_fraction
+        assert 0.0 <= known(worst.probability) < 0.5 * known(result.probability)
 
 
 @pytest.mark.parametrize("parts", [(), ("correspondences",), ("missing_map",), ("alternatives", "missing_map")])
