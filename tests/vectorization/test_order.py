@@ -31,29 +31,23 @@ def seen(seed: int = 0, x: float = 2.0, y: float = 1.4, theta: float = 0.3) -> t
     return ranges[kept, None] * rays[kept], rays[kept]
 
 
-def counts(name: str, n: int) -> NDArray[np.int64]:
-    rng = np.random.default_rng(1)
-    counts_by_name: dict[str, NDArray[np.int64]] = {
-        "twice": np.full(n, 2),
-        "thrice": np.full(n, 3),
-        "seven times": np.full(n, 7),
-        "every second twice": 1 + np.arange(n) % 2,
-        "a third of them twice": 1 + (np.arange(n) % 3 == 0),
-        "some": rng.integers(1, 4, n),
-        "one": 1 + (np.arange(n) == 9),
-    }
-    return counts_by_name[name]
-
-
-NAMES = ["twice", "thrice", "seven times", "every second twice", "a third of them twice", "some", "one"]
+COUNTS: dict[str, Callable[[int], NDArray[np.int64]]] = {
+    "twice": lambda n: np.full(n, 2),
+    "thrice": lambda n: np.full(n, 3),
+    "every second twice": lambda n: 1 + np.arange(n) % 2,
+    "a third of them twice": lambda n: 1 + (np.arange(n) % 3 == 0),
+    "seven times": lambda n: np.full(n, 7),
+    "some": lambda n: np.random.default_rng(1).integers(1, 4, n),
+    "one": lambda n: 1 + (np.arange(n) == 9),
+}
 
 
 @pytest.mark.parametrize("viewpoint", VIEWPOINTS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COUNTS)
 def test_points_that_come_again_count_once(name: str, viewpoint: Viewpoint) -> None:
     points, _ = seen()
     once = vectorize(points, viewpoint=viewpoint)
-    repeats = counts(name, len(points))
+    repeats = COUNTS[name](len(points))
     found = vectorize(np.repeat(points, repeats, axis=0), viewpoint=viewpoint)
     np.testing.assert_array_equal(found.measured.segments.endpoints, once.measured.segments.endpoints)
     np.testing.assert_array_equal(found.measured.point_counts, once.measured.point_counts)
@@ -80,11 +74,11 @@ def nearly(once: Floats, other: Floats) -> bool:
 
 
 @pytest.mark.parametrize("viewpoint", VIEWPOINTS)
-@pytest.mark.parametrize("name", ["twice", "thrice", "every second twice", "a third of them twice"])
+@pytest.mark.parametrize("name", list(COUNTS)[:4])
 @pytest.mark.parametrize("scatter", [1e-7, 1e-4, 1e-3])
 def test_points_that_come_nearly_again_count_once(name: str, scatter: float, viewpoint: Viewpoint) -> None:
     points, _ = seen()
-    repeated = np.repeat(points, counts(name, len(points)), axis=0)
+    repeated = np.repeat(points, COUNTS[name](len(points)), axis=0)
     repeated += np.random.default_rng(2).normal(0.0, scatter, repeated.shape)
     once, found = vectorize(points, viewpoint=viewpoint), vectorize(repeated, viewpoint=viewpoint)
     assert nearly(once.measured.segments.endpoints, found.measured.segments.endpoints)
