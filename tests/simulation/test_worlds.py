@@ -75,12 +75,6 @@ def test_the_papers_pillars_show_two_long_edges_in_different_directions_from_eve
         assert abs(directions[:, 1]).max() > 0.9
 
 
-def test_the_same_seed_draws_the_same_offices() -> None:
-    one, again, other = (offices(np.random.default_rng(s)).segments.endpoints for s in (1, 1, 2))
-    np.testing.assert_array_equal(one, again)
-    assert not np.array_equal(one, other)
-
-
 def test_offices_grow_as_asked_and_all_rooms_can_be_reached() -> None:
     plan = OfficePlan(rooms=3, corridors=2)
     world = offices(np.random.default_rng(0), plan)
@@ -123,9 +117,5 @@ def test_a_world_that_cannot_be_is_refused(make: Callable[[], object], argument:
     assert caught.value.argument == argument
 
 
-def test_everything_exported_exists_and_is_listed_in_order() -> None:
-    # Constants, classes, functions; each by name.
-    assert simulation.__all__ == sorted(
-        simulation.__all__, key=lambda name: (not name.isupper(), name[0].islower(), name)
-    )
+def test_everything_exported_exists() -> None:
     assert all(hasattr(simulation, name) for name in simulation.__all__)

@@ -1,0 +1,204 @@
+"""Peers of the comparison: scenes as promised, adapters in processes of their own, a matcher for grids."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from benchmarks.peers.adapters import PEERS, Answer
+from benchmarks.peers.corners import CornerOptions, MapCorners, best_of, fit_points, match
+from benchmarks.peers.grid_matcher import GridMatcher
+from benchmarks.peers.race import Attempt, Racer, attempts, is_right
+from benchmarks.peers.report import judged
+from benchmarks.peers.scenes import DRAWN_LEVELS, KINDS, SIZES, Cell, Level, draw_query, drawn_cell, polygons
+from registration import RigidTransform
+
+LONG = pytest.mark.long
+
+# --- Scenes -----------------------------------------------------------------------------------------------------------
+
+cell_of = functools.cache(drawn_cell)  # drawn once for all tests that look at it
+CELLS = [
+    pytest.param((kind, size, level), marks=[LONG] * (size == max(SIZES)), id=f"{kind}-{size}-{level.name}")
+    for kind in KINDS
+    for size in SIZES
+    for level in DRAWN_LEVELS
+]
+
+
+@pytest.fixture(params=CELLS)
+def drawn(request: pytest.FixtureRequest) -> tuple[Cell, tuple[str, int, object]]:
+    kind, size, level = request.param
+    return cell_of(kind, size, level, 3, seed=3), request.param
+
+
+def test_counts_and_outliers_are_as_promised(drawn) -> None:
+    cell, (_, _, level) = drawn
+    for query in cell.queries:
+        inliers, whole = int((query.on_map >= 0).sum()), len(query.scan)
+        low, high = level.counts
+        assert low - 1 <= (whole if level.whole else inliers) <= high + 1
+        assert abs((whole - inliers) / whole - level.outliers) < 0.03
+
+
+def test_the_truth_lays_every_inlier_on_its_segment_within_the_noise(drawn) -> None:
+    cell, (_, _, level) = drawn
+    for query in cell.queries:
+        seen = query.pose.apply(query.scan.reshape(-1, 2)).reshape(-1, 4)
+        for ends, wall in zip(seen[query.on_map >= 0], query.map[query.on_map[query.on_map >= 0]], strict=True):
+            along = wall[2:] - wall[:2]
+            length = math.hypot(*along)
+            for end in ends.reshape(2, 2) - wall[:2]:
+                across = (along[0] * end[1] - along[1] * end[0]) / length
+                assert abs(across) < 5.0 * level.sigma
+                assert -5.0 * level.sigma < end @ along / length < length + 5.0 * level.sigma
+            assert (ends[2:] - ends[:2]) @ along > 0.0
+
+
+def test_a_cell_is_drawn_again_from_its_seed_and_another_seed_gives_another() -> None:
+    one, again, other = (drawn_cell("offices", 50, DRAWN_LEVELS[1], 3, seed) for seed in (5, 5, 6))
+    assert all(np.array_equal(a.scan, b.scan) for a, b in zip(one.queries, again.queries, strict=True))
+    assert not any(np.array_equal(a.scan, b.scan) for a, b in zip(one.queries, other.queries, strict=True))
+
+
+# --- Adapters ---------------------------------------------------------------------------------------------------------
+
+EASY = Level("easy", (24, 24), 0.0, 1e-4, None)
+
+
+@pytest.fixture(scope="module")
+def easy() -> Cell:
+    """Scans of free-standing polygons without clutter and noise worth the name."""
+    rng = np.random.default_rng(11)
+    segments = polygons(60, rng)
+    return Cell("polygons", 60, "easy", tuple(draw_query(segments, EASY, rng) for _ in range(2)))
+
+
+@pytest.fixture(
+    params=["linefix", *(pytest.param(name, marks=pytest.mark.long) for name in PEERS if name != "linefix")]
+)
+def racer(request: pytest.FixtureRequest) -> Iterator[Racer]:
+    if not PEERS[request.param].installed:
+        pytest.skip(f"{PEERS[request.param].module} is not installed")
+    made = Racer(request.param, limit=30.0)
+    reason = made.missing()
+    if reason is not None:
+        pytest.skip(reason)
+    yield made
+    made.close()
+
+
+def test_a_peer_finds_what_is_easy(racer: Racer, easy: Cell) -> None:
+    found = list(attempts(racer, easy, limit=30.0))
+    assert [a.right for a in found] == [True, True]
+    assert all(0.0 < a.ms < 30_000.0 for a in found)
+
+
+@pytest.mark.long
+def test_corners_fit_where_they_are_and_not_where_a_segment_would_stick_out() -> None:
+    room = np.array([[0.0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]])
+    known = MapCorners.of(room, CornerOptions(known_reach=0.1))
+    assert len(known.corners) == 4
+    pose = RigidTransform(1.0, 2.0, 0.4)
+    scan = pose.inverse().apply(room[:2].reshape(-1, 2)).reshape(-1, 4)
+    (found,) = match(scan, known, CornerOptions(headings=0))
+    # The long wall first, then the short one: two of the four corners of a rectangle.
+    assert len(found) == 2
+    assert any(np.allclose(row[:2], [4.0, 0.0]) for row in found.known)
+    for stretched in ([[-1.0, 0, 4, 0], [4, 0, 4, 3]], [[0, 0, 4.3, 0], [4, 0, 4, 3]], [[0, 0, 4, 0], [4, -0.3, 4, 3]],
+                      [[0, 0, 4, 0], [4, 0, 4, 4.5]]):  # fmt: skip
+        (found,) = match(np.array(stretched), known, CornerOptions(headings=0))
+        assert len(found) == 0, stretched
+
+
+def test_points_give_their_pose_back_and_the_better_pose_is_chosen() -> None:
+    rng = np.random.default_rng(2)
+    pose = RigidTransform(3.0, -1.0, 2.5)
+    points = rng.uniform(-5, 5, (6, 2))
+    assert fit_points(points, pose.apply(points)) == pytest.approx((3.0, -1.0, 2.5))
+    walls = np.array([[0.0, 0, 5, 0], [5, 0, 5, 4]])
+    scan = pose.inverse().apply(walls.reshape(-1, 2)).reshape(-1, 4)
+    truth = (pose.x, pose.y, pose.theta)
+    assert best_of([(0.0, 0.0, 0.0), truth, (3.0, 1.0, 2.5)], scan, walls) == truth
+
+
+@pytest.mark.parametrize(
+    ("pose", "right"),
+    [((1.29, 2.0, 0.5), True), ((1.31, 2.0, 0.5), False), ((1.0, 2.0, 0.5 + math.radians(2.9)), True),
+     ((1.0, 2.0, 0.5 + math.radians(3.1)), False), ((math.nan, 2.0, 0.5), False), (None, False),
+     ((1.0, 2.0, 0.5 + math.tau), True)],
+)  # fmt: skip
+def test_an_answer_counts_within_three_decimetres_and_three_degrees(pose, right: bool) -> None:
+    assert is_right(Answer(pose), RigidTransform(1.0, 2.0, 0.5)) is right
+
+
+def test_a_cell_is_judged_by_the_best_peer_and_by_the_fastest_of_those_near() -> None:
+    def asked(right: int, ms: float) -> list[Attempt]:
+        return [Attempt(k < right, None, ms) for k in range(100)]
+
+    cell = Cell("offices", 50, "hard", ())
+    found = {"linefix": [asked(95, 2.0)], "kiss": [asked(94, 3.0)], "opencv": [asked(40, 0.1)]}
+    share, time = judged([cell], found, "linefix", list(found))
+    assert (share.met, time.met) == (True, True)
+    assert time.goal == "<= 3"
+    found["opencv"] = [asked(96, 0.1)]
+    share, time = judged([cell], found, "linefix", list(found))
+    assert (share.met, time.met) == (False, False)
+
+
+# --- Grids ------------------------------------------------------------------------------------------------------------
+
+RESOLUTION = 0.1
+ORIGIN = RigidTransform(-2.0, 5.0, 0.0)
+
+
+def room() -> tuple[np.ndarray, np.ndarray]:
+    """Return the occupied and the free cells of an L-shaped room."""
+    free = np.zeros((48, 64), bool)
+    free[4:40, 4:56] = True
+    free[24:40, 36:56] = False
+    occupied = np.zeros_like(free)
+    for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        occupied |= np.roll(free, shift, (0, 1)) & ~free
+    return occupied, free
+
+
+def cast(occupied: np.ndarray, x: float, y: float, theta: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return angles and ranges of beams that end in the middle of the first occupied cell, from a place in cells."""
+    angles = np.linspace(-math.pi, math.pi, 120, endpoint=False)
+    reach = np.arange(0.0, 80.0, 0.05)
+    rows = (y + reach * np.sin(angles[:, None] + theta)).astype(int).clip(0, occupied.shape[0] - 1)
+    columns = (x + reach * np.cos(angles[:, None] + theta)).astype(int).clip(0, occupied.shape[1] - 1)
+    return angles, (reach[occupied[rows, columns].argmax(axis=1)] + 0.5) * RESOLUTION
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "theta"),
+    [(12.5, 30.5, 0.4), pytest.param(45.5, 10.5, -2.0, marks=LONG), pytest.param(20.5, 8.5, 3.0, marks=LONG)],
+)
+def test_the_pose_is_found(x: float, y: float, theta: float) -> None:
+    occupied, free = room()
+    found = GridMatcher(occupied, free, RESOLUTION, ORIGIN).match(*cast(occupied, x, y, theta))
+    assert found.pose is not None
+    assert math.hypot(found.pose.x - (x * RESOLUTION - 2.0), found.pose.y - (y * RESOLUTION + 5.0)) < 0.15
+    assert abs(math.remainder(found.pose.theta - theta, math.tau)) < math.radians(3.0)
+    assert found.usable
+
+
+def test_a_room_of_two_equal_halves_leaves_no_lead() -> None:
+    free = np.zeros((40, 60), bool)
+    free[4:36, 4:56] = True
+    occupied = (np.roll(free, 1, 0) | np.roll(free, -1, 0) | np.roll(free, 1, 1) | np.roll(free, -1, 1)) & ~free
+    found = GridMatcher(occupied, free, RESOLUTION, ORIGIN).match(*cast(occupied, 15.5, 12.5, 0.3))
+    assert found.lead < 0.05
+    assert not found.usable
+
+
+def test_without_returns_there_is_no_pose() -> None:
+    found = GridMatcher(*room(), RESOLUTION, ORIGIN).match(np.zeros(0), np.zeros(0))
+    assert found.pose is None
+    assert not found.usable
