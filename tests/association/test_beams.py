@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from association import (
     NO_POINTS,
     AssociationResult,
-    InvalidMapError,
     MapIndex,
     MapPart,
     MapPoints,
@@ -182,29 +179,6 @@ def test_points_of_several_maps_lie_on_their_own() -> None:
     assert same_pose(found.pose, INSIDE)
     alone = associate(with_points(ROOM, legs), scan)
     assert same_pose(found.pose, alone.pose, 1e-6, 1e-6)
-
-
-@pytest.mark.parametrize(
-    ("points", "sigma", "argument", "message"),
-    [
-        ([[1.0, 2.0, 3.0]], None, "map.points", "found an array of shape"),
-        ([1.0, 2.0], None, "map.points", "found an array of shape"),
-        ([[1.0, 2.0], [3.0]], None, "map.points", "rows"),
-        ([["a", "b"]], None, "map.points", "rows"),
-        ([[0.0, 0.0], [math.nan, 0.0]], None, "map.points.1", "finite"),
-        (np.zeros((200_001, 2)), None, "map.points", "at most 200000 points, found 200001"),
-        ([POST], 0.0, "map.points_sigma", "above 0"),
-        ([POST], -1.0, "map.points_sigma", "above 0"),
-        ([POST], 10.1, "map.points_sigma", "found 10.1"),
-        ([POST], math.nan, "map.points_sigma", "above 0"),
-    ],
-)
-def test_arrays_that_are_no_points_are_rejected(
-    points: object, sigma: float | None, argument: str, message: str
-) -> None:
-    with pytest.raises(InvalidMapError, match=message) as error:
-        MapPoints.of(points, sigma)  # type: ignore[arg-type]
-    assert error.value.argument == argument
 
 
 def test_points_are_counted_and_those_far_outside_are_left_out() -> None:

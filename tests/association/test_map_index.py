@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import tracemalloc
-from typing import Any
 
 import numpy as np
 import pytest
 
-from association import InvalidMapError, MapIndex
+from association import MapIndex
 from association.index.merging import ends_of
 from association.index.tuning import (
     CELL,
@@ -25,7 +24,7 @@ from association.tuning import REACH, SECTORS
 from registration import Segments
 from registration.layout import Floats, Records
 
-from .scenes import ROOM, index_of, maze
+from .scenes import index_of, maze
 
 MAZE_INDEX = index_of(maze(1))
 
@@ -191,19 +190,3 @@ def test_memory_is_capped_whatever_the_extent() -> None:
         assert shape["columns"] * shape["rows"] < 1.01 * most
         ends = np.stack([index.pieces.ends["x1"], index.pieces.ends["y1"]], axis=1)
         assert all(cell_of(grid.shape, end) is not None for end in ends)
-
-
-@pytest.mark.parametrize(
-    ("endpoints", "sigma", "argument"),
-    [
-        (np.zeros((0, 4)), 0.0, "map.segments"),
-        ([[0, 0, 1, 0], [2e5, 0, 2e5 + 1, 0]], 0.0, "map.segments"),
-        (ROOM, -1.0, "map.sigma"),
-        (ROOM, 11.0, "map.sigma"),
-        (ROOM, math.nan, "map.sigma"),
-    ],
-)
-def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
-    with pytest.raises(InvalidMapError) as refused:
-        index_of(endpoints, sigma)
-    assert refused.value.argument == argument

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from association import HardPrior, InvalidSearchError, SoftPrior, Status
+from association import HardPrior, SoftPrior, Status
 
 from .scenes import (
     CORRIDOR,
@@ -17,7 +15,6 @@ from .scenes import (
     LOBBY,
     ROOM,
     SQUARE,
-    Floats,
     answer_of,
     equal_rooms,
     index_of,
@@ -36,52 +33,10 @@ ROOM_INDEX = index_of(ROOM)
 MAZE_INDEX = index_of(maze(1))
 
 
-@pytest.mark.parametrize(
-    "bad",
-    [
-        np.zeros((3, 3)),
-        np.diag([1.0, 1.0, -1.0]),
-        np.full((3, 3), math.nan),
-        np.eye(2),
-        np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-        np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-        np.diag([1e-13, 1.0, 1.0]),
-        np.diag([1e13, 1.0, 1.0]),
-    ],
-)
-def test_a_prior_takes_a_covariance(bad: Floats) -> None:
-    """Of the right shape, finite, symmetric, positive definite and neither tiny nor huge."""
-    with pytest.raises(InvalidSearchError) as refused:
-        SoftPrior(pose(), bad)
-    assert refused.value.argument == "prior.covariance"
-
-
 def test_a_covariance_may_have_unlike_deviations() -> None:
     scale = np.array([1e-5, 1e5, 1e-2])
     correlated = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
     assert SoftPrior(pose(), correlated * np.outer(scale, scale)).covariance[0, 0] == pytest.approx(1e-10)
-
-
-@pytest.mark.parametrize(
-    ("radius", "angle", "argument"),
-    [
-        (0.0, 1.0, "prior.radius"),
-        (1e7, 1.0, "prior.radius"),
-        (math.nan, 1.0, "prior.radius"),
-        (1.0, 0.0, "prior.angle"),
-        (1.0, 5.0, "prior.angle"),
-    ],
-)
-def test_a_window_has_a_size(radius: float, angle: float, argument: str) -> None:
-    with pytest.raises(InvalidSearchError) as refused:
-        HardPrior(pose(), radius, angle)
-    assert refused.value.argument == argument
-
-
-@pytest.mark.parametrize("prior", [partial(HardPrior, radius=1.0, angle=0.1), partial(SoftPrior, covariance=np.eye(3))])
-def test_the_pose_of_a_prior_is_a_transform(prior: Any) -> None:
-    with pytest.raises(InvalidSearchError, match=r"expected a RigidTransform, found \(1, 2, 0\)"):
-        prior((1, 2, 0))
 
 
 @pytest.mark.parametrize(

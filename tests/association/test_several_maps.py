@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -16,8 +15,6 @@ from association import AssociationOptions as Options
 from association import (
     AssociationResult,
     HardPrior,
-    InvalidMapError,
-    InvalidSearchError,
     KnownOfMaps,
     MapIndex,
     MapPart,
@@ -216,38 +213,6 @@ def test_a_prior_is_on_its_map(hard: bool) -> None:
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(prior, name))
         assert found.map_id == name
         assert same_pose(found.pose, TRUTH)
-
-
-def test_prior_and_weights_name_a_map_that_is_searched() -> None:
-    prior = HardPrior(TRUTH, 1.0, 0.5)
-    for prior_or_weights, argument in [
-        (KnownOfMaps(prior), "prior.map_id"),
-        (KnownOfMaps(prior, "roof"), "prior.map_id"),
-        (KnownOfMaps(map_weights={"roof": 0.5}), "map_weights.roof"),
-        (KnownOfMaps(map_weights={"floor-1": 1.5}), "map_weights.floor-1"),
-        (KnownOfMaps(map_weights={"floor-1": math.nan}), "map_weights.floor-1"),
-        (KnownOfMaps(map_weights={"floor-1": 0.6, "floor-2": 0.6}), "map_weights"),
-        (KnownOfMaps(map_weights=dict.fromkeys(NAMES, 0.0)), "map_weights"),
-    ]:
-        with pytest.raises(InvalidSearchError) as refused:
-            associate_on_maps(building(), seen_on(0), prior_or_weights)
-        assert refused.value.argument == argument
-
-
-def test_maps_that_cannot_be_searched_are_named() -> None:
-    room = part(floor(0))
-    wide = np.array([[0.0, 0.0, 1.0, 0.0], [2e5, 0.0, 2e5, 1.0]])
-    for maps, argument in [
-        ([], "maps"),
-        ([("a", room)] * 2, "maps"),
-        ([("a", room), ("b", MapPart(Segments.from_array([])))], "maps.1.segments"),
-        ([("a", room), ("b", replace(room, sigma=11.0))], "maps.1.sigma"),
-        ([("a", part(wide))], "maps.0.segments"),
-        ([(str(k), room) for k in range(257)], "maps"),
-    ]:
-        with pytest.raises(InvalidMapError) as refused:
-            MapSet(maps)
-        assert refused.value.argument == argument
 
 
 def test_alternatives_are_in_the_frames_of_their_maps() -> None:

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from association import (
-    MAX_VIEWS,
     AssociationResult,
     HardPrior,
-    InvalidSearchError,
     Scan,
     Status,
     View,
@@ -148,22 +146,6 @@ def test_correspondences_and_unmatched_segments_are_numbered_through_all_views()
     found = {pair.scan: pair.map for pair in result.correspondences}
     for k in range(count):
         assert found.get(k) == found.get(k + count + 2)
-
-
-def test_views_in_a_circle_are_refused() -> None:
-    scan = scan_of(ENDS)
-    with pytest.raises(InvalidSearchError) as caught:
-        assemble([View(scan), View(scan, relative_to=2), View(scan, relative_to=1)])
-    assert caught.value.argument == "scan.views.1.relative_to"
-    with pytest.raises(InvalidSearchError):
-        assemble([View(scan, relative_to=1)])
-    for count in (0, MAX_VIEWS + 1):
-        with pytest.raises(InvalidSearchError) as caught:
-            assemble([View(scan)] * count)
-        assert caught.value.argument == "scan.views"
-    with pytest.raises(InvalidSearchError) as caught:
-        assemble([View(scan), View(scan, covariance=np.diag([101.0, 1.0, 1.0]))])
-    assert caught.value.argument == "scan.views.1.covariance"
 
 
 def test_beams_count_where_every_view_has_them() -> None:
