@@ -213,10 +213,7 @@ def index_of(endpoints: Any, sigma: float | None = None, **others: Any) -> MapIn
 
 
 def scan_of(
-    endpoints: Any,
-    sigma: float = 0.02,
-    viewpoint: tuple[float, float] | None = None,
-    beams: Beams | None = None,
+    endpoints: Any, sigma: float = 0.02, viewpoint: tuple[float, float] | None = None, beams: Beams | None = None
 ) -> Scan:
     """Wrap scan-frame endpoints; by default not seen from one place, since `seen` lets every wall be seen."""
     return Scan(MeasuredSegments.from_segments(Segments.from_array(endpoints), sigma), viewpoint, beams)

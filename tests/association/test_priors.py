@@ -56,11 +56,7 @@ def test_a_window_contains_what_is_near_in_place_and_angle(at: Any, inside: bool
 
 
 @pytest.mark.parametrize(
-    "prior",
-    [
-        SoftPrior(pose(2.2, 2.0, 0.0), np.diag([0.25, 0.25, 0.05])),
-        HardPrior(pose(2.2, 2.0, 0.0), 0.5, 0.3),
-    ],
+    "prior", [SoftPrior(pose(2.2, 2.0, 0.0), np.diag([0.25, 0.25, 0.05])), HardPrior(pose(2.2, 2.0, 0.0), 0.5, 0.3)]
 )
 def test_a_prior_decides_between_the_four_ways_round_of_a_square(prior: SoftPrior | HardPrior) -> None:
     index, at = index_of(SQUARE), pose(2.0, 2.2, 0.1)

@@ -29,18 +29,7 @@ from association import (
 )
 from registration import MeasuredSegments, RigidTransform, Segments
 
-from .scenes import (
-    Floats,
-    box,
-    drawn_room,
-    known,
-    pose,
-    ranges,
-    reason_codes,
-    ring,
-    same_pose,
-    without_beams,
-)
+from .scenes import Floats, box, drawn_room, known, pose, ranges, reason_codes, ring, same_pose, without_beams
 
 TRUTH = pose(9.0, 6.0, 0.7)  # in the corridor
 NAMES = tuple(f"floor-{k}" for k in range(5))

@@ -8,16 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from association import (
-    AssociationResult,
-    HardPrior,
-    Scan,
-    Status,
-    View,
-    assemble,
-    mirrored,
-    scaled,
-)
+from association import AssociationResult, HardPrior, Scan, Status, View, assemble, mirrored, scaled
 from registration import RigidTransform
 
 from .scenes import (

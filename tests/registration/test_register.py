@@ -15,18 +15,7 @@ from registration import MeasuredSegments, RegistrationOptions, RigidTransform, 
 from registration.options import Estimator, Rotation, Weighting
 
 from . import reference
-from .scenes import (
-    POSE,
-    ROOM,
-    correspondences,
-    diagonal,
-    difference,
-    moved,
-    noisy_pairs,
-    pose_of,
-    room,
-    seen_from,
-)
+from .scenes import POSE, ROOM, correspondences, diagonal, difference, moved, noisy_pairs, pose_of, room, seen_from
 
 SEEDS = st.integers(0, 2**32 - 1)
 ESTIMATORS = ("joint", "one_step")

@@ -255,8 +255,7 @@ def test_ambiguity_at_any_transform_is_that_of_the_definition(seed: int) -> None
 
 
 @pytest.mark.parametrize(
-    ("degrees", "expected"),
-    [([0, 90], 1.0), ([0, 180], 0.0), ([0, 30], 0.5), ([0, 0, 90], 2.0 * math.sqrt(2.0) / 3.0)],
+    ("degrees", "expected"), [([0, 90], 1.0), ([0, 180], 0.0), ([0, 30], 0.5), ([0, 0, 90], 2.0 * math.sqrt(2.0) / 3.0)]
 )
 def test_reliability_in_closed_form(degrees: list[float], expected: float) -> None:
     pairs = correspondences(directed(degrees), MeasuredSegments.from_segments(directed(degrees)))

@@ -222,16 +222,7 @@ def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges: Floats, expecte
     assert beams.misfits_and_quantum(points, 0.0, points, np.empty(len(points)))[1] == pytest.approx(expected)
 
 
-GOOD = {
-    "nx": 1.0,
-    "p": 2.0,
-    "spread": 0.1,
-    "weight": 1e5,
-    "count": 10.0,
-    "chi2": 8.0,
-    "begin": -0.5,
-    "end": 0.5,
-}
+GOOD = {"nx": 1.0, "p": 2.0, "spread": 0.1, "weight": 1e5, "count": 10.0, "chi2": 8.0, "begin": -0.5, "end": 0.5}
 
 
 @pytest.mark.parametrize(
