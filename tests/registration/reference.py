@@ -166,20 +166,9 @@ def one_step_sums(
         point, _, alpha = transformation_line(v, m - np.array(reference[:2]), d, q)
         a = math.remainder(alpha - reference[2], math.tau)
         c = point[0] * v[1] - point[1] * v[0]
-        total += [
-            w,
-            w * v[0] ** 2,
-            w * v[1] ** 2,
-            w * v[0] * v[1],
-            w * point[0],
-            w * point[1],
-            w * c**2,
-            w * a,
-            w * a**2,
-            w * (1.0 - math.cos(a)),
-            w * math.sin(a),
-            1.0,
-        ]
+        turn = 1.0 - math.cos(a), math.sin(a)
+        total[:-1] += w * np.array([1.0, *v**2, v[0] * v[1], *point, c**2, a, a**2, *turn])
+        total[-1] += 1.0
     return total
 
 
