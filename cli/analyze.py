@@ -7,15 +7,13 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 from .asking import Where, setting
-from .errors import Names, WrongUseError, flags_of
+from .errors import Names, WrongUseError, flags_of, needing
 from .inputs import draw_picture, read_map_file, read_map_or_id
-from .options import File, MapArgument, Number, Text, grouped, option
+from .options import MapArgument, grouped, option
 from .printing import Json, Output, rows, write_json
 from .progress import compile_first, progress
-from .scans import needing_formats
 
 SUFFIXES = (".json", ".geojson")
 
@@ -24,21 +22,21 @@ SUFFIXES = (".json", ".geojson")
 class ScannerOptions:
     """The scanner that the robot has, as options."""
 
-    fov: Annotated[float, option("Field of view of the scanner.", "RADIANS")] = 6.283185307179586
-    beams: Annotated[int, option("Number of beams in the field of view.", "N")] = 720
-    range_max: Annotated[float, option("Maximum range of the scanner.", "METRES")] = 20.0
-    sigma: Annotated[float, option("Standard deviation of the ranges.", "METRES")] = 0.02
+    fov: float = option(6.283185307179586, "Field of view of the scanner.", "RADIANS")
+    beams: int = option(720, "Number of beams in the field of view.", "N")
+    range_max: float = option(20.0, "Maximum range of the scanner.", "METRES")
+    sigma: float = option(0.02, "Standard deviation of the ranges.", "METRES")
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceOptions:
     """The places to analyze, what is analyzed of each, and the time for it, as options."""
 
-    spacing: Annotated[Number, option("Distance between places. Default: about 400 places.", "METRES")] = None
-    point: Annotated[tuple[float, float] | None, option("Analyze only places connected with this one.", "X Y")] = None
-    drive: Annotated[float, option("Maximum distance to drive until the pose is usable, at most 30.", "METRES")] = 0.0
-    landmark: Annotated[Text, option("Map file of a landmark's walls: repeat the analysis with it.", "FILE")] = None
-    deadline_ms: Annotated[Number, option("Time limit of the analysis.", "MS")] = None
+    spacing: float | None = option(None, "Distance between places. Default: about 400 places.", "METRES")
+    point: tuple[float, float] | None = option(None, "Analyze only places connected with this one.", "X Y")
+    drive: float = option(0.0, "Maximum distance to drive until the pose is usable, at most 30.", "METRES")
+    landmark: str | None = option(None, "Map file of a landmark's walls: repeat the analysis with it.", "FILE")
+    deadline_ms: float | None = option(None, "Time limit of the analysis.", "MS")
 
 
 @grouped
@@ -48,8 +46,8 @@ def analyze(
     places: PlaceOptions,
     where: Where,
     output: Output,
-    out: Annotated[File, option("Write the result as .json or .geojson.", "FILE")] = None,
-    picture: Annotated[File, option("Draw the result on the map as .png.", "FILE")] = None,
+    out: Path | None = option(None, "Write the result as .json or .geojson.", "FILE"),
+    picture: Path | None = option(None, "Draw the result on the map as .png.", "FILE"),
 ) -> None:
     """Simulate scans on a grid of poses and report where localization succeeds."""
     if out is not None and out.suffix.lower() not in SUFFIXES:
@@ -90,7 +88,7 @@ def features(answer: Json) -> Json:
 
 
 def _draw(document: Json, answer: Json, picture: Path) -> None:
-    with needing_formats("drawing"):
+    with needing("drawing"):
         from formats import VERDICTS, PlaceMark, rgb, verdict_of
 
     marks = [

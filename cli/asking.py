@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import os
 import re
-import urllib.parse
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import (
     NO_NAMES,
@@ -23,7 +22,7 @@ from .errors import (
     refused_at,
     refusing,
 )
-from .options import Text, option
+from .options import option
 from .printing import Json
 from .progress import compile_first
 
@@ -48,13 +47,14 @@ LIMITS = {  # by the name of the setting
 }
 BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 _HEADER = re.compile(r"[!-~]+")
+_URL = re.compile(r"https?://([!-~]+@)?([a-z0-9._-]+|\[[0-9a-f:.]+\])(:[0-9]{1,5})?(/[!-~]*)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
 class Where:
     """The service to ask, as an option."""
 
-    server: Annotated[Text, option("Use the service at this URL; the key is read from LINEFIX_KEY.", "URL")] = None
+    server: str | None = option(None, "Use the service at this URL; the key is read from LINEFIX_KEY.", "URL")
 
     @contextmanager
     def opened(self) -> Iterator[Here | Server]:
@@ -94,9 +94,9 @@ class Here:
         """
         answer: Json
         if method in OF_STORE:
-            from .stored import StoredMaps
+            from .stored import stored_maps
 
-            with closing(StoredMaps(names)) as maps:
+            with stored_maps("".join(arguments[:1]), names) as maps:
                 answer = getattr(maps, method)(*arguments, **more)
                 return answer
         with answering(names) as within:
@@ -110,13 +110,7 @@ class Here:
         with answering(names) as within:
             from linefix.answering import locating
 
-            answer = locating(target, options, within)
-
-        def located(sought: Json) -> Json:
-            with refusing(names):
-                return answer(sought)
-
-        return located
+            return refusing(names)(locating(target, options, within))
 
 
 @contextmanager
@@ -132,9 +126,9 @@ def answering(names: Names) -> Iterator[Within]:
 
 
 def _stored(map_id: str) -> tuple[Any, Json]:
-    from .stored import StoredMaps
+    from .stored import stored_maps
 
-    with closing(StoredMaps()) as maps:
+    with stored_maps(map_id) as maps:
         return maps.found(map_id)
 
 
@@ -152,25 +146,14 @@ def setting(name: str, default: N) -> N:
 
 @contextmanager
 def server_at(url: str) -> Iterator[Server]:
-    """Give the server at a URL.
-
-    Raises
-    ------
-    WrongUseError
-        When the client is not installed, the URL is none, or no header can hold the key.
-    """
+    """Give the server at a URL; raises `WrongUseError` without the client, or where URL or key are none."""
     try:
         from linefix_client import Client
     except ModuleNotFoundError as error:
         raise WrongUseError(
             f"--server needs {error.name}: in a checkout, pip install ./clients/python, or omit --server"
         ) from None
-    try:
-        parts = urllib.parse.urlsplit(url)
-        named = parts.scheme in ("http", "https") and parts.hostname is not None and parts.port != 0
-    except ValueError:
-        named = False
-    if not named or not _HEADER.fullmatch(url):
+    if not _URL.fullmatch(url):
         found = "one with a name or a password" if "@" in url else repr(url)
         raise WrongUseError(f"--server: expected a URL such as http://127.0.0.1:8000, found {found}")
     key = os.environ.get(KEY) or None
@@ -202,23 +185,32 @@ class Server:
             When no server answers, or a field is missing or of another type.
         """
         from linefix_client import LinefixError, ProblemError
+        from pydantic import ValidationError
 
         if method in OF_STORED:
             arguments = (self._id_of(arguments[0]), *arguments[1:])
         try:
             answer: Json = getattr(self._client, method)(*arguments, **more)
+            _fields(method).validate_python(answer)
+            return answer
+        except ValidationError as error:
+            wrong = error.errors(include_url=False)[0]
+            place = "/" + "/".join(map(str, wrong["loc"]))
+            raise NoServerError(
+                f"the answer of {self._url} does not match this version of Linefix: {place}: {wrong['msg']}; "
+                "check the URL and the version of the server"
+            ) from None
         except ProblemError as error:
             raise self._refusal(error, arguments, names) from None
         except LinefixError as error:
-            if error.__cause__ is None:  # a server answers, though none of Linefix
-                raise NoServerError(f"{str(error).removesuffix('; check the URL')}; check the URL") from None
-            raise NoServerError(
+            told = (
                 f"no server responds at {self._url}: {error.__cause__}; start one with linefix serve, or omit --server"
-            ) from None
+            )
+            if error.__cause__ is None:  # a server answers, though none of Linefix
+                told = f"{str(error).removesuffix('; check the URL')}; check the URL"
+            raise NoServerError(told) from None
         except ValueError as error:  # such as a number that JSON cannot have
             raise WrongUseError(f"not sent: {error}") from None
-        self._require_fields(method, answer)
-        return answer
 
     def _id_of(self, on: Json) -> str:
         """Return the id of a stored map; raises `WrongUseError` where it is a map file."""
@@ -228,19 +220,6 @@ class Server:
                 f"store it with linefix map put ID FILE --server {self._url}, or omit --server"
             )
         return str(on["map_id"])
-
-    def _require_fields(self, method: str, answer: Json) -> None:
-        from pydantic import ValidationError
-
-        try:
-            _fields(method).validate_python(answer)
-        except ValidationError as error:
-            wrong = error.errors(include_url=False)[0]
-            place = "/" + "/".join(map(str, wrong["loc"]))
-            raise NoServerError(
-                f"the answer of {self._url} does not match this version of Linefix: {place}: {wrong['msg']}; "
-                "check the URL and the version of the server"
-            ) from None
 
     def _refusal(self, error: Any, arguments: tuple[Any, ...], names: Names) -> CommandError:
         if error.status == 401:

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from .errors import RefusedError, WrongUseError
-from .options import Oriented, UsableOptions, argument, flag, grouped, option
+from .errors import RefusedError, WrongUseError, needing
+from .options import ORIENTED, UsableOptions, argument, flag, grouped, option, required
 from .printing import Output, noted, rows
 from .progress import progress
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 class RunOptions:
     """How to search the scans, as options."""
 
-    workers: Annotated[int | None, option("Number of processes. Default: the number of cores.", "N", min=1)] = None
-    ray: Annotated[bool, flag("Run on a Ray cluster: that of RAY_ADDRESS, or a new one.", "--ray")] = False
-    block: Annotated[int, option("Number of scans in the block of a worker.", "N", min=1, max=65_536)] = 512
-    oriented: Oriented = True
-    deadline_ms: Annotated[float, option("Time limit of each search.", "MS", min=1.0)] = 10_000.0
+    workers: int | None = option(None, "Number of processes. Default: the number of cores.", "N", min=1)
+    ray: bool = flag("Run on a Ray cluster: that of RAY_ADDRESS, or a new one.", "--ray")
+    block: int = option(512, "Number of scans in the block of a worker.", "N", min=1, max=65_536)
+    oriented: bool = flag(*ORIENTED, default=True)
+    deadline_ms: float = option(10_000.0, "Time limit of each search.", "MS", min=1.0)
 
 
 @grouped
 def batch(
     logs: Annotated[list[str], argument("Parquet files, bags, MCAP files or CARMEN logs.", "LOGS")],
-    maps: Annotated[Path, option("A map file, or a folder of map files.", "MAPS")],
-    out: Annotated[Path, option("The Parquet file to write, one row per scan.", "FILE")],
+    maps: Annotated[Path, required("A map file, or a folder of map files.", "MAPS")],
+    out: Annotated[Path, required("The Parquet file to write, one row per scan.", "FILE")],
     run: RunOptions,
     usable: UsableOptions,
     output: Output,
@@ -42,10 +42,8 @@ def batch(
     """
     if out.is_dir():
         raise WrongUseError(f"--out: found the folder {out}, expected a file")
-    from registration import InputError
-
     begun = time.monotonic()
-    try:
+    with needing("linefix batch", "ray" if run.ray else "batch"):
         from batch import associate_many
 
         options, engine = _options(run, usable), _engine(run)
@@ -53,13 +51,6 @@ def batch(
             summary = associate_many(
                 logs, maps, out, options, engine, lambda step: show(step.stage, step.done, step.total)
             )
-    except ModuleNotFoundError as error:
-        extra = "ray" if run.ray else "batch"
-        raise RefusedError(
-            f'linefix batch needs the package {error.name}: in a checkout, pip install ".[{extra}]"'
-        ) from None
-    except InputError as error:
-        raise RefusedError(str(error)) from None
     output.print(asdict(summary), rows(_rows(summary, time.monotonic() - begun)))
     if summary.scans and summary.errors == summary.scans:
         raise RefusedError(f"none of the {summary.scans:,} scans could be searched; the first: {_first_error(out)}")

@@ -83,13 +83,10 @@ def flags_of(group: Any, place: str = "") -> dict[str, str]:
 
 def place_of(pointer: str, names: Names) -> str:
     """Return the user's name for a place in a request, and the rest of the pointer."""
-    begin, rest = pointer, ""
-    while begin not in names and begin:
-        begin, _, last = begin.rpartition("/")
-        rest = f"/{last}{rest}"
-    name = names.get(begin)
-    if name is None:
+    begin = max((one for one in names if f"{pointer}/".startswith(f"{one}/")), key=len, default=None)
+    if begin is None:
         return pointer
+    name, rest = names[begin], pointer[len(begin) :]
     if name.startswith("--"):
         return " ".join([name, *rest.split("/")[1:]])
     return f"{name}: {rest}" if rest else name
@@ -100,6 +97,26 @@ def refused_at(faults: Sequence[tuple[str, str]], names: Names) -> RefusedError:
     told = [f"{place}: {message}" if (place := place_of(pointer, names)) else message for pointer, message in faults]
     more = f" (and {len(told) - MOST_NAMED} more)" if len(told) > MOST_NAMED else ""
     return RefusedError("; ".join(told[:MOST_NAMED]) + more, faults[0][0])
+
+
+@contextmanager
+def needing(what: str, *extras: str) -> Iterator[None]:
+    """Raise `RefusedError` if an extra is missing, by default ``[formats]``, or a library refuses a file or an option.
+
+    Raises
+    ------
+    RefusedError
+    """
+    from registration import InputError
+
+    try:
+        yield
+    except ModuleNotFoundError:
+        extras = extras or ("formats",)
+        needed = f"extra{'s' * (len(extras) > 1)} {' and '.join(extras)}"
+        raise RefusedError(f'{what} needs the {needed}: in a checkout, pip install ".[{",".join(extras)}]"') from None
+    except InputError as error:
+        raise RefusedError(f"--point: {error.message}" if error.argument == "point" else str(error)) from None
 
 
 @contextmanager

@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import RefusedError, WrongUseError
+from .errors import RefusedError, WrongUseError, needing
 from .printing import Json, noted, print_lines, rows, write_json
-from .scans import needing_formats, read_json
+from .scans import read_json
 
 if TYPE_CHECKING:
     from formats import LineMap
@@ -77,7 +77,7 @@ def read_map_file(name: str) -> Json:
 
 def _read_other(path: Path) -> Json:
     """Return the map of another tool; print on stderr which grid of a recording it is, and what was left out."""
-    with needing_formats(f"reading {path.name}"):
+    with needing(f"reading {path.name}"):
         from formats import read_map
         from linefix.documents.results import map_json
 
@@ -119,7 +119,7 @@ def write_document(document: Json, out: Path) -> None:
     if out.suffix.lower() == ".json":
         write_json(document, out)
         return
-    with needing_formats(f"writing {out.name}"):
+    with needing(f"writing {out.name}"):
         from formats import write_map
 
         write_map(line_map_of(document), out)
@@ -127,7 +127,7 @@ def write_document(document: Json, out: Path) -> None:
 
 def draw_picture(document: Json, out: Path, *poses: Any, **more: Any) -> None:
     """Draw a map, and on it what `formats.draw_map` takes; raises `RefusedError` as `write_document`."""
-    with needing_formats("drawing a picture"):
+    with needing("drawing a picture"):
         from formats import draw_map
 
         draw_map(line_map_of(document), out, *poses, **more)

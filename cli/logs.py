@@ -8,11 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
-from .errors import WrongUseError
+from .errors import WrongUseError, needing
 from .inputs import existing
 from .options import TopicOptions
 from .printing import noted, print_lines, rows
-from .scans import needing_formats
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan
@@ -31,7 +30,7 @@ def opened(path: Path, source: TopicOptions, mount: RigidTransform | None = None
     RefusedError
         When it cannot be read.
     """
-    with needing_formats(f"reading {existing(path).name}"):
+    with needing(f"reading {existing(path).name}"):
         from formats import LogOptions, read_log
 
         return read_log(path, LogOptions(source.topic, source.odom, source.tf_namespace, mount, source.base))
@@ -49,7 +48,7 @@ def mount_of(given: tuple[float, float, float] | None) -> RigidTransform | None:
 
 def scans_of(log: Log) -> Iterator[LoggedScan]:
     """Yield the scans of a log; raises `RefusedError` where it is broken."""
-    with needing_formats(f"reading {log.name}"):
+    with needing(f"reading {log.name}"):
         yield from log
 
 

@@ -5,27 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Annotated
 
 from .asking import Where
 from .errors import Names, WrongUseError
 from .inputs import NamedMap, places_of, read_map_file, read_maps, target_of
-from .options import (
-    LIKELY,
-    File,
-    MapArgument,
-    MapsArgument,
-    Number,
-    Oriented,
-    ScanArgument,
-    Text,
-    Texts,
-    UsableOptions,
-    argument,
-    grouped,
-    option,
-)
-from .printing import Json, Output, pose_text, rows, table, verdict_rows, write_json
+from .options import ORIENTED, MapArgument, MapsArgument, ScanArgument, UsableOptions, argument, flag, grouped, option
+from .printing import Json, Output, pose_text, rows, section, table, verdict_rows, write_json
 from .scans import read_json, read_scan
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
@@ -44,19 +31,19 @@ PLACES: Names = {  # options of a search, by their places in a request
 class SearchOptions:
     """The options of a search: the part of the map and the time."""
 
-    near: Annotated[tuple[float, float, float] | None, option("Search only near this pose.", "X Y THETA")] = None
-    radius: Annotated[float, option("Maximum distance from --near.", "METRES")] = 1.0
-    angle: Annotated[float, option("Maximum rotation from --near.", "RADIANS")] = 0.5
-    oriented: Oriented = True
-    deadline_ms: Annotated[Number, option("Time limit of the search.", "MS")] = None
+    near: tuple[float, float, float] | None = option(None, "Search only near this pose.", "X Y THETA")
+    radius: float = option(1.0, "Maximum distance from --near.", "METRES")
+    angle: float = option(0.5, "Maximum rotation from --near.", "RADIANS")
+    oriented: bool = flag(*ORIENTED, default=True)
+    deadline_ms: float | None = option(None, "Time limit of the search.", "MS")
 
 
 @dataclass(frozen=True, slots=True)
 class SeveralOptions:
     """Prior knowledge about several maps, as options."""
 
-    near_map: Annotated[Text, option("Of several maps the one of --near.", "MAP_ID")] = None
-    weight: Annotated[Texts, option("Probability of one of several maps; repeatable.", f"MAP_ID={LIKELY}")] = None
+    near_map: str | None = option(None, "Of several maps the one of --near.", "MAP_ID")
+    weight: list[str] | None = option(None, "Probability of one of several maps; repeatable.", "MAP_ID=PROBABILITY")
 
 
 @grouped
@@ -132,52 +119,49 @@ def _explained(found: Json) -> Iterator[str]:
     yield from rows(verdict_rows(found["answer"]))
     yield from _verdict(found["verdict"])
     if found["last_view"] is not None:
-        yield from ("", "The last view of the drive alone:")
-        yield from _verdict(found["last_view"])
+        yield from ("", "The last view of the drive alone:", *_verdict(found["last_view"]))
 
 
 def _verdict(one: Json) -> Iterator[str]:
     """Return a verdict, part by part."""
     if one["features"] is not None:
         yield from _features(one)
-    yield from ("", "Vetoes")
     vetoes = [(veto["name"], veto["reason"], "applies" if veto["applies"] else "passed") for veto in one["vetoes"]]
-    yield from table(("veto", "reason", "result"), vetoes)
+    yield from section("Vetoes", ("veto", "reason", "result"), vetoes)
     if one["features"] is not None:
         least = one["thresholds"]
-        yield from ("", f"Probabilities, with the prior probability {least['on_map']:.2f} of the map")
+        title = f"Probabilities, with the prior probability {least['on_map']:.2f} of the map"
         probabilities = [
             ("by the model", one["by_model"], None),
             ("among the alternatives", one["among"], None),
             ("of the pose, their product", one["by_model"] * one["among"], least["usable_from"]),
             ("explained", one["explained"], least["explained"]),
         ]
-        yield from table(("probability", "value", "threshold"), probabilities)
+        yield from section(title, ("probability", "value", "threshold"), probabilities)
     yield from ("", f"status {one['status']}, {'usable' if one['usable'] else 'not usable'}")
 
 
 def _features(one: Json) -> Iterator[str]:
     """Return the terms of the odds against each way of being not right, next to those of a usual right answer."""
     for against, odds in one["log_odds"].items():
-        yield from ("", f"Contributions to the log odds against {against}, nats")
         terms = [term for term in one["contributions"] if term["against"] == against]
         found = [(term["name"], term["value"], term["nats"], term["usual"]) for term in terms]
-        yield from table(("feature", "value", "contribution", "usual"), found)
+        title = f"Contributions to the log odds against {against}, nats"
+        yield from section(title, ("feature", "value", "contribution", "usual"), found)
         yield f"log odds with the constant: {odds:.3f}"
-    yield from ("", "Increase of the log odds if the features of a reason were usual, nats")
-    yield from table(("reason", "nats"), one["taken"].items())
+    title = "Increase of the log odds if the features of a reason were usual, nats"
+    yield from section(title, ("reason", "nats"), one["taken"].items())
     others, null = one["alternatives"], one["null"]
     yield from ("", f"Alternatives: {len(others)}; the answer has weight 1")
     if others:
         first = others[:MOST_ALTERNATIVES]
         gaps = [(pose_text(other["pose"]), round(other["gap"], 3) + 0.0, other["weight"]) for other in first]
         yield from table(("pose", "gap in nats", "weight"), gaps)
+    told = "the mirrored scan fits nowhere"
     if null is None:
         told = "not searched, because the answer is not usable without it"
     elif null["score"]:
         told = f"{null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score"
-    else:
-        told = "the mirrored scan fits nowhere"
     yield from ("", f"Null score: {told}")
 
 
@@ -187,10 +171,8 @@ def register(
     scan: ScanArgument,
     where: Where,
     output: Output,
-    correspondences: Annotated[
-        Text, option("JSON file: [[scan index, map index], ...]. Default: i with i.", "FILE")
-    ] = None,
-    oriented: Oriented = True,
+    correspondences: str | None = option(None, "JSON file: [[scan index, map index], ...]. Default: i with i.", "FILE"),
+    oriented: bool = flag(*ORIENTED, default=True),
 ) -> None:
     """Find the pose from known correspondences; the answer is that of /v1/register."""
     body: Json = {"map": read_map_file(on), "scan": read_scan(scan)}
@@ -211,8 +193,8 @@ def vectorize(
     scan: ScanArgument,
     where: Where,
     output: Output,
-    out: Annotated[File, option("Write the segments to this file, as a scan for locate.", "FILE")] = None,
-    sigma: Annotated[Number, option("Standard deviation of the ranges. Default: estimated.", "METRES")] = None,
+    out: Path | None = option(None, "Write the segments to this file, as a scan for locate.", "FILE"),
+    sigma: float | None = option(None, "Standard deviation of the ranges. Default: estimated.", "METRES"),
 ) -> None:
     """Cut ranges or points into segments; the answer is that of /v1/vectorize."""
     told = read_scan(scan)

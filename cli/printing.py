@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Any, TextIO
 
 from .options import flag
 
@@ -20,7 +20,7 @@ Lines = Iterable[str]
 class Output:
     """The option that prints an answer as JSON."""
 
-    as_json: Annotated[bool, flag("Print the complete answer as JSON.", "--json")] = False
+    as_json: bool = flag("Print the complete answer as JSON.", "--json")
 
     @property
     def notes(self) -> TextIO:
@@ -75,6 +75,11 @@ def table(columns: Sequence[str], records: Iterable[Sequence[object]]) -> Lines:
         ).rstrip()
         for row in cells
     ]
+
+
+def section(title: str, columns: Sequence[str], records: Iterable[Sequence[object]]) -> Lines:
+    """Return a table below its title and an empty line."""
+    return ["", title, *table(columns, records)]
 
 
 def shown(value: object) -> str:

@@ -16,26 +16,27 @@ from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
 from .one_scan import explain, locate, register, vectorize
-from .options import PlainCommand, Text, Texts, argument, flag, option
+from .options import PlainCommand, argument, flag, grouped, option
 from .replay import replay
 from .ros2 import RosCommand, ros2
 
-ROLES = ("read", "associate", "write")
+ROLES = "read, associate, write"
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
+@grouped
 def key(
     name: Annotated[str, argument("Name of the key, for people; not secret.", "NAME")],
-    role: Annotated[Texts, option(f"Role of the key: {', '.join(ROLES)}; repeatable. Default: all.", "ROLE")] = None,
-    maps: Annotated[Text, option("Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX")] = None,
+    role: list[str] | None = option(None, f"Role of the key: {ROLES}; repeatable. Default: all.", "ROLE"),
+    maps: str | None = option(None, "Prefix of the ids of the maps that the key may use. Default: all.", "PREFIX"),
 ) -> None:
     """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
     from service.admission.keys import parse_keys
 
     made = secrets.token_urlsafe(32)
-    described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or ROLES}
+    described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or ROLES.split(", ")}
     if maps is not None:
         described["maps"] = maps
     # A string or a list of them is the same in TOML as in JSON.
@@ -45,7 +46,7 @@ def key(
     except ValueError:
         raise WrongUseError(
             f"the name {name!r}, a role of {role!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for "
-            f"NAME, one of {', '.join(ROLES)} for --role, and letters, digits, dots or dashes for --maps"
+            f"NAME, one of {ROLES} for --role, and letters, digits, dots or dashes for --maps"
         ) from None
     print(lines)
     typer.echo(made, err=True)
@@ -66,8 +67,9 @@ def _print_version(asked: bool) -> None:
 
 
 @app.callback()
+@grouped
 def linefix(
-    version: Annotated[bool, flag("Print the version.", "--version", callback=_print_version, is_eager=True)] = False,
+    version: bool = flag("Print the version.", "--version", callback=_print_version, is_eager=True),
 ) -> None:
     """Find the pose of a robot on a map of walls from a laser scan.
 

@@ -14,7 +14,7 @@ from .asking import Locate, Where
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .inputs import NamedMap, draw_picture, places_of, read_maps, target_of
 from .logs import mount_of, opened, print_notes, scans_of
-from .options import File, TopicOptions, UsableOptions, argument, grouped, option
+from .options import TopicOptions, UsableOptions, argument, grouped, option, required
 from .printing import Json, Lines, Output, print_json, print_lines, rows, table
 from .progress import progress
 from .tracking import Frames, Tracker, map_of, pose_of
@@ -82,23 +82,23 @@ class Tally:
 class ScanOptions:
     """Which scans of a log to localize, and how, as options."""
 
-    mount: Annotated[tuple[float, float, float] | None, option("Pose of the laser on the robot.", "X Y THETA")] = None
-    mode: Annotated[Literal["track", "global"], option(MODE)] = "track"
-    every: Annotated[int, option("Use each Nth scan.", "N", min=1)] = 1
+    mount: tuple[float, float, float] | None = option(None, "Pose of the laser on the robot.", "X Y THETA")
+    mode: Literal["track", "global"] = option("track", MODE)
+    every: int = option(1, "Use each Nth scan.", "N", min=1)
 
 
 @dataclass(frozen=True, slots=True)
 class ResultFiles:
     """The files to write, as options."""
 
-    out: Annotated[File, option("Write the usable poses to this file in the TUM format.", "FILE")] = None
-    picture: Annotated[File, option("Draw map and poses to this PNG file; usable poses are green.", "FILE")] = None
+    out: Path | None = option(None, "Write the usable poses to this file in the TUM format.", "FILE")
+    picture: Path | None = option(None, "Draw map and poses to this PNG file; usable poses are green.", "FILE")
 
 
 @grouped
 def replay(
     log: Annotated[Path, argument("A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.", "LOG")],
-    on: Annotated[list[str], option("A map file, a folder, or the id of a stored map; repeatable.", "MAP", "--map")],
+    on: Annotated[list[str], required("A map file, a folder, or the id of a stored map; repeatable.", "MAP", "--map")],
     source: TopicOptions,
     scans: ScanOptions,
     usable: UsableOptions,

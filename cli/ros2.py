@@ -9,15 +9,14 @@ import threading
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from .asking import Where
-from .errors import RefusedError, WrongUseError
+from .errors import RefusedError, WrongUseError, needing
 from .inputs import read_maps
-from .options import File, PlainCommand, Text, Texts, UsableOptions, flag, grouped, option
+from .options import PlainCommand, UsableOptions, flag, grouped, option
 from .printing import Json
 from .ros2_parameters import given_parameter, parameters_of, robots_of
-from .scans import needing_formats
 
 if TYPE_CHECKING:
     from ros2 import Maps, NodeOptions
@@ -66,45 +65,40 @@ class RosCommand(PlainCommand):
 class RobotOptions:
     """The maps, topics and frames of the robot, and when its pose is published, as options."""
 
-    on: Annotated[Texts, option(MAPS, "MAP", "--map")] = None
-    map_topic: Annotated[str, option("Topic of an OccupancyGrid, without --map.", "TOPIC")] = "map"
-    scan: Annotated[Texts, option("Topic of scans; repeat for more scanners. Default: scan.", "TOPIC")] = None
-    together_s: Annotated[float, option(TOGETHER, "SECONDS", min=0.0, max=5.0)] = 0.1
-    odom: Annotated[str, option("Topic of odometry.", "TOPIC")] = "odom"
-    motion: Annotated[bool, option("Correct the motion during a scan by the twist of odometry.")] = True
-    base: Annotated[str, option("The base frame of the robot.", "FRAME")] = "base_link"
-    odom_frame: Annotated[str, option("The odometry frame, if no odometry message names it.", "FRAME")] = "odom"
-    namespace: Annotated[
-        Text, option("Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE")
-    ] = None
-    frame_prefix: Annotated[str, option("Prefix of all frames of the robot, such as robot1/.", "PREFIX")] = ""
-    agree: Annotated[int, option("Number of scans that have to agree on a published pose.", "N", min=1, max=100)] = 3
-    when: Annotated[Literal["start", "lost", "always"], option(WHEN)] = "start"
-    min_sigma: Annotated[float, option(f"{LEAST} of the position in initialpose.", "METRES", min=0.0, max=10.0)] = 0.05
-    min_sigma_theta: Annotated[
-        float, option(f"{LEAST} of the heading in initialpose.", "RADIANS", min=0.0, max=3.0)
-    ] = 0.0349
-    publish_tf: Annotated[bool, option(PUBLISH_TF)] = False
-    tf_max_age_s: Annotated[float, option(STOP_TF, "SECONDS", min=0.0, max=3600.0)] = 0.0
-    surface: Annotated[
-        float | None,
-        option("Depth of walls' surfaces in the map's cells.", "CELLS", min=0.0, max=10.0),
-    ] = None
-    use_sim_time: Annotated[bool, option("Use the time of /clock.")] = False
-    hardware_id: Annotated[str, option("Hardware id of the diagnostics. Default: the namespace.", "NAME")] = ""
+    on: list[str] | None = option(None, MAPS, "MAP", "--map")
+    map_topic: str = option("map", "Topic of an OccupancyGrid, without --map.", "TOPIC")
+    scan: list[str] | None = option(None, "Topic of scans; repeat for more scanners. Default: scan.", "TOPIC")
+    together_s: float = option(0.1, TOGETHER, "SECONDS", min=0.0, max=5.0)
+    odom: str = option("odom", "Topic of odometry.", "TOPIC")
+    motion: bool = option(True, "Correct the motion during a scan by the twist of odometry.")
+    base: str = option("base_link", "The base frame of the robot.", "FRAME")
+    odom_frame: str = option("odom", "The odometry frame, if no odometry message names it.", "FRAME")
+    namespace: str | None = option(
+        None, "Namespace of all relative topics. Default: that of the first --scan.", "NAMESPACE"
+    )
+    frame_prefix: str = option("", "Prefix of all frames of the robot, such as robot1/.", "PREFIX")
+    agree: int = option(3, "Number of scans that have to agree on a published pose.", "N", min=1, max=100)
+    when: Literal["start", "lost", "always"] = option("start", WHEN)
+    min_sigma: float = option(0.05, f"{LEAST} of the position in initialpose.", "METRES", min=0.0, max=10.0)
+    min_sigma_theta: float = option(0.0349, f"{LEAST} of the heading in initialpose.", "RADIANS", min=0.0, max=3.0)
+    publish_tf: bool = option(False, PUBLISH_TF)
+    tf_max_age_s: float = option(0.0, STOP_TF, "SECONDS", min=0.0, max=3600.0)
+    surface: float | None = option(None, "Depth of walls' surfaces in the map's cells.", "CELLS", min=0.0, max=10.0)
+    use_sim_time: bool = option(False, "Use the time of /clock.")
+    hardware_id: str = option("", "Hardware id of the diagnostics. Default: the namespace.", "NAME")
 
 
 @dataclass(frozen=True, slots=True)
 class RosArguments:
     """Parameters and remappings in the way of ROS 2, as options."""
 
-    params_file: Annotated[File, option("A parameter file of ROS 2 (YAML).", "FILE")] = None
-    ros_args: Annotated[bool, flag("Ignored; the options after it apply as usual.", "--ros-args")] = False
-    parameter: Annotated[Texts, option("Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")] = None
-    log_level: Annotated[Texts, option("Ignored, as are rosout logs.", "LEVEL")] = None
-    rosout_logs: Annotated[bool, flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)] = False
-    stdout_logs: Annotated[bool, flag("Ignored.", "--enable-stdout-logs/--disable-stdout-logs", hidden=True)] = False
-    remap: Annotated[Texts, option("Remap the name of a topic.", "FROM:=TO", "--remap", "-r")] = None
+    params_file: Path | None = option(None, "A parameter file of ROS 2 (YAML).", "FILE")
+    ros_args: bool = flag("Ignored; the options after it apply as usual.", "--ros-args")
+    parameter: list[str] | None = option(None, "Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")
+    log_level: list[str] | None = option(None, "Ignored, as are rosout logs.", "LEVEL")
+    rosout_logs: bool = flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)
+    stdout_logs: bool = flag("Ignored.", "--enable-stdout-logs/--disable-stdout-logs", hidden=True)
+    remap: list[str] | None = option(None, "Remap the name of a topic.", "FROM:=TO", "--remap", "-r")
 
 
 @grouped
@@ -113,13 +107,8 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
 
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
     """
-    try:
+    with needing("linefix ros2", "formats", "ros2"):
         import ros2 as node_side
-    except ModuleNotFoundError:
-        raise RefusedError(
-            'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
-        ) from None
-
     rules = ros.remap or []
     robots = [] if ros.params_file is None else robots_of(ros.params_file)
     if len(robots) > 1 and robot.namespace is None and not any(rule.startswith("__ns:=") for rule in rules):
@@ -190,7 +179,7 @@ def _maps_at(names: Sequence[str]) -> Maps:
                 f"{name}: found a frame_id that is not a name, expected at most "
                 f"{MAX_FRAME} printable characters; correct it in the map file"
             )
-    with needing_formats("a map"):
+    with needing("a map"):
         several = len(documents) > 1
         index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
     return Maps(index, frames)

@@ -94,11 +94,8 @@ def robots_of(file: Path) -> list[str]:
 def _sections_of(file: Path) -> Sections:
     """Return the sections of the node by namespace and name of the node."""
     expected = f"expected {NODE}: ros__parameters: name: value"
-    try:
-        with file.open(encoding="utf-8", errors="replace") as stream:
-            document = _yaml(stream.read(MAX_PARAMETERS + 1))
-    except OSError as error:
-        raise WrongUseError(f"{file}: {error.strerror}") from None
+    with file.open(encoding="utf-8", errors="replace") as stream:
+        document = _yaml(stream.read(MAX_PARAMETERS + 1))
     sections: Sections = {}
     for name, inner in document.items() if isinstance(document, dict) else ():
         above, _, node = str(name).strip("/").rpartition("/")

@@ -6,12 +6,10 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .errors import RefusedError, WrongUseError
+from .errors import RefusedError, WrongUseError, needing
 from .printing import Json
 
 STDIN = "-"
@@ -28,19 +26,16 @@ NEXT = "\n---"  # between the messages of `ros2 topic echo`
 
 
 def bytes_of(name: str) -> bytes:
-    """Return the content of a text file; ``-`` reads stdin. A byte-order mark is left out.
+    """Return the content of a text file without a byte-order mark; ``-`` reads stdin.
 
     Raises
     ------
-    WrongUseError
+    OSError
         When there is no such file, or it cannot be read.
     RefusedError
         When it is text in UTF-16.
     """
-    try:
-        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
-    except OSError as error:
-        raise WrongUseError(f"{name}: {error.strerror}") from None
+    data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
     if data.startswith(WIDE):
         raise RefusedError(f"{name}: found text in UTF-16, expected UTF-8; save the file as UTF-8")
     return data.removeprefix(BYTE_ORDER_MARK)
@@ -51,7 +46,7 @@ def read_json(name: str, data: bytes | None = None) -> Any:
 
     Raises
     ------
-    WrongUseError
+    OSError
         As `bytes_of`.
     RefusedError
         When it is not JSON, or has more values than any request may have.
@@ -68,24 +63,6 @@ def read_json(name: str, data: bytes | None = None) -> Any:
         raise RefusedError(f"{name}: not JSON: {error}") from None
 
 
-@contextmanager
-def needing_formats(what: str) -> Iterator[None]:
-    """Raise `RefusedError` if the extra ``[formats]`` is missing, or refuses a file.
-
-    Raises
-    ------
-    RefusedError
-    """
-    from registration import InputError
-
-    try:
-        yield
-    except ModuleNotFoundError:
-        raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
-    except InputError as error:
-        raise RefusedError(f"--point: {error.message}" if error.argument == "point" else str(error)) from None
-
-
 def read_scan(name: str) -> Json:
     """Read a scan file; ``-`` reads it from stdin.
 
@@ -94,8 +71,10 @@ def read_scan(name: str) -> Json:
 
     Raises
     ------
+    OSError
+        As `bytes_of`.
     WrongUseError
-        When there is no such file, it cannot be read, or it is a log.
+        When it is a log.
     RefusedError
         When the content is neither JSON nor YAML, or no scan.
     """
@@ -125,7 +104,7 @@ def read_scan(name: str) -> Json:
 
 def _yaml(data: bytes, name: str) -> Any:
     """Return the first message of YAML."""
-    with needing_formats(f"reading {name} as YAML"):
+    with needing(f"reading {name} as YAML"):
         from formats.errors import naming
         from formats.files import load_yaml
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..asking import Where
 from ..inputs import read_map_or_id
 from ..logs import some_scans
-from ..options import File, MapArgument, Texts, TopicOptions, grouped, option
+from ..options import MapArgument, TopicOptions, grouped, option
 from ..printing import Json, Output, rows
 from ..scans import read_scan
 
@@ -28,8 +29,8 @@ def check(
     source: TopicOptions,
     where: Where,
     output: Output,
-    scan: Annotated[Texts, option("A scan file from the building; repeat for more scans.", "FILE")] = None,
-    log: Annotated[File, option(f"A log from the building; {SAMPLES} of its scans are used.", "FILE")] = None,
+    scan: list[str] | None = option(None, "A scan file from the building; repeat for more scans.", "FILE"),
+    log: Path | None = option(None, f"A log from the building; {SAMPLES} of its scans are used.", "FILE"),
 ) -> None:
     """Report possible errors of a map; with scans, also whether they fit better mirrored, scaled or moved."""
     scans = {f"/scans/{number}": (name, read_scan(name)) for number, name in enumerate(scan or [])}

@@ -8,25 +8,11 @@ from pathlib import Path
 from typing import Annotated
 
 from ..asking import Where, answering
-from ..errors import WrongUseError, flags_of
+from ..errors import WrongUseError, flags_of, needing
 from ..inputs import draw_picture, existing, write_document
 from ..logs import some_scans
-from ..options import (
-    ORIENTED,
-    File,
-    Number,
-    OutMap,
-    Picture,
-    Text,
-    Texts,
-    TopicOptions,
-    argument,
-    flag,
-    grouped,
-    option,
-)
+from ..options import DRAW_RESULT, ORIENTED, WRITE_MAP, TopicOptions, argument, flag, grouped, option
 from ..printing import Json, Output, noted, rows
-from ..scans import needing_formats
 from .checking import SAMPLES, check_rows, of_sensor
 from .updating import draw_changes, update_by_drive, update_rows
 
@@ -38,18 +24,18 @@ UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per u
 class SaidOfFile:
     """Facts that a file does not state itself, as options; each is a field of the form of ``/v1/maps:import``."""
 
-    units: Annotated[Text, option(UNIT, "UNIT")] = None
-    layers: Annotated[Texts, option("Layers of a drawing to read, such as *WALL*; repeatable.", "PATTERN")] = None
-    where: Annotated[Texts, option("Entities to read, such as indoor=wall; repeatable.", "PROPERTY=VALUE")] = None
-    level: Annotated[Text, option("Floor of a drawing that has several levels.", "NAME")] = None
-    surface: Annotated[Number, option("Depth of walls' surfaces behind the front of a grid's cells.", "CELLS")] = None
-    point: Annotated[tuple[float, float] | None, option("A free place, to find the walls' directions.", "X Y")] = None
-    drawn: Annotated[Text, option("What a drawing's lines are: faces or centres of walls.", "WHAT")] = None
-    thickness: Annotated[Number, option("Thickness of walls drawn by centre lines.", "METRES")] = None
-    oriented: Annotated[bool | None, ORIENTED] = None
-    local_metres: Annotated[bool, flag("The coordinates of a GeoJSON are metres.", "--local-metres")] = False
-    topic: Annotated[Text, option("Topic of the grid in a bag.", "TOPIC")] = None
-    unknown: Annotated[Text, option("Grey value of unknown cells in a picture, 0 to 255, or none.", "GREY")] = None
+    units: str | None = option(None, UNIT, "UNIT")
+    layers: list[str] | None = option(None, "Layers of a drawing to read, such as *WALL*; repeatable.", "PATTERN")
+    where: list[str] | None = option(None, "Entities to read, such as indoor=wall; repeatable.", "PROPERTY=VALUE")
+    level: str | None = option(None, "Floor of a drawing that has several levels.", "NAME")
+    surface: float | None = option(None, "Depth of walls' surfaces behind the front of a grid's cells.", "CELLS")
+    point: tuple[float, float] | None = option(None, "A free place, to find the walls' directions.", "X Y")
+    drawn: str | None = option(None, "What a drawing's lines are: faces or centres of walls.", "WHAT")
+    thickness: float | None = option(None, "Thickness of walls drawn by centre lines.", "METRES")
+    oriented: bool | None = flag(*ORIENTED, default=None)
+    local_metres: bool = flag("The coordinates of a GeoJSON are metres.", "--local-metres")
+    topic: str | None = option(None, "Topic of the grid in a bag.", "TOPIC")
+    unknown: str | None = option(None, "Grey value of unknown cells in a picture, 0 to 255, or none.", "GREY")
 
     @property
     def fields(self) -> Json:
@@ -65,10 +51,10 @@ def import_map(
     said: SaidOfFile,
     where: Where,
     output: Output,
-    out: OutMap = None,
-    picture: Picture = None,
-    log: Annotated[File, option("A log of the building: find where the walls' surfaces are.", "FILE")] = None,
-    update: Annotated[bool, flag("Improve the map with the scans of --log; see map update.", "--update")] = False,
+    out: Path | None = option(None, WRITE_MAP, "FILE"),
+    picture: Path | None = option(None, DRAW_RESULT, "FILE"),
+    log: Path | None = option(None, "A log of the building: find where the walls' surfaces are.", "FILE"),
+    update: bool = flag("Improve the map with the scans of --log; see map update.", "--update"),
 ) -> None:
     """Read a map of another tool, report what was read and what is doubtful, and write it as a map file."""
     if log is not None and where.server is not None:
@@ -102,7 +88,7 @@ def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
     if where.server is not None:
         sent = [(one.name, one.read_bytes()) for one in files]
         return where.ask("import_map", sent, said.fields, names=names)
-    with answering(names) as within, needing_formats(f"reading {file.name}"):
+    with answering(names) as within, needing(f"reading {file.name}"):
         from formats import read_map
         from linefix.answering import check_import
         from linefix.operations import Stopwatch

@@ -8,7 +8,7 @@ from typing import Annotated
 from ..asking import Where
 from ..errors import NoServerError, WrongUseError
 from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id, write_document
-from ..options import WRITE_MAP, File, MapArgument, argument, grouped, option
+from ..options import WRITE_MAP, MapArgument, argument, grouped, option, required
 from ..printing import Json, Output, print_json, rows, table
 
 MAX_PAGES = 100_000  # of a list of maps
@@ -58,7 +58,7 @@ def list_maps(where: Where, output: Output) -> None:
 def get(
     map_id: MapId,
     where: Where,
-    out: Annotated[File, option(f"{WRITE_MAP} Default: print it.", "FILE")] = None,
+    out: Path | None = option(None, f"{WRITE_MAP} Default: print it.", "FILE"),
 ) -> None:
     """Print a stored map as JSON, or write it to a file."""
     document = where.ask("get_map", _checked(map_id))
@@ -77,7 +77,7 @@ def remove(map_id: MapId, where: Where) -> None:
 @grouped
 def draw(
     on: MapArgument,
-    out: Annotated[Path, option("File to write: png, svg, dxf, geojson, csv or json.", "FILE")],
+    out: Annotated[Path, required("File to write: png, svg, dxf, geojson, csv or json.", "FILE")],
     where: Where,
 ) -> None:
     """Draw a map: walls in grey, a blue tick on the free side of each."""

@@ -11,12 +11,11 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, Annotated
 
 from ..asking import Where
-from ..errors import WrongUseError, flags_of
+from ..errors import WrongUseError, flags_of, needing
 from ..inputs import draw_picture, line_map_of, read_map_or_id, write_document
 from ..logs import some_scans
-from ..options import MapArgument, Number, OutMap, Picture, TopicOptions, argument, grouped, option
+from ..options import DRAW_RESULT, WRITE_MAP, MapArgument, TopicOptions, argument, grouped, option
 from ..printing import Json, Output, rows
-from ..scans import needing_formats
 from .checking import of_sensor
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ class Visits(TopicOptions):
     """The logs of visits, and what to read of them."""
 
     logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")]
-    scans: Annotated[int, option("Use so many scans of each log at most.", "N", min=3)] = SCANS
+    scans: int = option(SCANS, "Use so many scans of each log at most.", "N", min=3)
 
     def read(self) -> dict[str, list[LoggedScan]]:
         """Return scans of each visit, by the name of its log.
@@ -58,10 +57,10 @@ class Visits(TopicOptions):
 class Result:
     """Which changes to accept, and files for the new map."""
 
-    accept: Annotated[Number, option("Leave changes of less confidence out.", "CONFIDENCE", min=0.0, max=1.0)] = None
-    refuse: Annotated[list[int] | None, option("Leave this change out; repeat for more changes.", "INDEX")] = None
-    out: OutMap = None
-    picture: Picture = None
+    accept: float | None = option(None, "Leave changes of less confidence out.", "CONFIDENCE", min=0.0, max=1.0)
+    refuse: list[int] | None = option(None, "Leave this change out; repeat for more changes.", "INDEX")
+    out: Path | None = option(None, WRITE_MAP, "FILE")
+    picture: Path | None = option(None, DRAW_RESULT, "FILE")
 
 
 @grouped
@@ -154,7 +153,7 @@ def _metres(rows: Sequence[Sequence[float]]) -> str:
 
 def draw_changes(old: Json, answer: Json, picture: Path) -> None:
     """Draw the old map, and the changes in colours with their numbers: old walls that go dashed, new walls solid."""
-    with needing_formats("drawing a picture"):
+    with needing("drawing a picture"):
         import numpy as np
 
         from formats.colours import CHANGES, rgb
