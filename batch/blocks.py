@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +18,7 @@ from registration import MeasuredSegments, Segments
 from vectorization import LaserScan, Motion
 
 from .errors import UnreadableScansError
-from .tables import COLUMNS, MOTION
+from .tables import BOUNDS, COLUMNS, MOTION
 
 SIGMA = 0.02  # m, of the points of segments without a sigma; as over HTTP
 
@@ -45,6 +44,9 @@ class Block:
     path: str
     start: int
     stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
 
     @property
     def halves(self) -> tuple[Block, Block]:
@@ -88,15 +90,8 @@ class Row:
         angle_min, increment = self._number("angle_min"), self._number("angle_increment")
         if angle_min is None or increment is None:
             raise UnreadableScansError("expected a number", argument="angle_min and angle_increment")
-        nearest, farthest = self._number("range_min"), self._number("range_max")
-        laser = LaserScan(
-            angle_min,
-            increment,
-            self.values["ranges"],
-            0.0 if nearest is None else nearest,
-            math.inf if farthest is None else farthest,
-            self._motion(),
-        )
+        bounds = {name: bound for name in BOUNDS if (bound := self._number(name)) is not None}
+        laser = LaserScan(angle_min, increment, self.values["ranges"], motion=self._motion(), **bounds)
         seen = RangeScan(laser, self._number("time_increment") or 0.0, flipped=bool(self.values.get("flipped")))
         return linefix.assemble([linefix.view_of(seen, sigma=self._number("sigma"))])
 
@@ -122,13 +117,11 @@ class Row:
 def rows_of(block: Block) -> Iterator[Row]:
     """Yield the scans of a block."""
     table = _read(block)
-    columns = {name: table.column(name) for name in table.column_names}
-    ranges = columns.pop("ranges", None)
-    told = {name: column.to_pylist() for name, column in columns.items()}
-    for k in range(len(table)):
-        values = {name: column[k] for name, column in told.items()}
-        if ranges is not None and ranges[k].is_valid:
-            values["ranges"] = ranges[k].values.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
+    ranges = table.column("ranges") if "ranges" in table.column_names else pa.nulls(len(table))
+    rest = table.select([name for name in table.column_names if name != "ranges"]).to_pylist()
+    for k, (values, one) in enumerate(zip(rest or [{} for _ in ranges], ranges, strict=True)):
+        if one.is_valid:
+            values["ranges"] = one.values.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
         yield Row(block.start + k, values)
 
 

@@ -74,13 +74,6 @@ def checked(outcome: tuple[Any, str]) -> Any:
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-@dataclass(slots=True)
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    number: int | None = None  # of the item that it is at
-
-
 @dataclass(frozen=True, slots=True)
 class Processes:
     """Worker processes; one that ends early is replaced.
@@ -98,59 +91,56 @@ class Processes:
     def run(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result | Lost]]:
         """Yield each item once with its result, as they are done; see `Engine.run`."""
         waiting, losses = deque(range(len(items))), Counter[int]()
-        workers: list[_Worker] = []
+        running: dict[Connection, tuple[BaseProcess, int]] = {}  # by the pipe of each worker; the number of its item
+
+        def give(process: BaseProcess, pipe: Connection) -> None:
+            """Send the next item to a worker, or end it; one that has just ended is noticed when its answer is read."""
+            if not waiting:
+                _end(process, pipe)
+                return
+            running[pipe] = process, waiting.popleft()
+            with contextlib.suppress(OSError):
+                pipe.send(items[running[pipe][1]])
+
         try:
-            with _one_thread():
-                workers += [_started(function) for _ in range(min(self.count, len(items)))]
-            for worker in workers:
-                _give(worker, waiting, items)
-            while busy := [worker for worker in workers if worker.number is not None]:
-                ready = wait([worker.pipe for worker in busy])
-                for worker in [worker for worker in busy if worker.pipe in ready]:
-                    number = worker.number
-                    assert number is not None
+            for _ in range(min(self.count, len(items))):
+                give(*_started(function))
+            while running:
+                for pipe in wait(list(running)):
+                    assert isinstance(pipe, Connection)
+                    process, number = running.pop(pipe)
                     try:
-                        outcome = worker.pipe.recv()
+                        outcome = pipe.recv()
                     except (EOFError, OSError):
-                        workers.remove(worker)
-                        _ended(worker)
+                        _end(process, pipe)
+                        process, pipe = _started(function)
                         losses[number] += 1
-                        with _one_thread():
-                            worker = _started(function)
-                        workers.append(worker)
                         if losses[number] < ATTEMPTS:
                             waiting.append(number)
-                            _give(worker, waiting, items)
+                            give(process, pipe)
                             continue
                         outcome = Lost(), ""
-                    _give(worker, waiting, items)
+                    give(process, pipe)
                     yield items[number], checked(outcome)
         finally:
-            for worker in workers:
-                _ended(worker)
+            for pipe, (process, _) in running.items():
+                _end(process, pipe)
 
 
-def _give(worker: _Worker, waiting: deque[int], items: Sequence[object]) -> None:
-    """Send the next item to a worker; a worker that has just ended is noticed when its answer is read."""
-    worker.number = waiting.popleft() if waiting else None
-    if worker.number is not None:
-        with contextlib.suppress(OSError):
-            worker.pipe.send(items[worker.number])
-
-
-def _started(function: Callable[[Item], Result]) -> _Worker:
+def _started(function: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_work, args=(function, theirs), daemon=True)
-    process.start()
+    with _one_thread():
+        process.start()
     theirs.close()  # so that ours shows the end of the worker
-    return _Worker(process, ours)
+    return process, ours
 
 
-def _ended(worker: _Worker) -> None:
-    worker.pipe.close()
-    worker.process.kill()
-    worker.process.join()
+def _end(process: BaseProcess, pipe: Connection) -> None:
+    pipe.close()
+    process.kill()
+    process.join()
 
 
 def _work(function: Callable[[Item], Result], pipe: Connection) -> None:

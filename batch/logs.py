@@ -16,7 +16,8 @@ from registration import InputError
 
 from .blocks import Block
 from .errors import UnreadableScansError
-from .tables import COLUMNS, FORMS, LASER, MOTION, SCANS
+from .parts import whole
+from .tables import BOUNDS, COLUMNS, FORMS, LASER, MOTION, SCANS
 
 if TYPE_CHECKING:
     from formats import LoggedScan
@@ -102,11 +103,10 @@ def merged_notes(layouts: Iterable[Layout]) -> tuple[LogNote, ...]:
     """Return one note for each kind and code, with the sums over all logs."""
     found: dict[tuple[str, str], LogNote] = {}
     for note in (note for layout in layouts for note in layout.notes()):
-        key = note.kind, note.code
-        first = found.get(key)
-        found[key] = (
-            note if first is None else replace(first, count=first.count + note.count, logs=first.logs + note.logs)
-        )
+        first = found.setdefault((note.kind, note.code), note)
+        if first is not note:
+            both = replace(first, count=first.count + note.count, logs=first.logs + 1)
+            found[note.kind, note.code] = both
     return tuple(found.values())
 
 
@@ -130,22 +130,21 @@ def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
 
 
 def lay_out(layout: Layout) -> None:
-    """Write a log's scans in row groups of a block; what there is of a file is whole."""
-    source, target = Path(layout.log), Path(layout.path)
-    begun = target.with_suffix(".begun")
-    if source.suffix.lower() in PARQUET:
-        file = pq.ParquetFile(source, pre_buffer=False)
-        with pq.ParquetWriter(begun, file.schema_arrow) as writer:
-            for batch in file.iter_batches(layout.block, use_threads=False):
+    """Write a log's scans in row groups of a block."""
+    parquet = None
+    if Path(layout.log).suffix.lower() in PARQUET:
+        parquet = pq.ParquetFile(layout.log, pre_buffer=False)
+    schema = SCANS if parquet is None else parquet.schema_arrow
+    with whole(Path(layout.path)) as file, pq.ParquetWriter(file, schema) as writer:
+        if parquet is not None:
+            for batch in parquet.iter_batches(layout.block, use_threads=False):
                 writer.write_batch(batch, layout.block)
-    else:
-        with pq.ParquetWriter(begun, SCANS) as writer:
-            notes = list[dict[str, Any]]()
-            found = _rows(layout.log, notes)
-            while rows := list(islice(found, layout.block)):
-                writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
-            writer.add_key_value_metadata({NOTES: orjson.dumps(notes)})
-    begun.rename(target)
+            return
+        notes = list[dict[str, Any]]()
+        found = _rows(layout.log, notes)
+        while rows := list(islice(found, layout.block)):
+            writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
+        writer.add_key_value_metadata({NOTES: orjson.dumps(notes)})
 
 
 def _rows(log: str, notes: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -171,9 +170,8 @@ def _rows(log: str, notes: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 def _row(scan: LoggedScan) -> dict[str, Any]:
     laser, motion = scan.laser, scan.laser.motion
-    names = (*LASER, "range_min", "range_max")
     row: dict[str, Any] = {"stamp": scan.stamp_ns, "flipped": scan.flipped, "time_increment": scan.time_increment}
-    row |= {name: getattr(laser, name) for name in names}
+    row |= {name: getattr(laser, name) for name in (*LASER, *BOUNDS)}
     return row if motion is None else row | {name: getattr(motion, name) for name in MOTION[1:]}
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -46,13 +46,8 @@ class Parts:
 
     def keep(self, block: Block, rows: pa.Table) -> None:
         """Write the rows of a block; they outlive a kill and a power loss from then on."""
-        path = self._path(block.number, block.start, block.stop)
-        begun = path.with_suffix(".begun")
-        with begun.open("wb") as file:
+        with whole(self._path(block.number, block.start, block.stop)) as file:
             pq.write_table(rows, file)
-            file.flush()
-            os.fsync(file.fileno())
-        begun.rename(path)
 
     def left(self, blocks: list[Block]) -> list[Block]:
         """Return what of the blocks is not done."""
@@ -63,8 +58,7 @@ class Parts:
 
     def assemble(self, out: Path) -> Iterator[pa.Table]:
         """Write the rows in the order of logs and scans, then remove the parts; yield them on the way."""
-        begun = out.with_name(out.name + ".begun")
-        with pq.ParquetWriter(begun, POSES) as writer:
+        with whole(out) as file, pq.ParquetWriter(file, POSES) as writer:
             gathered: list[pa.Table] = []
             for kept in self._kept():
                 gathered.append(pq.read_table(self._path(*kept)))
@@ -74,9 +68,6 @@ class Parts:
                     gathered.clear()
             if gathered:
                 writer.write_table(pa.concat_tables(gathered))
-        with begun.open("rb") as file:
-            os.fsync(file.fileno())
-        begun.replace(out)
         shutil.rmtree(self.folder)
 
     def _path(self, number: int, start: int, stop: int) -> Path:
@@ -93,6 +84,17 @@ def _left(block: Block, done: set[tuple[int, int]]) -> list[Block]:
     if any(block.start <= start and stop <= block.stop for start, stop in done):
         return [one for half in block.halves for one in _left(half, done)]
     return [block]
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write; it has its name, and outlives a kill and a power loss, once all of it is written."""
+    begun = path.with_name(path.name + ".begun")
+    with begun.open("wb") as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())
+    begun.replace(path)
 
 
 @contextmanager
@@ -124,8 +126,8 @@ def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
             folder.mkdir(parents=True, exist_ok=True)
         plan = parts.folder / "run.json"
         if not plan.exists():
-            plan.with_suffix(".begun").write_text(json.dumps(told))
-            plan.with_suffix(".begun").rename(plan)
+            with whole(plan) as file:
+                file.write(json.dumps(told).encode())
         elif json.loads(plan.read_text()) != json.loads(json.dumps(told)):
             raise OtherRunError(
                 "an unfinished run of other logs, maps or options lies there; go on with those, or remove the folder",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -114,10 +114,14 @@ def associate_many(
         _lay_out(layouts, engine, watch)
         blocks = [block for layout in layouts for block in layout.blocks()]
         left = parts.left(blocks)
-        total, searched = _scans(blocks), _scans(left)
-        _search(left, BlockSearch(shelf, options), engine, parts, _counting(watch, total - searched, total))
+        total = sum(map(len, blocks))
+        taken_over = searched = total - sum(map(len, left))
+        watch(Progress("searching", searched, total))
+        for count in _search(left, BlockSearch(shelf, options), engine, parts):
+            searched += count
+            watch(Progress("searching", searched, total))
         notes = merged_notes(layouts)  # before the parts are removed
-        return replace(_summary(parts.assemble(target), total - searched), notes=notes)
+        return _summary(parts.assemble(target), taken_over, notes)
 
 
 def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], None]) -> None:
@@ -131,39 +135,23 @@ def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], 
         watch(Progress("reading", len(layouts) - len(missing) + done, len(layouts)))
 
 
-def _search(
-    blocks: list[Block], search: BlockSearch, engine: Engine, parts: Parts, count: Callable[[int], None]
-) -> None:
-    """Search all blocks; what ends its workers is halved until the one scan is found that does."""
-    count(0)
+def _search(blocks: list[Block], search: BlockSearch, engine: Engine, parts: Parts) -> Iterator[int]:
+    """Search all blocks; yield the number of scans of each that is done.
+
+    What ends its workers is halved until the one scan is found that does.
+    """
     while blocks:
         halves: list[Block] = []
         for block, outcome in engine.run(search, blocks):
-            if not isinstance(outcome, Lost):
-                parts.keep(block, outcome)
-            elif block.stop - block.start > 1:
+            if isinstance(outcome, Lost) and len(block) > 1:
                 halves += block.halves
                 continue
-            else:
-                parts.keep(block, lost_row(block))
-            count(block.stop - block.start)
+            parts.keep(block, lost_row(block) if isinstance(outcome, Lost) else outcome)
+            yield len(block)
         blocks = halves
 
 
-def _counting(watch: Callable[[Progress], None], done: int, total: int) -> Callable[[int], None]:
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        watch(Progress("searching", done, total))
-
-    return count
-
-
-def _scans(blocks: Sequence[Block]) -> int:
-    return sum(block.stop - block.start for block in blocks)
-
-
-def _summary(tables: Iterator[pa.Table], taken_over: int) -> Summary:
+def _summary(tables: Iterator[pa.Table], taken_over: int, notes: tuple[LogNote, ...]) -> Summary:
     scans = usable = errors = 0
     statuses: Counter[str] = Counter()
     for table in tables:
@@ -171,7 +159,7 @@ def _summary(tables: Iterator[pa.Table], taken_over: int) -> Summary:
         usable += sum(table.column("usable").to_pylist())
         errors += len(table) - table.column("error").null_count
         statuses.update(status for status in table.column("status").to_pylist() if status is not None)
-    return Summary(scans, taken_over, usable, errors, dict(statuses))
+    return Summary(scans, taken_over, usable, errors, dict(statuses), notes)
 
 
 def _told(names: list[str], shelf: MapShelf, options: FleetOptions) -> dict[str, Any]:

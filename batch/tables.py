@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pyarrow as pa
 
 LASER = ("angle_min", "angle_increment", "ranges")
+BOUNDS = ("range_min", "range_max")
 MOTION = ("time_increment", "vx", "vy", "omega")
 FORMS = ("ranges", "segments")
 
@@ -32,7 +33,7 @@ COLUMNS: dict[str, tuple[Callable[[pa.DataType], bool], str]] = {
     "segments": (_is_list, "lists of four numbers"),
     "flipped": (pa.types.is_boolean, "true or false"),
     **dict.fromkeys(("map_id", "error"), TEXT),
-    **dict.fromkeys((*LASER[:2], *MOTION, "range_min", "range_max", "sigma"), NUMBER),
+    **dict.fromkeys((*LASER[:2], *BOUNDS, *MOTION, "sigma"), NUMBER),
 }
 
 # A log of another tool, laid out as Parquet.

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from linefix.documents.errors import Fault
+
 from .errors import (
     NO_NAMES,
-    CommandError,
     Names,
     NoServerError,
     NoSuchMapError,
@@ -221,19 +222,18 @@ class Server:
             )
         return str(on["map_id"])
 
-    def _refusal(self, error: Any, arguments: tuple[Any, ...], names: Names) -> CommandError:
+    def _refusal(self, error: Any, arguments: tuple[Any, ...], names: Names) -> RefusedError | NoServerError:
         if error.status == 401:
             return NoServerError(f"{self._url} requires a key; set {KEY} in the environment")
         if error.status == 403:
             return NoServerError(f"{self._url}: {error.detail}; set {KEY} in the environment to a key with this right")
         on = arguments[0] if arguments else None
-        map_id = on["map"].get("map_id") if isinstance(on, dict) and isinstance(on.get("map"), dict) else on
+        map_id = on.get("map", {}).get("map_id") if isinstance(on, dict) else on
         if error.code == "unknown_map" and isinstance(map_id, str):
             return NoSuchMapError(map_id, f"--server {self._url}")
-        found = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
-        faults = [(one["pointer"], one["message"]) for one in found]
-        detail = ": ".join((*filter(None, [names.get("")]), f"{self._url}: {error.detail}"))
-        refused = refused_at(faults, names) if faults else RefusedError(detail)
+        found = [one for one in error.errors if one.keys() >= {"pointer", "message"}]
+        faults = [Fault(str(one["pointer"]), one["message"]) for one in found]
+        refused = refused_at(faults or [Fault("", f"{self._url}: {error.detail}")], names)
         return refused if 400 <= error.status < 500 and error.status not in BUSY else NoServerError(str(refused))
 
 

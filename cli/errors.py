@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any
 
+from linefix.documents.errors import Fault
+
 MOST_NAMED = 4  # wrong places in one line
 
 
@@ -92,11 +94,11 @@ def place_of(pointer: str, names: Names) -> str:
     return f"{name}: {rest}" if rest else name
 
 
-def refused_at(faults: Sequence[tuple[str, str]], names: Names) -> RefusedError:
-    """Return the error for places that are wrong, each a pointer and a message: the first are named, others counted."""
-    told = [f"{place}: {message}" if (place := place_of(pointer, names)) else message for pointer, message in faults]
+def refused_at(faults: Sequence[Fault], names: Names) -> RefusedError:
+    """Return the error for places that are wrong: the first are named, others counted."""
+    told = [str(Fault(place_of(one.pointer, names), one.message)) for one in faults]
     more = f" (and {len(told) - MOST_NAMED} more)" if len(told) > MOST_NAMED else ""
-    return RefusedError("; ".join(told[:MOST_NAMED]) + more, faults[0][0])
+    return RefusedError("; ".join(told[:MOST_NAMED]) + more, faults[0].pointer)
 
 
 @contextmanager
@@ -122,21 +124,13 @@ def needing(what: str, *extras: str) -> Iterator[None]:
 @contextmanager
 def refusing(names: Names = NO_NAMES) -> Iterator[None]:
     """Raise errors of the command line in place of those about a request."""
-    from linefix.answering import NotStoredError
-    from linefix.documents.errors import DeadlinePassedError, InvalidRequestError, TooManyError
-    from linefix.documents.inputs import fault_of
+    from linefix.documents.errors import DeadlinePassedError, RequestError
+    from linefix.documents.inputs import faults_in
     from registration import InputError
 
     try:
         yield
-        return
     except DeadlinePassedError as error:
         raise NoServerError(str(error)) from None
-    except NotStoredError as error:
-        raise RefusedError(str(error)) from None
-    except TooManyError as error:
-        faults = [(error.pointer, str(error))]
-    except (InvalidRequestError, InputError) as error:
-        found = error.faults if isinstance(error, InvalidRequestError) else [fault_of(error)]
-        faults = [(one.pointer, one.message) for one in found]
-    raise refused_at(faults, names)
+    except (RequestError, InputError) as error:
+        raise refused_at(faults_in(error), names) from None

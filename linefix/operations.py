@@ -26,11 +26,12 @@ from .analyzing import looks
 from .checking import checking
 from .documents import inputs, results
 from .documents.analysis import AnalyzeRequest
+from .documents.applying import ApplyRequest
 from .documents.errors import DeadlinePassedError, Fault, InvalidRequestError
 from .documents.parts import MapDocument, SearchOptions
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
 from .documents.scans import measured_of, scanned_of, transform_of, vectorization_of
-from .documents.updates import ApplyRequest, UpdateRequest
+from .documents.updates import UpdateRequest
 from .driving import search
 
 T = TypeVar("T")
@@ -144,7 +145,7 @@ def find(
     return result, answer if references else {**answer, "map": target.references[None]}
 
 
-def registered(asked: RegisterRequest, watch: Stopwatch, listed: Callable[[Iterable[Json]], Any] = list) -> Json:
+def registered(asked: RegisterRequest, watch: Stopwatch, listed: results.Listed = list) -> Json:
     """Return the answer of a registration; `listed` makes a list of its residuals, which are many."""
     segments, scan = Segments.from_array(asked.map.segments, argument="map.segments"), measured_of(asked.scan)
     pairs, how = inputs.pairs_of(asked, len(segments), len(scan)), inputs.registration_options_of(asked)

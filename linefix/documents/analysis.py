@@ -9,10 +9,9 @@ from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from association import ReasonCode
 
-from .errors import TooManyError
-from .limits import Limits
+from .limits import require_within
 from .parts import AnyMap
-from .replies import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer, Verdict
+from .reply_parts import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer, Verdict
 from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Point, Strict, in_radians
 
 Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
@@ -78,9 +77,7 @@ class AnalyzeRequest(Strict):
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> AnalyzeRequest:
-        limits: Limits | None = info.context
-        if limits is not None and self.laser.beams > limits.beams:
-            raise TooManyError("/laser/beams", limits.beams, "beams")
+        require_within(info, "beams", self.laser.beams, "beams", "/laser/beams")
         return self
 
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from .errors import TooManyError
-from .limits import MAX_FAULTS, Limits
+from .limits import MAX_FAULTS, require_within
 from .strict import MAX_MAGNITUDE
 
 Floats = NDArray[np.float64]
@@ -85,10 +84,8 @@ class _Array:
         """Return the numbers; stored arrays are read without limits, which may have changed since."""
         if type(value) is not list:
             raise _not_an_array(value)
-        limits: Limits | None = info.context
         name, what = self.counted
-        if limits is not None and len(value) > getattr(limits, name):
-            raise TooManyError("", getattr(limits, name), what)
+        require_within(info, name, len(value), what)
         return self.numbers(value)
 
     def numbers(self, value: list[Any]) -> Floats:

@@ -6,7 +6,7 @@ from typing import Any
 
 from map_quality import FindingCode
 
-from .replies import Index, MapReference, PoseAnswer, TimingAnswer, Verdict
+from .reply_parts import Index, MapReference, PoseAnswer, TimingAnswer, Verdict
 from .strict import Answer
 
 

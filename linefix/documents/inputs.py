@@ -25,12 +25,14 @@ from map_quality import NOT_SHARPENED, Analysis, Replacement, Robot, Sharpened, 
 from registration import InputError, InvalidArgumentError, RegistrationOptions, Segments
 
 from .analysis import AnalyzeRequest
-from .errors import Fault, InvalidRequestError
-from .parts import HardPriorFields, LaserScan, MapDocument, SearchOptions, SoftPriorFields, is_oriented
+from .applying import ApplyRequest, SharpenedWalls
+from .errors import Fault, InvalidRequestError, RequestError
+from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields, is_oriented
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
 from .scans import Scanned, scanned_of, transform_of
-from .updates import ApplyRequest, SharpenedWalls, UpdateRequest
+from .sensors import LaserScan
+from .updates import UpdateRequest
 from .views import OneScan, ViewsScan
 
 # Options of a search that have the same names and values in a request.
@@ -192,9 +194,15 @@ def naming_scan(place: str) -> Iterator[None]:
     try:
         yield
     except (InvalidRequestError, InputError) as error:
-        faults = error.faults if isinstance(error, InvalidRequestError) else (fault_of(error),)
-        moved = [Fault(place + one.pointer.removeprefix("/scan"), one.message) for one in faults]
+        moved = [Fault(place + one.pointer.removeprefix("/scan"), one.message) for one in faults_in(error)]
         raise InvalidRequestError(moved) from error
+
+
+def faults_in(error: RequestError | InputError) -> tuple[Fault, ...]:
+    """Return the wrong places of a request that an error names."""
+    if isinstance(error, InvalidRequestError):
+        return error.faults
+    return (fault_of(error) if isinstance(error, InputError) else Fault(getattr(error, "pointer", ""), str(error)),)
 
 
 def fault_of(error: InputError) -> Fault:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pydantic import ValidationInfo
+
+from .errors import TooManyError
+
 MAX_FAULTS = 20  # wrong places that are reported of one request
 
 
@@ -38,3 +42,16 @@ class Limits:
     views: int = 64
     beams_together: int = 100_000
     segments_together: int = 10_000
+
+
+def require_within(info: ValidationInfo, name: str, count: int, what: str, pointer: str = "") -> None:
+    """Refuse more of something than one of the limits; what is stored is read without limits.
+
+    Raises
+    ------
+    TooManyError
+        With the pointer to the part that there is too much of, and what that is.
+    """
+    limits: Limits | None = info.context
+    if limits is not None and count > getattr(limits, name):
+        raise TooManyError(pointer, getattr(limits, name), what)

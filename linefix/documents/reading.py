@@ -16,7 +16,6 @@ from .parts import MapDocument
 from .requests import BatchItem, BatchRequest
 
 M = TypeVar("M", bound=BaseModel)
-MAP_FIELDS = ("segments", "sigma", "oriented", "frame_id", "points", "points_sigma", "meta")
 _NO_NUMBER = re.compile(r"-?(NaN|Inf)", re.IGNORECASE)
 
 
@@ -51,8 +50,8 @@ def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, l
 def read_map(data: bytes | bytearray, limits: Limits) -> tuple[MapDocument, bytes]:
     """Return a map that is to be stored, and the document to store: the sent fields and no more."""
     asked = read_model(MapDocument, data, limits)
-    document = {name: getattr(asked, name) for name in MAP_FIELDS}
-    return asked, encode({name: value for name, value in document.items() if name in asked.model_fields_set})
+    sent = [name for name in MapDocument.model_fields if name in asked.model_fields_set]
+    return asked, encode({name: getattr(asked, name) for name in sent})
 
 
 def read_stored(document: bytes) -> MapDocument:

@@ -8,20 +8,10 @@ from pydantic import Field, SkipValidation, ValidationInfo, field_validator, mod
 from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
-from .errors import Fault, InvalidRequestError, TooManyError
-from .limits import Limits
-from .parts import (
-    AnyMap,
-    AnyPrior,
-    InlineMap,
-    Laser,
-    MeasuredFields,
-    RaySigma,
-    SearchOptions,
-    Twist,
-    require_at_the_sensor,
-    require_times,
-)
+from .errors import Fault, InvalidRequestError
+from .limits import require_within
+from .parts import AnyMap, AnyPrior, InlineMap, SearchOptions
+from .sensors import Laser, MeasuredFields, RaySigma, Twist, require_at_the_sensor, require_times
 from .several import MapWeights, SeveralMaps, require_one_kind
 from .strict import DeadlineMs, FreeJson, Point, Pose, Sigma, Strict
 from .views import AnyScan
@@ -157,9 +147,7 @@ class BatchRequest(OnMaps):
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
-        limits: Limits | None = info.context
-        if limits is not None and len(self.scans) > limits.batch:
-            raise TooManyError("/scans", limits.batch, "scans")
+        require_within(info, "batch", len(self.scans), "scans", "/scans")
         if self.priors is not None and len(self.priors) != len(self.scans):
             raise PydanticCustomError(
                 "priors", f"expected one prior or null for each of {len(self.scans)} scans, found {len(self.priors)}"

@@ -1,4 +1,4 @@
-"""Results of the library to answers: the fields are those of the models of `replies`, each declared there alone."""
+"""Results of the library to answers: the fields are those of their models, each declared there alone."""
 
 from __future__ import annotations
 
@@ -13,14 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import PydanticUndefined
 
-from association import (
-    NOT_IN_ORDER,
-    AssociationDiagnostics,
-    AssociationResult,
-    AssociationWarning,
-    Status,
-    VerdictExplanation,
-)
+from association import NOT_IN_ORDER, AssociationDiagnostics, AssociationResult, AssociationWarning, Status
 from map_quality import Analysis, MapCheck, MapUpdate, PlaceVerdict
 from registration import RegistrationResult
 from vectorization import Vectorization
@@ -28,6 +21,7 @@ from vectorization import Vectorization
 from ..checking import CheckedMap
 from . import analysis, checks, replies, updates
 from .parts import MapDocument
+from .reply_parts import AlternativeAnswer, CorrespondenceAnswer, CriticalWallAnswer, MapVerdictAnswer, WarningAnswer
 from .strict import Answer
 
 if TYPE_CHECKING:
@@ -37,6 +31,7 @@ if TYPE_CHECKING:
 
 Json = dict[str, Any]
 Indices = NDArray[np.intp]
+Listed = Callable[[Iterable[Json]], Any]
 MOST_INDICES = 1000  # of one finding
 SEAL = frozenset(("client_ref", "request_id", "timing_ms"))  # of the request, not of its result
 
@@ -86,9 +81,7 @@ def _json(value: Any, model: type[Answer] | None = None) -> Any:
     return answers_of(model, value) if isinstance(value, tuple | list) else answer_of(model, value)
 
 
-def registration_json(
-    result: RegistrationResult, pairs: Indices, listed: Callable[[Iterable[Json]], Any] = list
-) -> Json:
+def registration_json(result: RegistrationResult, pairs: Indices, listed: Listed = list) -> Json:
     """Return the answer of a registration.
 
     `pairs` are the indices of scan and map segment of each correspondence, (k, 2). `listed` makes a list of the
@@ -152,14 +145,14 @@ def association_json(
     given["unmatched_scan"] = included.listed(result.unmatched_scan)
     given["diagnostics"] = _diagnostics_json(result.diagnostics, included)
     given["correspondences"] = [
-        answer_of(replies.CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences
+        answer_of(CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences
     ]
     given["segments"] = included.segments
-    given["alternatives"] = answers_of(replies.AlternativeAnswer, result.alternatives)
+    given["alternatives"] = answers_of(AlternativeAnswer, result.alternatives)
     given["missing_map"] = result.missing_map
     if result.maps:
         given["maps"] = [
-            answer_of(replies.MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
+            answer_of(MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
         ]
         given["map"] = None if result.map_id is None else references[result.map_id]
     answer = answer_of(replies.FoundAnswer, result, **given)
@@ -172,20 +165,14 @@ def _diagnostics_json(diagnostics: AssociationDiagnostics | None, included: Incl
     if diagnostics is None:
         return None
     wall = diagnostics.critical_wall
-    critical = None if wall is None else answer_of(replies.CriticalWallAnswer, wall, scan=included.listed(wall.scan))
+    critical = None if wall is None else answer_of(CriticalWallAnswer, wall, scan=included.listed(wall.scan))
     return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical)
 
 
 def explanation_json(found: Explanation) -> Json:
     """Return how a verdict came about, without the answer itself: the JSON of ``linefix explain``."""
-    last = found.last_view
-    return {"verdict": _verdict_json(found.verdict), "last_view": None if last is None else _verdict_json(last)}
-
-
-def _verdict_json(one: VerdictExplanation) -> Json:
-    pose = None if one.pose is None else answer_of(replies.PoseAnswer, one.pose)
-    others = [{**asdict(other), "pose": answer_of(replies.PoseAnswer, other.pose)} for other in one.alternatives]
-    return {**asdict(one), "status": str(one.status), "pose": pose, "alternatives": others}
+    parts = {"verdict": found.verdict, "last_view": found.last_view}
+    return {name: None if one is None else {**asdict(one), "status": str(one.status)} for name, one in parts.items()}
 
 
 def vectorization_json(found: Vectorization, moving: AssociationWarning | None = None) -> Json:
@@ -200,7 +187,7 @@ def vectorization_json(found: Vectorization, moving: AssociationWarning | None =
         sigma=found.sigma,
         sigmas=measured.sigma.tolist(),
         rms=found.rms.tolist(),
-        warnings=answers_of(replies.WarningAnswer, [one for one in (unordered, moving) if one is not None]),
+        warnings=answers_of(WarningAnswer, [one for one in (unordered, moving) if one is not None]),
     )
 
 

@@ -25,8 +25,8 @@ from vectorization import (
 
 from ..ranges import RangeScan, motion_warning, view_of
 from .errors import Fault, InvalidRequestError
-from .parts import Laser, MeasuredFields, PointFields, RangeFields, Twist
 from .requests import VectorizeRequest
+from .sensors import Laser, MeasuredFields, PointFields, RangeFields, Twist
 from .strict import Pose
 from .views import OneScan, OneView, ViewsScan
 

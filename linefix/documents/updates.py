@@ -9,12 +9,11 @@ from pydantic_core import PydanticCustomError
 
 from map_quality import ChangeCode, KeptCode
 
-from .arrays import Covariance, MapSegmentRows
-from .errors import TooManyError
-from .limits import Limits
-from .parts import LaserScan, MapDocument, MapSigma
-from .replies import Index, MapReference, Row2, Row4, Share, TimingAnswer
-from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Pose, Strict
+from .arrays import Covariance
+from .limits import require_within
+from .reply_parts import Index, MapReference, Row2, Row4, Share, TimingAnswer
+from .sensors import LaserScan
+from .strict import Answer, DeadlineMs, FreeJson, Pose, Strict
 
 MOST_VISITS = 100
 
@@ -87,9 +86,9 @@ class UpdateRequest(Strict):
 
     @model_validator(mode="after")
     def _checked(self, info: ValidationInfo) -> UpdateRequest:
-        limits: Limits | None = info.context
-        if limits is not None and sum(len(one.scans) for one in self.visits) > limits.batch:
-            raise TooManyError("/visits", limits.batch, "scans of all visits together")
+        require_within(
+            info, "batch", sum(len(one.scans) for one in self.visits), "scans of all visits together", "/visits"
+        )
         names = [one.visit for one in self.visits]
         if len(set(names)) < len(names):
             raise PydanticCustomError(
@@ -286,116 +285,6 @@ class UpdateAnswer(Answer):
     refused_visits: list[RefusedVisitAnswer]
     kept: list[KeptWallsAnswer]
     complete: bool
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer
-
-
-MOST_NEW = 10_000  # segments of one change
-_SegmentIndex = Annotated[int, Field(ge=0, le=10_000_000)]
-
-
-class NewSegment(Strict):
-    """A segment of the new map.
-
-    Attributes
-    ----------
-    segment
-        `[x1, y1, x2, y2]`, metres, free space on the left
-    sigma
-        standard deviation normal to the segment, metres; not used
-    """
-
-    segment: Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
-    sigma: MapSigma
-
-
-class ProposedChange(Strict):
-    """A change as an update proposed it.
-
-    Attributes
-    ----------
-    code
-        kind of change
-    segments
-        indices of the old map's segments that it replaces
-    new
-        segments in their place
-    evidence
-        not used; allowed, so that a change may be sent unchanged
-    confidence
-        not used, likewise
-    accepted
-        whether it is in the new map
-    """
-
-    code: ChangeCode
-    segments: Annotated[list[_SegmentIndex], Field(max_length=100_000)]
-    new: Annotated[list[NewSegment], Field(max_length=MOST_NEW)]
-    evidence: FreeJson = None
-    confidence: float | None = None
-    accepted: bool = True
-
-
-class SharpenedWalls(Strict):
-    """Walls at better positions, as an update returned them.
-
-    Attributes
-    ----------
-    segments
-        indices of the old map's segments
-    ends
-        `[x1, y1, x2, y2]` of each, metres
-    sigma
-        standard deviation of each normal to itself, metres
-    """
-
-    segments: Annotated[list[_SegmentIndex], Field(max_length=1_000_000)]
-    ends: MapSegmentRows
-    sigma: Annotated[list[MapSigma], Field(max_length=1_000_000)]
-
-    @model_validator(mode="after")
-    def _as_many(self) -> SharpenedWalls:
-        if not len(self.segments) == len(self.ends) == len(self.sigma):
-            raise PydanticCustomError(
-                "sharpened", "expected as many segments as ends and sigma, found different numbers"
-            )
-        return self
-
-
-class ApplyRequest(Strict):
-    """A map, and changes of it that an update proposed.
-
-    Attributes
-    ----------
-    map
-        the old map, as the update had it
-    changes
-        as the update returned them; `accepted` of each says whether it is in the new map
-    sharpened
-        as the update returned it
-    client_ref
-        returned as it was sent
-    """
-
-    map: MapDocument
-    changes: Annotated[list[ProposedChange], Field(max_length=10_000)]
-    sharpened: SharpenedWalls | None = None
-    client_ref: FreeJson = None
-
-
-class ApplyAnswer(Answer):
-    """A map with the accepted changes; nothing is stored.
-
-    Attributes
-    ----------
-    map
-        the new map, with the accepted changes
-    client_ref
-        returned as it was sent
-    """
-
-    map: NewMapAnswer
     client_ref: Any
     request_id: str
     timing_ms: TimingAnswer

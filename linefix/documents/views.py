@@ -7,9 +7,8 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationInfo, model_validator
 
 from .arrays import StepCovariance
-from .errors import TooManyError
-from .limits import Limits
-from .parts import LaserScan, MeasuredFields, PointFields, PointScan, RangeFields, SegmentScan
+from .limits import require_within
+from .sensors import LaserScan, MeasuredFields, PointFields, PointScan, RangeFields, SegmentScan
 from .strict import FrameId, FreeJson, OneOf, Point, Pose, Strict
 
 
@@ -78,27 +77,18 @@ class ViewsScan(Strict):
     @model_validator(mode="before")
     @classmethod
     def _few(cls, value: Any, info: ValidationInfo) -> Any:
-        limits: Limits | None = info.context
         views = value.get("views") if isinstance(value, dict) else None
-        if limits is not None and isinstance(views, list) and len(views) > limits.views:
-            raise TooManyError("", limits.views, "views")
+        if isinstance(views, list):
+            require_within(info, "views", len(views), "views")
         return value
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> ViewsScan:
-        limits: Limits | None = info.context
-        if limits is None:
-            return self
         segments = sum(len(view.segments) for view in self.views if isinstance(view, SegmentView))
-        if segments > limits.segments_together:
-            raise TooManyError("", limits.segments_together, "segments of all views together")
-        beams = sum(
-            len(view.laser.ranges) if isinstance(view, LaserView) else len(view.points)
-            for view in self.views
-            if not isinstance(view, SegmentView)
-        )
-        if beams > limits.beams_together:
-            raise TooManyError("", limits.beams_together, "ranges or points of all views together")
+        beams = sum(len(view.laser.ranges) for view in self.views if isinstance(view, LaserView))
+        beams += sum(len(view.points) for view in self.views if isinstance(view, PointView))
+        require_within(info, "segments_together", segments, "segments of all views together")
+        require_within(info, "beams_together", beams, "ranges or points of all views together")
         return self
 
 

@@ -7,15 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from linefix.documents.checks import MapCheckAnswer
-from linefix.documents.replies import (
-    FoundAnswer,
-    Index,
-    MapReference,
-    Milliseconds,
-    PoseAnswer,
-    Row4,
-    TimingAnswer,
-)
+from linefix.documents.replies import FoundAnswer
+from linefix.documents.reply_parts import Index, MapReference, Milliseconds, PoseAnswer, Row4, TimingAnswer
 from linefix.documents.strict import Answer
 from linefix.documents.updates import NewMapAnswer
 
