@@ -12,8 +12,7 @@ from .asking import Where, setting
 from .errors import Names, WrongUseError, flags_of, needing
 from .inputs import draw_picture, read_map_file, read_map_or_id
 from .options import MapArgument, grouped, option
-from .printing import Json, Output, rows, write_json
-from .progress import compile_first, progress
+from .printing import Json, Output, compile_first, progress, rows, write_json
 
 SUFFIXES = (".json", ".geojson")
 

@@ -13,19 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from linefix.documents.errors import Fault
 
-from .errors import (
-    NO_NAMES,
-    Names,
-    NoServerError,
-    NoSuchMapError,
-    RefusedError,
-    WrongUseError,
-    refused_at,
-    refusing,
-)
+from .errors import NO_NAMES, Names, NoServerError, NoSuchMapError, RefusedError, WrongUseError, refused_at, refusing
 from .options import option
-from .printing import Json
-from .progress import compile_first
+from .printing import Json, compile_first
 
 if TYPE_CHECKING:
     from linefix.answering import Within

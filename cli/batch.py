@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from .errors import RefusedError, WrongUseError, needing
 from .options import ORIENTED, UsableOptions, argument, flag, grouped, option, required
-from .printing import Output, noted, rows
-from .progress import progress
+from .printing import Output, noted, progress, rows
 
 if TYPE_CHECKING:
     from batch import Engine, FleetOptions, LogNote, Summary

@@ -1,11 +1,13 @@
-"""Answers for people and for programs."""
+"""What a command prints: answers for people and for programs, and the progress of what takes a while."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,6 +16,9 @@ from .options import flag
 
 Json = dict[str, Any]
 Lines = Iterable[str]
+
+LOOK_SECONDS = 0.3
+REPORT_SECONDS = 10.0  # between two lines where there is no terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,3 +134,49 @@ def escaped(document: str) -> str:
     if document.isascii() and "\x7f" not in document:
         return document
     return "".join(one if one.isprintable() else json.dumps(one)[1:-1].replace("\x7f", "\\u007f") for one in document)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float, float | None], None]]:
+    """Show the progress on a terminal, never in piped output; yield the function that takes stage, done and total."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    tasks: dict[str, Any] = {}
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bars:
+
+        def show(stage: str, done: float, total: float | None) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, completed=int(done), total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield show
+
+
+def compile_first() -> None:
+    """Compile the kernels that are not cached, in a process that ends with it: the compiler takes 330 MB.
+
+    A terminal shows a bar; elsewhere a line every ten seconds reports the progress.
+    """
+    from compiled import compiled_fraction, is_complete
+
+    if is_complete():
+        return
+    from linefix.compiling import start_compiler
+
+    message = "linefix: compiling the kernels, about a minute on two idle cores; later runs load them from the cache"
+    print(message, file=sys.stderr)
+    reported = time.monotonic()
+    # If it ends early or can keep nothing this process compiles what it needs.
+    with progress() as show, suppress(OSError), start_compiler() as compiler:
+        try:
+            while compiler.poll() is None:
+                fraction = compiled_fraction()
+                show("kernels, %", round(100.0 * fraction), 100)
+                if not sys.stderr.isatty() and time.monotonic() - reported > REPORT_SECONDS:
+                    reported = time.monotonic()
+                    print(f"linefix: {fraction:.0%} of the kernels are compiled", file=sys.stderr)
+                time.sleep(LOOK_SECONDS)
+        finally:
+            compiler.kill()

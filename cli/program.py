@@ -11,10 +11,13 @@ import typer
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from . import maps
 from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
+from .maps.checking import check
+from .maps.importing import import_map
+from .maps.storing import draw, get, list_maps, put, remove
+from .maps.updating import update
 from .one_scan import explain, locate, register, vectorize
 from .options import PlainCommand, argument, flag, grouped, option
 from .replay import replay
@@ -24,6 +27,9 @@ ROLES = "read, associate, write"
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
+maps = typer.Typer(name="map", rich_markup_mode=None, help="Import, check, update, draw and store maps.")
+OF_MAPS = {"import": import_map, "check": check, "update": update, "draw": draw}
+OF_MAPS |= {"put": put, "list": list_maps, "get": get, "rm": remove}
 
 
 @grouped
@@ -55,7 +61,9 @@ def key(
 for command in (locate, explain, replay, analyze, batch, register, vectorize, key):
     app.command(cls=PlainCommand)(command)
 app.command(cls=RosCommand)(ros2)
-app.add_typer(maps.app)
+for name, command in OF_MAPS.items():
+    maps.command(name, cls=PlainCommand)(command)
+app.add_typer(maps)
 
 
 def _print_version(asked: bool) -> None:
@@ -68,9 +76,7 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 @grouped
-def linefix(
-    version: bool = flag("Print the version.", "--version", callback=_print_version, is_eager=True),
-) -> None:
+def linefix(version: bool = flag("Print the version.", "--version", callback=_print_version, is_eager=True)) -> None:
     """Find the pose of a robot on a map of walls from a laser scan.
 
     Exit codes: 0 done, whatever the verdict; 1 a defect, or a service that cannot start; 2 wrong use;

@@ -11,13 +11,11 @@ from statistics import median
 from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 from .asking import Locate, Where
-from .errors import CommandError, NoSuchMapError, RefusedError
+from .errors import NoSuchMapError, RefusedError
 from .inputs import NamedMap, draw_picture, places_of, read_maps, target_of
-from .logs import mount_of, opened, print_notes, scans_of
+from .logs import Frames, Tracker, map_of, mount_of, opened, pose_of, print_notes, scans_of
 from .options import TopicOptions, UsableOptions, argument, grouped, option, required
-from .printing import Json, Lines, Output, print_json, print_lines, rows, table
-from .progress import progress
-from .tracking import Frames, Tracker, map_of, pose_of
+from .printing import Json, Lines, Output, print_json, print_lines, progress, rows, table
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan
@@ -51,7 +49,7 @@ class Tally:
     warnings: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)  # ms
     poses: list[Located] = field(default_factory=list)
-    refused: CommandError | None = None  # the last
+    refused: str | None = None  # the last message
 
     @property
     def count(self) -> int:
@@ -63,11 +61,11 @@ class Tally:
         """The usable poses so far."""
         return [one for one in self.poses if one.usable]
 
-    def take(self, one: LoggedScan, found: Json | CommandError) -> None:
+    def take(self, one: LoggedScan, found: Json) -> None:
         """Count an answer, and keep its pose."""
-        if isinstance(found, CommandError):
+        if "error" in found:
             self.verdicts["refused"] += 1
-            self.refused = found
+            self.refused = found["error"]
             return
         usable, pose = found["usable"], pose_of(found)
         self.verdicts[found["status"] + (", usable" if usable else ", not usable")] += 1
@@ -138,43 +136,36 @@ def replay(
     if broken is not None:
         raise broken
     if tally.refused is not None and tally.count == tally.verdicts["refused"]:
-        raise tally.refused
+        raise RefusedError(tally.refused)
 
 
 def located(
     locate: Locate, scans: Iterator[LoggedScan], frames: Frames, tracker: Tracker | None
-) -> Iterator[tuple[LoggedScan, Json | RefusedError]]:
-    """Yield each scan with its pose, or the reason why it is refused.
+) -> Iterator[tuple[LoggedScan, Json]]:
+    """Yield each scan with its answer; that of a scan that is refused has the reason as its ``error``.
 
     With a tracker the prior comes from the answers before and odometry.
     """
     from formats import scan_json
 
-    refusals: list[str] | None = []  # None: one was taken
-    for logged in scans:
+    refusals, all_refused = list[str](), True
+    for one in scans:
         try:
-            one = frames.taken(logged)
-        except RefusedError as error:
-            yield logged, error
-            continue
-        prior = None if tracker is None else tracker.prior(one)
-        try:
+            one = frames.taken(one)
+            prior = None if tracker is None else tracker.prior(one)
             found = locate({"scan": scan_json(one)} | ({} if prior is None else {"prior": prior}))
         except RefusedError as error:
-            refusals = None if refusals is None else [*refusals, str(error)]
-            if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
+            refusals.append(str(error))
+            # Many scans, and all so far, with the same message: the map may be the reason.
+            hopeless = all_refused and len(refusals) == HOPELESS and len(set(refusals)) == 1
+            if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or hopeless:
                 raise
-            yield one, error
+            yield one, {"usable": False, "reasons": [], "error": str(error)}
             continue
-        refusals = None
+        all_refused = False
         if tracker is not None:
             tracker.learn(found, one)
         yield one, found
-
-
-def _hopeless(refusals: list[str] | None) -> bool:
-    """Return whether many scans, and all so far, were refused with the same message: the map may be the reason."""
-    return refusals is not None and len(refusals) == HOPELESS and len(set(refusals)) == 1
 
 
 def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
@@ -186,11 +177,10 @@ def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[Logged
             show("scans", number, total)
 
 
-def _line(one: LoggedScan, found: Json | CommandError, frames: Frames, *, several: bool) -> Json:
-    answer: Json = {"usable": False, "reasons": []} if isinstance(found, CommandError) else found
-    line = {"stamp": one.stamp, **{name: answer.get(name) for name in FIELDS}, "child_frame_id": frames.name}
-    line["error"] = str(found) if isinstance(found, CommandError) else None
-    return {**line, "map_id": map_of(answer)} if several else line
+def _line(one: LoggedScan, found: Json, frames: Frames, *, several: bool) -> Json:
+    line = {"stamp": one.stamp, **{name: found.get(name) for name in FIELDS}, "child_frame_id": frames.name}
+    line["error"] = found.get("error")
+    return {**line, "map_id": map_of(found)} if several else line
 
 
 def _write_poses(tally: Tally, out: Path, where: TextIO) -> None:
@@ -246,7 +236,7 @@ def _lines(tally: Tally, server: str | None) -> Iterator[str]:
     if len(usable) < FEW * tally.count or "map_scale" in tally.warnings:
         yield from rows([("hint", HINT.format("" if server is None else f" --server {server}"))])
     if tally.refused is not None:
-        yield from rows([("refused", str(tally.refused))])
+        yield from rows([("refused", tally.refused)])
     if tally.times:
         told = f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most"
         yield from rows([("time", told)])

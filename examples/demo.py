@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from cli.progress import compile_first
+from cli.printing import compile_first
 from registration import Segments
 from simulation import SimulatedScan
 

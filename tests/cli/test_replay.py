@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import linefix
-from cli.tracking import LOST, Tracker
+from cli.logs import LOST, Tracker
 from formats import LoggedScan
 from registration import RigidTransform
 from tests.map_quality.check.drawn import faces

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from cli.errors import RefusedError
+from cli.logs import Frames, odometry_of
 from cli.replay import HOPELESS
-from cli.tracking import Frames, odometry_of
 from formats import LoggedScan
 from registration import RigidTransform
 from tests.map_quality.check.drawn import faces
