@@ -15,7 +15,7 @@ The extra ``linefix[batch]`` brings the libraries, ``linefix[ray]`` Ray besides.
 from .engine import Engine, Lost, OnRay, Processes
 from .errors import FleetError, OtherRunError, UnreadableMapsError, UnreadableScansError
 from .logs import LogNote
-from .running import Progress, Summary, associate_many
+from .running import Summary, associate_many
 from .searching import FleetOptions
 from .tables import POSES
 
@@ -29,7 +29,6 @@ __all__ = [
     "OnRay",
     "OtherRunError",
     "Processes",
-    "Progress",
     "Summary",
     "UnreadableMapsError",
     "UnreadableScansError",

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pyarrow as pa
 
@@ -19,23 +19,7 @@ from .parts import Parts, opened
 from .searching import BlockSearch, FleetOptions, MapShelf, lost_row
 
 PathLike = str | os.PathLike[str]
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of a run.
-
-    Attributes
-    ----------
-    stage : "reading" or "searching"
-        Logs are read, then scans are searched.
-    done, total : int
-        Of them.
-    """
-
-    stage: Literal["reading", "searching"]
-    done: int
-    total: int
+Watch = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +55,7 @@ def associate_many(
     out: PathLike,
     options: FleetOptions | None = None,
     engine: Engine | None = None,
-    watch: Callable[[Progress], None] = lambda _: None,
+    watch: Watch = lambda stage, done, total: None,
 ) -> Summary:
     """Find where the scans of many logs were taken; write one row for each.
 
@@ -91,7 +75,8 @@ def associate_many(
     engine : Engine, optional
         The engine that does the work; by default this machine's processes, one for each core.
     watch : callable, optional
-        Called after each step.
+        Called after each step, with its stage, the number that is done, and that of all: first logs in ``"reading"``,
+        then scans in ``"searching"``.
 
     Returns
     -------
@@ -116,15 +101,15 @@ def associate_many(
         left = parts.left(blocks)
         total = sum(map(len, blocks))
         taken_over = searched = total - sum(map(len, left))
-        watch(Progress("searching", searched, total))
+        watch("searching", searched, total)
         for count in _search(left, BlockSearch(shelf, options), engine, parts):
             searched += count
-            watch(Progress("searching", searched, total))
+            watch("searching", searched, total)
         notes = merged_notes(layouts)  # before the parts are removed
         return _summary(parts.assemble(target), taken_over, notes)
 
 
-def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], None]) -> None:
+def _lay_out(layouts: list[Layout], engine: Engine, watch: Watch) -> None:
     missing = [layout for layout in layouts if not layout.done]
     for done, (layout, outcome) in enumerate(engine.run(lay_out, missing), start=1):
         if isinstance(outcome, Lost):
@@ -132,7 +117,7 @@ def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], 
                 "each worker that read it has ended; the log is damaged or needs more memory: check it, or omit it",
                 argument=layout.log,
             )
-        watch(Progress("reading", len(layouts) - len(missing) + done, len(layouts)))
+        watch("reading", len(layouts) - len(missing) + done, len(layouts))
 
 
 def _search(blocks: list[Block], search: BlockSearch, engine: Engine, parts: Parts) -> Iterator[int]:

@@ -12,26 +12,21 @@ MOTION = ("time_increment", "vx", "vy", "omega")
 FORMS = ("ranges", "segments")
 
 
-def _is_number(kind: pa.DataType) -> bool:
-    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+def _any_of(*tests: Callable[[pa.DataType], bool]) -> Callable[[pa.DataType], bool]:
+    return lambda kind: any(test(kind) for test in tests)
 
 
-def _is_text(kind: pa.DataType) -> bool:
-    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
-
-
-def _is_list(kind: pa.DataType) -> bool:
-    return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
-
-
+types = pa.types
+_is_number, _is_text = _any_of(types.is_floating, types.is_integer), _any_of(types.is_string, types.is_large_string)
+_is_list = _any_of(types.is_list, types.is_large_list, types.is_fixed_size_list)
 NUMBER, TEXT = (_is_number, "numbers"), (_is_text, "text")
 
 # The columns of input that are read: the test of their type, and what is expected.
 COLUMNS: dict[str, tuple[Callable[[pa.DataType], bool], str]] = {
-    "stamp": (lambda kind: pa.types.is_integer(kind) or pa.types.is_timestamp(kind), "nanoseconds or points in time"),
+    "stamp": (_any_of(types.is_integer, types.is_timestamp), "nanoseconds or points in time"),
     "ranges": (lambda kind: _is_list(kind) and _is_number(kind.value_type), "a list of numbers"),
     "segments": (_is_list, "lists of four numbers"),
-    "flipped": (pa.types.is_boolean, "true or false"),
+    "flipped": (types.is_boolean, "true or false"),
     **dict.fromkeys(("map_id", "error"), TEXT),
     **dict.fromkeys((*LASER[:2], *BOUNDS, *MOTION, "sigma"), NUMBER),
 }

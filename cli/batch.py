@@ -12,7 +12,7 @@ from .options import ORIENTED, UsableOptions, argument, flag, grouped, option, r
 from .printing import Output, noted, progress, rows
 
 if TYPE_CHECKING:
-    from batch import Engine, FleetOptions, LogNote, Summary
+    from batch import LogNote, Summary
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +41,18 @@ def batch(
     """
     if out.is_dir():
         raise WrongUseError(f"--out: found the folder {out}, expected a file")
+    if run.ray and run.workers is not None:
+        raise WrongUseError("--workers: --ray uses all cores of the cluster; omit --workers")
     begun = time.monotonic()
-    with needing("linefix batch", "ray" if run.ray else "batch"):
-        from batch import associate_many
+    with needing("linefix batch", "ray" if run.ray else "batch"), progress() as show:
+        from association import AssociationOptions
+        from batch import FleetOptions, OnRay, Processes, associate_many
+        from linefix.compiling import compile_kernels
 
-        options, engine = _options(run, usable), _engine(run)
-        with progress() as show:
-            summary = associate_many(
-                logs, maps, out, options, engine, lambda step: show(step.stage, step.done, step.total)
-            )
+        search = AssociationOptions(max_alternatives=0, include=(), oriented=run.oriented, **asdict(usable))
+        options = FleetOptions(search, run.deadline_ms, run.block, compile_kernels)
+        engine = OnRay() if run.ray else None if run.workers is None else Processes(run.workers)
+        summary = associate_many(logs, maps, out, options, engine, show)
     output.print(asdict(summary), rows(_rows(summary, time.monotonic() - begun)))
     if summary.scans and summary.errors == summary.scans:
         raise RefusedError(f"none of the {summary.scans:,} scans could be searched; the first: {_first_error(out)}")
@@ -60,25 +63,6 @@ def _first_error(out: Path) -> str:
     import pyarrow.parquet as pq
 
     return next((str(told) for told in pq.read_table(out, columns=["error"])["error"].to_pylist() if told), "unknown")
-
-
-def _options(chosen: RunOptions, usable: UsableOptions) -> FleetOptions:
-    from association import AssociationOptions
-    from batch import FleetOptions
-    from linefix.compiling import compile_kernels
-
-    search = AssociationOptions(max_alternatives=0, include=(), oriented=chosen.oriented, **asdict(usable))
-    return FleetOptions(search, chosen.deadline_ms, chosen.block, compile_kernels)
-
-
-def _engine(chosen: RunOptions) -> Engine | None:
-    from batch import OnRay, Processes
-
-    if chosen.ray:
-        if chosen.workers is not None:
-            raise WrongUseError("--workers: --ray uses all cores of the cluster; omit --workers")
-        return OnRay()
-    return None if chosen.workers is None else Processes(chosen.workers)
 
 
 def _rows(summary: Summary, seconds: float) -> list[tuple[str, str]]:

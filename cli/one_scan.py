@@ -82,13 +82,11 @@ def _located(answer: Json) -> Iterator[str]:
 
 def _request(maps: Sequence[NamedMap], scan: str, search: SearchOptions, usable: UsableOptions) -> Json:
     """Return the request of ``/v1/associate`` for the arguments and options of a command."""
-    body: Json = {**target_of(maps), "scan": read_scan(scan), "options": asdict(usable)}
+    options = {"oriented": None if search.oriented else False, "deadline_ms": search.deadline_ms}
+    body: Json = {**target_of(maps), "scan": read_scan(scan), "options": {**asdict(usable), **options}}
     if search.near is not None:
         pose = dict(zip(("x", "y", "theta"), search.near, strict=True))
         body["prior"] = pose | {"radius": search.radius, "angle": search.angle}
-    if not search.oriented:
-        body["options"]["oriented"] = False
-    body["options"]["deadline_ms"] = search.deadline_ms
     return body
 
 
@@ -175,12 +173,10 @@ def register(
     oriented: bool = flag(*ORIENTED, default=True),
 ) -> None:
     """Find the pose from known correspondences; the answer is that of /v1/register."""
-    body: Json = {"map": read_map_file(on), "scan": read_scan(scan)}
+    body = {"map": read_map_file(on), "scan": read_scan(scan), "options": {"oriented": None if oriented else False}}
     if correspondences is not None:
         body["correspondences"] = read_json(correspondences)
-    if not oriented:
-        body["options"] = {"oriented": False}
-    names = {"/map": on, "/scan": scan} | ({} if correspondences is None else {"/correspondences": correspondences})
+    names = {"/map": on, "/scan": scan, "/correspondences": correspondences or "--correspondences"}
     answer = where.ask("register", body, names=names)
     found = answer["diagnostics"]
     chi2 = "none" if found["chi2"] is None else f"{found['chi2']:.2f}"
@@ -199,9 +195,7 @@ def vectorize(
     """Cut ranges or points into segments; the answer is that of /v1/vectorize."""
     told = read_scan(scan)
     asked: Json = {name: told[name] for name in TAKEN if name in told}
-    sigma = told.get("sigma") if sigma is None else sigma
-    if sigma is not None:
-        asked["options"] = {"sigma": sigma}
+    asked["options"] = {"sigma": told.get("sigma") if sigma is None else sigma}
     answer = where.ask("vectorize", asked, names={"": scan})
     if out is not None:
         kept: Json = {name: told[name] for name in ("frame_id", "stamp", "viewpoint") if name in told}

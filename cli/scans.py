@@ -20,7 +20,6 @@ LOGS = (".bag", ".mcap", ".db3", ".clf", ".log")
 FORMS = ("laser", "points", "segments", "views")
 CUT = "..."  # the last element of an array that `ros2 topic echo` has cut
 LOST = re.compile(r"A message was lost!!!.*?---\s*\n", re.DOTALL)  # of `ros2 topic echo`
-WORDS = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf, "nan": math.nan, "-nan": math.nan}  # of `rostopic echo`
 WARNINGS = re.compile(r"\A(\s*\[?(WARN|WARNING|INFO)\b.*\n)+")  # of the tools of ROS, before the message
 NEXT = "\n---"  # between the messages of `ros2 topic echo`
 
@@ -151,6 +150,6 @@ def _finite(laser: Json, name: str) -> Json:
 def _number(value: Any) -> Any:
     """Return the number that a text stands for, as of `rostopic echo` or in quotes; anything else as it is."""
     try:
-        return WORDS.get(value.lower()) or float(value) if isinstance(value, str) else value
+        return float(value) if isinstance(value, str) else value
     except ValueError:
         return value

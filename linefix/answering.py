@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from association import AssociationOptions, AssociationResult, Deadline, KnownOfMaps, MapIndex, MapSet, Scan
 from map_quality import check_map, finished
 
+from . import operations
 from .analyzing import Progress, look_on_all_cores
 from .documents import inputs, results
 from .documents.analysis import MapAnalyzeRequest
@@ -21,19 +22,7 @@ from .documents.requests import AssociateRequest, BatchItem, CheckRequest, OnMap
 from .documents.updates import UpdateRequest
 from .driving import search
 from .explaining import Explanation, explain_search
-from .operations import (
-    Json,
-    Search,
-    Steps,
-    Stopwatch,
-    Target,
-    check_steps,
-    find,
-    registered,
-    require_time,
-    update_steps,
-    vectorized,
-)
+from .operations import Json, Search, Steps, Stopwatch, Target, require_time
 
 if TYPE_CHECKING:
     from formats import ImportedMap
@@ -134,7 +123,7 @@ def locate(
     by: Search = search,
 ) -> Json:
     """Return the answer of ``POST /v1/associate`` on maps that are indexed."""
-    _, answer = find(target, sought, how, watch.deadline(how.deadline_ms, within.deadline_ms), watch, by)
+    _, answer = operations.find(target, sought, how, watch.deadline(how.deadline_ms, within.deadline_ms), watch, by)
     return _sealed(answer, watch, getattr(sought, "client_ref", None))
 
 
@@ -160,14 +149,14 @@ def register(document: Json, within: Within) -> Json:
     """Return the answer of ``POST /v1/register``."""
     watch = Stopwatch()
     asked = validate(RegisterRequest, document, within.limits)
-    return _sealed(registered(asked, watch), watch)
+    return _sealed(operations.registered(asked, watch), watch)
 
 
 def vectorize(document: Json, within: Within) -> Json:
     """Return the answer of ``POST /v1/vectorize``."""
     watch = Stopwatch()
     asked = validate(VectorizeRequest, document, within.limits)
-    return _sealed(vectorized(asked, watch), watch)
+    return _sealed(operations.vectorized(asked, watch), watch)
 
 
 def analyze(document: Json, within: Within, cores: int = 1, progress: Progress = lambda done, total: None) -> Json:
@@ -191,7 +180,7 @@ def check(on: Json, document: Json | None, within: Within) -> Json:
     drawn, reference = _map_at(on, within)
     index, oriented = inputs.index_of(drawn, oriented=True), is_oriented(None, drawn.oriented)
     deadline = watch.deadline(None if asked is None else asked.deadline_ms, within.deadline_ms)
-    answer = _worked(check_steps(index, asked, deadline, oriented=oriented), watch, deadline)
+    answer = _worked(operations.check_steps(index, asked, deadline, oriented=oriented), watch, deadline)
     return _sealed({**answer, "map": reference}, watch, None if asked is None else asked.client_ref)
 
 
@@ -202,7 +191,7 @@ def update(on: Json, document: Json, within: Within) -> Json:
     old, reference = _map_at(on, within)
     index = inputs.index_of(old, oriented=is_oriented(None, old.oriented))
     deadline = Deadline() if asked.deadline_ms is None else watch.deadline(asked.deadline_ms, asked.deadline_ms)
-    answer = _worked(update_steps(index, old, asked, deadline), watch, Deadline())
+    answer = _worked(operations.update_steps(index, old, asked, deadline), watch, Deadline())
     return _sealed({**answer, "based_on": reference}, watch, asked.client_ref)
 
 

@@ -9,18 +9,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from association import (
-    INCLUDED,
-    AssociationOptions,
-    Deadline,
-    HardPrior,
-    MapIndex,
-    MapPart,
-    MapPoints,
-    Prior,
-    Scan,
-    SoftPrior,
-)
+from association import AssociationOptions, Deadline, HardPrior, MapIndex, MapPart, MapPoints, Prior, Scan, SoftPrior
 from map_quality import NOT_SHARPENED, Analysis, Replacement, Robot, Sharpened, VisitScan
 from registration import InputError, InvalidArgumentError, RegistrationOptions, Segments
 
@@ -50,7 +39,7 @@ def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:
 
 def association_options_of(options: SearchOptions, *, oriented: bool) -> AssociationOptions:
     """Return how to search a map whose directions count, or do not."""
-    include = tuple(part for part in INCLUDED if part in options.include)
+    include = tuple(part for part in options.include if part != "segments")  # those of a scan are not searched for
     return AssociationOptions(oriented=oriented, include=include, **{name: getattr(options, name) for name in _AS_SENT})
 
 

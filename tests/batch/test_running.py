@@ -21,7 +21,6 @@ from batch import (
     Lost,
     OtherRunError,
     Processes,
-    Progress,
     UnreadableMapsError,
     UnreadableScansError,
     associate_many,
@@ -148,10 +147,10 @@ def test_a_run_that_was_ended_goes_on_where_it_was(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         associate_many([log], room, out, SMALL, Here(ends_after=3))
     assert not out.exists()
-    told: list[Progress] = []
-    summary = associate_many([log], room, out, SMALL, Here(), told.append)
+    told: list[tuple[str, int, int]] = []
+    summary = associate_many([log], room, out, SMALL, Here(), lambda *step: told.append(step))
     assert (summary.scans, summary.taken_over) == (40, 24)
-    searched = [progress.done for progress in told if progress.stage == "searching"]
+    searched = [done for stage, done, _ in told if stage == "searching"]
     assert searched == [24, 32, 40]
     assert without_times(rows(out)) == without_times(rows(tmp_path / "whole.parquet"))
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -212,10 +211,10 @@ def test_a_worker_killed_on_the_way_costs_no_row(tmp_path: Path) -> None:
     log, room, out = write_log(tmp_path / "a.parquet", 80), write_room(tmp_path), tmp_path / "out.parquet"
     killed: list[int] = []
 
-    def kill_one(progress: Progress) -> None:
+    def kill_one(stage: str, done: int, total: int) -> None:
         children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
         workers = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-        if progress.stage == "searching" and progress.done > 0 and not killed and workers:
+        if stage == "searching" and done > 0 and not killed and workers:
             killed.append(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
