@@ -29,13 +29,7 @@ SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a 
 MOST_SCANS = 10**9  # of an update: each is read from a file of this machine
 OF_STORED = {"check_map": "check", "update_map": "update"}  # a server has them for stored maps; the name in `answering`
 OF_STORE = ("put_map", "get_map", "list_maps", "delete_map")
-LIMITS = {  # by the name of the setting
-    "MAX_VALUES": "values",
-    "MAX_MAP_SEGMENTS": "map_segments",
-    "MAX_SCAN_SEGMENTS": "scan_segments",
-    "MAX_BEAMS": "beams",
-    "MAX_CORRESPONDENCES": "pairs",
-}
+LIMITS = ("values", "map_segments", "scan_segments", "beams")  # by settings of these names, after MAX_
 BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 _HEADER = re.compile(r"[!-~]+")
 _URL = re.compile(r"https?://([!-~]+@)?([a-z0-9._-]+|\[[0-9a-f:.]+\])(:[0-9]{1,5})?(/[!-~]*)?", re.IGNORECASE)
@@ -111,9 +105,10 @@ def answering(names: Names) -> Iterator[Within]:
     from linefix.documents.limits import Limits
 
     compile_first()
-    limits = {name: setting(variable, getattr(Limits(), name)) for variable, name in LIMITS.items()}
+    limits = {name: setting(f"MAX_{name.upper()}", getattr(Limits(), name)) for name in LIMITS}
+    limits |= {"pairs": setting("MAX_CORRESPONDENCES", Limits().pairs), "batch": MOST_SCANS}
     with refusing(names):
-        yield Within(Limits(**limits, batch=MOST_SCANS), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored)
+        yield Within(Limits(**limits), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored)
 
 
 def _stored(map_id: str) -> tuple[Any, Json]:
@@ -194,10 +189,9 @@ class Server:
         except ProblemError as error:
             raise self._refusal(error, arguments, names) from None
         except LinefixError as error:
-            told = (
-                f"no server responds at {self._url}: {error.__cause__}; start one with linefix serve, or omit --server"
-            )
-            if error.__cause__ is None:  # a server answers, though none of Linefix
+            cause = error.__cause__
+            told = f"no server responds at {self._url}: {cause}; start one with linefix serve, or omit --server"
+            if cause is None:  # a server answers, though none of Linefix
                 told = f"{str(error).removesuffix('; check the URL')}; check the URL"
             raise NoServerError(told) from None
         except ValueError as error:  # such as a number that JSON cannot have
