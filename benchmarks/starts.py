@@ -90,7 +90,7 @@ def observe(index: linefix.MapIndex, laser: linefix.LaserScan, stamp: int) -> Ob
     try:
         answer = linefix.locate(index, laser, options=OPTIONS)
     except InputError:
-        return Observation(stamp, None, None, False)
+        return Observation(stamp)
     return observation_of(answer, None, stamp)
 
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from registration import IDENTITY, RigidTransform, wrap_angle
 
 from . import tuning
+from .clock import Confirmation
 
 Floats = NDArray[np.float64]
 
@@ -54,10 +55,10 @@ class Observation:
     ----------
     stamp : int
         Nanoseconds.
-    pose : RigidTransform or None
-        map_from_base.
-    covariance : (3, 3) or None
-        Of `pose`, additive (x, y, theta) in the map frame; m^2, m rad, rad^2.
+    pose : RigidTransform
+        map_from_base; of a scan without one any, neither usable nor conclusive.
+    covariance : (3, 3)
+        Of `pose`, additive (x, y, theta) in the map frame; m^2, m rad, rad^2; 0 where it is not known.
     usable : bool
     odometry : RigidTransform or None
         odom_from_base at `stamp`; None: no odometry, the robot is taken to rest.
@@ -76,9 +77,9 @@ class Observation:
     """
 
     stamp: int
-    pose: RigidTransform | None
-    covariance: Floats | None
-    usable: bool
+    pose: RigidTransform = IDENTITY
+    covariance: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    usable: bool = False
     odometry: RigidTransform | None = None
     part: tuple[int, ...] = ()
     unknown_s: float = 0.0
@@ -165,8 +166,7 @@ class Agreement:
     _hypotheses: list[_Hypothesis] = field(default_factory=list)
     _agreed: _Hypothesis | None = None
     _newest: int | None = None
-    _held: Observation | None = None  # whose stamp fits that of no other scan yet
-    _contradicted: bool = False
+    _confirmation: Confirmation[Observation] = field(default_factory=Confirmation)
     _unexplained: int = 0  # scans since the last agreement that contradict odometry
     _contradiction: int | None = None  # the stamp of the last of all such scans
 
@@ -178,7 +178,7 @@ class Agreement:
     @property
     def contradicted(self) -> bool:
         """Return whether a scan contradicted the agreed hypothesis since it was last supported."""
-        return self._contradicted
+        return self._agreed is not None and self._agreed.against > 0
 
     @property
     def refuted(self) -> bool:
@@ -197,8 +197,8 @@ class Agreement:
 
     def reset(self) -> None:
         """Forget everything, as when the robot was carried, or the map changed."""
-        self._hypotheses, self._agreed, self._newest, self._contradicted = [], None, None, False
-        self._held, self._unexplained, self._contradiction = None, 0, None
+        self._hypotheses, self._agreed, self._newest = [], None, None
+        self._confirmation, self._unexplained, self._contradiction = Confirmation(), 0, None
 
     def take(self, scan: Observation) -> Event:
         """Take the next scan.
@@ -206,17 +206,16 @@ class Agreement:
         Scans that are a little older than the last one are left out. One whose stamp is far from that of the last is
         taken when the next one confirms its clock; where that was set back, everything is forgotten.
         """
-        held, self._held = self._held, None
-        if self._newest is not None and not _near(self._newest, scan.stamp):
-            if held is None or scan.stamp < held.stamp:
-                self._held = scan
-                return Event.NOTHING
-            if held.stamp < self._newest:
-                self.reset()
-            self._take(held)
-        elif self._newest is not None and scan.stamp < self._newest:
+        ahead = 0 if self._newest is None else scan.stamp - self._newest
+        fits = -tuning.CLOCK_BACK_NS <= ahead <= tuning.CLOCK_AHEAD_NS
+        if fits and ahead < 0:
             return Event.NOTHING
-        return self._take(scan)
+        event = Event.NOTHING
+        for one in self._confirmation.take(scan.stamp, scan, fits=fits):
+            if self._newest is not None and one.stamp < self._newest:
+                self.reset()
+            event = self._take(one)
+        return event
 
     def _take(self, scan: Observation) -> Event:
         self._newest = scan.stamp
@@ -237,17 +236,14 @@ class Agreement:
             if scan.odometry is not None and against:
                 self._unexplained, self._contradiction = self._unexplained + 1, scan.stamp
         if self._agreed is not None and self._agreed in supported:
-            self._agreed.against, self._contradicted = 0, False
+            self._agreed.against = 0
             return Event.CONFIRMED
         contradicted = self._unexplained >= tuning.UNEXPLAINED_SCANS
         for one in supported:
             if one.agreed(self.needed, contradicted=contradicted):
-                self._agreed, self._contradicted, self._hypotheses, self._unexplained = one, False, [one], 0
+                self._agreed, self._hypotheses, self._unexplained, one.against = one, [one], 0, 0
                 return Event.AGREED
-        if self._agreed in against:
-            self._contradicted = True
-            return Event.CONTRADICTED
-        return Event.NOTHING
+        return Event.CONTRADICTED if self._agreed in against else Event.NOTHING
 
     def _begin(self, scan: Observation) -> _Hypothesis:
         if len(self._hypotheses) >= tuning.MAX_HYPOTHESES:
@@ -287,9 +283,8 @@ def predict(begin: Observation, step: RigidTransform, unknown_s: float = 0.0) ->
     (3, 3)
         Additive (x, y, theta) in the map frame; with the error of odometry.
     """
-    assert begin.pose is not None
     predicted = begin.pose.compose(step)
-    known = np.zeros((3, 3)) if begin.covariance is None else begin.pose.carry(begin.covariance, step)
+    known = begin.pose.carry(begin.covariance, step)
     distance, angle = math.hypot(step.x, step.y), abs(step.theta)
     place = tuning.ODOMETRY_DISTANCE + tuning.ODOMETRY_DISTANCE_PER_METRE * distance + tuning.UNKNOWN_SPEED * unknown_s
     turn = tuning.ODOMETRY_ANGLE + tuning.ODOMETRY_ANGLE_PER_ANGLE * angle + tuning.ODOMETRY_ANGLE_PER_METRE * distance
@@ -303,23 +298,16 @@ def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> floa
     return float(difference @ np.linalg.solve(covariance, difference))
 
 
-def _near(newest: int, stamp: int) -> bool:
-    return -tuning.CLOCK_BACK_NS <= stamp - newest <= tuning.CLOCK_AHEAD_NS
-
-
 def _verdict(begin: Observation, scan: Observation, step: RigidTransform, unknown_s: float) -> bool | None:
     """Return whether a scan agrees with what odometry predicts; None where that is undecided.
 
     Poses of different maps never agree.
     """
-    if scan.pose is None:
-        return None
     predicted, covariance = predict(begin, step, unknown_s)
     if scan.usable and scan.map_id != begin.map_id:
         return False
     if scan.usable:
-        both = covariance + (0.0 if scan.covariance is None else scan.covariance)
-        return chi_square(predicted, scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
+        return chi_square(predicted, scan.pose, covariance + scan.covariance) <= tuning.AGREEING_CHI_SQUARE
     if not scan.conclusive:
         return None
     places = [one.pose for one in (Place(scan.pose, scan.map_id), *scan.others) if one.map_id == begin.map_id]

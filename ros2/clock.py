@@ -1,19 +1,16 @@
-"""Times: stamps of messages as numbers, and the clock of the robot, which may be that of a simulation."""
+"""The clock of the robot, which may be that of a simulation; and stamps that do not fit it."""
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from . import messages as ros
-from .messages import Time
+from .messages import NS, Time, nanoseconds
 
-NS = 1_000_000_000
-
-
-def nanoseconds(stamp: Time) -> int:
-    """Return a time as one number."""
-    return int(stamp.sec) * NS + int(stamp.nanosec)
+Value = TypeVar("Value")
 
 
 def time_of(stamp: int) -> Time:
@@ -50,3 +47,27 @@ class Clock:
     def steady(self) -> int:
         """Return nanoseconds of a clock that is not set, unless a simulation begins again."""
         return self._now if self.simulated else time.monotonic_ns()
+
+
+@dataclass(slots=True)
+class Confirmation(Generic[Value]):
+    """Holds a value whose stamp is far from the time, until the next one confirms its clock.
+
+    Attributes
+    ----------
+    longest : float
+        From the held value to the next one, nanoseconds.
+    """
+
+    longest: float = math.inf
+    _held: tuple[int, Value] | None = None
+
+    def take(self, stamp: int, value: Value, *, fits: bool) -> list[Value]:
+        """Return the values to use now: this one if it `fits`; else the held one and this one, or none."""
+        held, self._held = self._held, None
+        if fits:
+            return [value]
+        if held is None or not 0 < stamp - held[0] <= self.longest:
+            self._held = stamp, value
+            return []
+        return [held[1], value]

@@ -1,16 +1,93 @@
-"""When ``initialpose`` is published, and the transform from the map to the odometry frame (REP 105). No DDS in here."""
+"""Whether the localizer of the robot agrees, when ``initialpose`` is published, and the transform from the map."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from registration import RigidTransform, wrap_angle
 
-from .agreement import Event, Observation
-from .clock import NS
+from . import tuning
+from .agreement import Event, Observation, chi_square
+from .frames import FrameError, Frames, matrix_of, planar
+from .messages import NS, PoseWithCovarianceStamped, nanoseconds
+from .odometry import OdometryHistory
 from .options import When
+from .reporting import PLANAR, at_least
 from .tuning import ALWAYS_SECONDS, CORRECTION_SPEED, CORRECTION_TURN_RATE, LOST_SECONDS, UNCONFIRMED_SECONDS
+
+UNKNOWN = np.diag([1.0, 1.0, math.pi])  # covariance of a pose without a valid one
+
+
+class Watch:
+    """Compares poses with ``amcl_pose``, or with the transform from the map to the odometry frame.
+
+    Parameters
+    ----------
+    frames : Frames
+    odometry : OdometryHistory
+    transforms : bool
+        False where this node publishes the transform itself: it is not that of a localizer.
+    """
+
+    def __init__(self, frames: Frames, odometry: OdometryHistory, *, transforms: bool = True) -> None:
+        self._frames, self._odometry, self._transforms = frames, odometry, transforms
+        self._amcl: Observation | None = None
+        self._against = 0
+
+    @property
+    def lost(self) -> bool:
+        """Return whether the localizer disagreed with the last scans that confirmed the pose."""
+        return self._against >= tuning.LOST_SCANS
+
+    def reset(self) -> None:
+        """Forget what was compared, as after a new pose was published."""
+        self._against = 0
+
+    def take(self, message: PoseWithCovarianceStamped) -> None:
+        """Take a message of ``amcl_pose``.
+
+        Raises
+        ------
+        FrameError
+            When it is no pose, or its covariance is none: the pose then counts with a wide one.
+        """
+        pose = planar(matrix_of(message.pose.pose.position, message.pose.pose.orientation))
+        covariance = np.reshape(np.asarray(message.pose.covariance, dtype=np.float64), (6, 6))[np.ix_(PLANAR, PLANAR)]
+        valid = bool((np.abs(covariance) <= tuning.MAX_COVARIANCE).all())
+        used = at_least(covariance, 0.0, 0.0) if valid else UNKNOWN
+        self._amcl = Observation(nanoseconds(message.header.stamp), pose, used)
+        if not valid:
+            raise FrameError(f"found a covariance with {np.abs(covariance).max():g}; 1 m and 102 degrees are assumed")
+
+    def compare(self, scan: Observation, map_frame: str, odom_frame: str) -> bool | None:
+        """Return whether the localizer agrees with a scan that is agreed; None where it is not known.
+
+        The result counts for `lost`.
+        """
+        estimate = self._at(scan, map_frame, odom_frame)
+        if estimate is None:
+            return None
+        both = estimate.covariance + scan.covariance
+        both = both + np.diag([tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA_THETA**2])
+        agrees = chi_square(estimate.pose, scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
+        self._against = 0 if agrees else self._against + 1
+        return agrees
+
+    def _at(self, scan: Observation, map_frame: str, odom_frame: str) -> Observation | None:
+        matrix = self._frames.lookup(map_frame, odom_frame, scan.stamp) if self._transforms else None
+        if matrix is not None and scan.odometry is not None:
+            pose = planar(matrix).compose(scan.odometry)
+            return Observation(scan.stamp, pose) if self._amcl is None else replace(self._amcl, pose=pose)
+        if self._amcl is None:
+            return None
+        step = self._odometry.between(self._amcl.stamp, scan.stamp)
+        if step is None:
+            return None
+        carried = self._amcl.pose.carry(self._amcl.covariance, step)
+        return replace(self._amcl, pose=self._amcl.pose.compose(step), covariance=carried)
 
 
 @dataclass(slots=True)
@@ -82,7 +159,7 @@ class MapToOdom:
 
     def take(self, event: Event, scan: Observation) -> None:
         """Take a scan that is agreed or confirmed; others, and those without odometry, change nothing."""
-        if event not in (Event.AGREED, Event.CONFIRMED) or scan.pose is None or scan.odometry is None:
+        if event not in (Event.AGREED, Event.CONFIRMED) or scan.odometry is None:
             return
         self._target = scan.pose.compose(scan.odometry.inverse())
         other = (scan.part, scan.unknown_s) != (self._part, self._unknown_s)

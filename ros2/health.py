@@ -6,38 +6,27 @@ import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum
 
 from .messages import DiagnosticArray, DiagnosticStatus, Header, Time
 from .reporting import ERROR, OK, WARN, status_of
+from .topics import Publisher
 from .tuning import LOG_SECONDS, REPEAT_SECONDS
-from .wire import Publisher
 
 NUMBER = re.compile(r"(?<![\w/])[-+]?(?:\d+(?:\.\d*)?(?:e[-+]?\d+)?|nan|inf)(?!\w)")
 MOST_PROBLEMS = 100  # different ones that are remembered
 
 
-class State(StrEnum):
-    """The state of the node."""
+class State(Enum):
+    """The state of the node: its name, its level and its message in diagnostics."""
 
-    NO_MAP = "no_map"
-    NO_SCAN = "no_scan"
-    SEARCHING = "searching"
-    AGREED = "agreed"
-    CONTRADICTED = "contradicted"
-    LOST = "lost"
-    STALE = "stale"
-
-
-STATES = {
-    State.NO_MAP: (WARN, "no usable map has been received"),
-    State.NO_SCAN: (WARN, "no scan can be searched"),
-    State.SEARCHING: (WARN, "no pose is agreed yet"),
-    State.AGREED: (OK, "the pose is agreed"),
-    State.CONTRADICTED: (ERROR, "the agreed pose is contradicted by the last scans"),
-    State.LOST: (ERROR, "the pose of the localizer differs from that of the scans"),
-    State.STALE: (ERROR, "the agreed pose is not confirmed any more"),
-}
+    NO_MAP = "no_map", WARN, "no usable map has been received"
+    NO_SCAN = "no_scan", WARN, "no scan can be searched"
+    SEARCHING = "searching", WARN, "no pose is agreed yet"
+    AGREED = "agreed", OK, "the pose is agreed"
+    CONTRADICTED = "contradicted", ERROR, "the agreed pose is contradicted by the last scans"
+    LOST = "lost", ERROR, "the pose of the localizer differs from that of the scans"
+    STALE = "stale", ERROR, "the agreed pose is not confirmed any more"
 
 
 @dataclass(slots=True)
@@ -64,18 +53,15 @@ class Health:
     _map: str | None = None
     _beat: float = 0.0
 
-    def problem(self, problem: str, stamp: Time | None = None) -> None:
-        """Publish a problem, and log it; the same one at most once in `REPEAT_SECONDS` and `LOG_SECONDS`."""
-        self._report((ERROR, problem), stamp or Time(), NUMBER.sub("#", problem))
+    def problem(self, problem: str, stamp: Time | None = None, *, about: str | None = None, level: int = ERROR) -> None:
+        """Publish a problem, and log it: at most once in `REPEAT_SECONDS` and `LOG_SECONDS`.
 
-    def warn(self, warning: str, stamp: Time, about: str) -> None:
-        """Publish a warning, and log it, as often as a problem; warnings `about` one thing may differ."""
-        self._report((WARN, warning), stamp, about)
-
-    def _report(self, verdict: tuple[int, str], stamp: Time, about: str) -> None:
+        One `about` the same, or the same but for numbers, is the same one; its level is that of a warning or an error.
+        """
+        about = about or NUMBER.sub("#", problem)
         if _is_new(self._published, about, REPEAT_SECONDS):
-            self.publish("scan", stamp, verdict)
-        self.note(verdict[1], about)
+            self.publish("scan", stamp or Time(), (level, problem))
+        self.note(problem, about)
 
     def note(self, line: str, about: str | None = None) -> None:
         """Log a line; one `about` the same, or the same but for numbers, at most once in `LOG_SECONDS`."""
@@ -99,14 +85,14 @@ class Health:
         if not changed and not map_changed and now - self._beat < 1.0:
             return
         self._beat, self._map = now, values.get("map_id")
-        values = {"state": state.value, **values}
-        level, message = STATES[state]
+        name, level, message = state.value
+        values = {"state": name, **values}
         verdict = level, f"{message}: {doubt}" if doubt and level != OK else message
         self.publish("localization", stamp, verdict, values)
         self.status.publish(self._status("localization", verdict, values))
         if changed:
             self._state = state
-            self.log(f"state {state.value}: {verdict[1]}")
+            self.log(f"state {name}: {verdict[1]}")
 
 
 def _is_new(times: dict[str, float], text: str, seconds: float) -> bool:

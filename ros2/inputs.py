@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .clock import NS, Clock, nanoseconds
-from .messages import LaserScan
-from .odometry import OdometryHistory
-from .options import NodeOptions, quoted
-from .topics import Topics
-from .tuning import CLOCKS_APART, ENDED_SECONDS, MISSED_PERIODS, SEVERAL_SCANS, SILENT_SECONDS
-from .wire import Subscription
+from formats.logs.tuning import CLOCKS_APART_NS
+
+from .messages import NS, LaserScan, nanoseconds
+from .options import quoted
+from .robot import Robot
+from .topics import Subscription
+from .tuning import ENDED_SECONDS, MISSED_PERIODS, SEVERAL_SCANS, SILENT_SECONDS
 
 
 @dataclass(slots=True)
@@ -36,37 +36,30 @@ class Inputs:
 
     Parameters
     ----------
-    options : NodeOptions
-    topics : Topics
-    odometry : OdometryHistory
-    clock : Clock
-    log : callable
-        Takes a line; the same line again and again.
+    robot : Robot
+
+    Attributes
+    ----------
+    latency : int
+        From the stamp of the last scan to its reception, as `Clock.steady` counts, nanoseconds.
     """
 
-    def __init__(
-        self,
-        options: NodeOptions,
-        topics: Topics,
-        odometry: OdometryHistory,
-        clock: Clock,
-        log: Callable[[str], None],
-    ) -> None:
-        self._options, self._topics, self._odometry, self._clock, self._log = options, topics, odometry, clock, log
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._topics, self._odometry, self._clock = robot, robot.topics, robot.odometry, robot.clock
         self._began: float | None = None
         self._started: float | None = None  # the same without a clock
         self._looked = time.monotonic()
         self._scans, self._ranges, self._searched = _Seen(), _Seen(), _Seen()
         self._senders: deque[tuple[float, str, Any]] = deque(maxlen=200)  # time, frame and publisher of the last scans
-        self._latency: int | None = None  # ns from the stamp of the last scan to its reception
+        self.latency = 0
         self._apart = 0  # scans one after the other whose clock differs from that of odometry
         self._disagreeing: float | None = None  # since when scans are usable, but none is agreed
-        self._mapped = options.map_topic is None
+        self._mapped = robot.options.map_topic is None
 
     def scan(self, scan: LaserScan) -> None:
         """Note that a scan has come."""
-        if self._latency is None:
-            self._log(f"first scan on {self._topics.scans[0].name}")
+        if self._scans.last == -math.inf:
+            self._robot.health.note(f"first scan on {self._topics.scans[0].name}")
         now, received, stamp = self._now, self._clock.steady(), nanoseconds(scan.header.stamp)
         self._scans.note(now)
         ranges = np.asarray(scan.ranges)
@@ -74,9 +67,11 @@ class Inputs:
             self._ranges.note(now)
             info = getattr(scan, "sample_info", None)
             self._senders.append((now, scan.header.frame_id, getattr(info, "publication_handle", None)))
-        self._latency = received - stamp
+        self.latency = received - stamp
         offset = self._odometry.clock_offset(stamp, received)
-        self._apart = self._apart + 1 if abs(offset) > CLOCKS_APART and self._odometry.silent_s < ENDED_SECONDS else 0
+        self._apart = (
+            self._apart + 1 if abs(offset) * NS > CLOCKS_APART_NS and self._odometry.silent_s < ENDED_SECONDS else 0
+        )
 
     def map(self) -> None:
         """Note that a map has come: if it is not used, that is another problem."""
@@ -92,10 +87,6 @@ class Inputs:
             self._disagreeing = None
         elif usable and self._disagreeing is None:
             self._disagreeing = self._now
-
-    def received(self, stamp: int) -> int | None:
-        """Return when a scan with a stamp was received, as `Clock.steady` counts."""
-        return None if self._latency is None else stamp + self._latency
 
     @property
     def _now(self) -> float:
@@ -118,7 +109,7 @@ class Inputs:
     @property
     def transform_stops(self) -> bool:
         """Return whether the transform is not to be published any more."""
-        return 0.0 < self._options.tf_max_age_s < self._now - self._ranges.last
+        return 0.0 < self._robot.options.tf_max_age_s < self._now - self._ranges.last
 
     @property
     def values(self) -> dict[str, str]:
@@ -133,7 +124,7 @@ class Inputs:
         if time.monotonic() - self._looked >= min(1.0, SILENT_SECONDS):
             self._looked = time.monotonic()
             for _, line in self._problems(SILENT_SECONDS):
-                self._log(line)
+                self._robot.health.note(line)
 
     def _problems(self, patience: float) -> Iterator[tuple[str, str]]:
         """Yield what is missing for some seconds, and what contradicts itself: the doubt, and a line with the remedy.
@@ -154,7 +145,7 @@ class Inputs:
         if silent(self._scans):
             names = ", ".join(one.name for one in topics.scans)
             yield from ((f"no scan arrives on {names}", self._reason(one)) for one in topics.scans)
-        elif self._latency is not None and silent(self._ranges):
+        elif silent(self._ranges):
             told = "no scan has a range between range_min and range_max"
             yield told, f"{told} for {SILENT_SECONDS:g} s; check the laser"
         if not self._mapped and now - began > patience:
@@ -176,7 +167,7 @@ class Inputs:
             told = f"odometry on {odometry.source} and tf differ by {odometry.apart} in {quoted(odometry.frame)}"
             remedy = "stop one of the two publishers, or set --odom to the topic of the one that publishes tf"
             wrong = "the transform from the map would be wrong by that"
-            yield told if self._options.publish_tf else "", f"{told}; {remedy}. With --publish-tf, {wrong}"
+            yield told if self._robot.options.publish_tf else "", f"{told}; {remedy}. With --publish-tf, {wrong}"
         elif self._apart >= 3:
             yield f"the clocks of scans and of odometry on {odometry.source} differ", self._clocks
         if self.shared:
@@ -209,10 +200,10 @@ class Inputs:
     @property
     def _clocks(self) -> str:
         now = self._clock.steady()
-        return self._odometry.clocks(now - (self._latency or 0), now)
+        return self._odometry.clocks(now - self.latency, now)
 
     def _reason(self, topic: Subscription[Any]) -> str:
-        domain = self._options.domain
+        domain = self._robot.options.domain
         if topic.writers.connected:
             silent = f"no valid message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
             return f"{silent}; check the driver and the network"

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Collection
 
 import linefix
 from formats.logs.tuning import MOST_GAP_NS
 
 from .agreement import Agreement, Event, Observation
-from .clock import NS, Clock, nanoseconds, time_of
-from .deciding import InitialPose, MapToOdom
-from .frames import Frames
-from .health import Health, State
+from .clock import time_of
+from .deciding import InitialPose, MapToOdom, Watch
+from .frames import FrameError
+from .health import State
 from .maps import UNNAMED, Maps
-from .messages import PoseWithCovarianceStamped, String, Time
-from .odometry import OdometryHistory
-from .options import NodeOptions, quoted
-from .reporting import at_least, map_marker, stamped_pose, transform_of
+from .messages import NS, String, Time, nanoseconds
+from .options import quoted
+from .reporting import WARN, at_least, map_marker, stamped_pose, transform_of
 from .requests import Requests
+from .robot import Robot
 from .searching import observation_of
-from .topics import Topics
-from .transforms import FrameError
 from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
-from .watching import Watch
 
 
 class Localization:
@@ -32,39 +29,31 @@ class Localization:
 
     Parameters
     ----------
-    options : NodeOptions
-    topics : Topics
-    health : Health
-    frames : Frames
-    odometry : OdometryHistory
-        The node owns both.
-    clock : Clock
+    robot : Robot
+
+    Attributes
+    ----------
+    maps : Maps or None
+        Those that are searched.
     """
 
-    def __init__(
-        self,
-        options: NodeOptions,
-        topics: Topics,
-        health: Health,
-        frames: Frames,
-        odometry: OdometryHistory,
-        clock: Clock,
-    ) -> None:
-        self._maps: Maps | None = None
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._odometry = robot, robot.odometry
+        self._options, self._topics, self._health = robot.options, robot.topics, robot.health
+        self.maps: Maps | None = None
         self._map_name = UNNAMED  # of the last agreed pose
         self._localizer_map: str | None = None  # of the last pose that was published to a localizer
-        self._options, self._topics, self._health = options, topics, health
-        self._frames, self._odometry, self._clock = frames, odometry, clock
-        self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
-        self._watch, self._correction = Watch(transforms=not options.publish_tf), MapToOdom()
-        self._requests = Requests(topics.named_requests, topics.results)
+        self._agreement, self._initial = Agreement(robot.options.agree), InitialPose(robot.options.when)
+        self._watch = Watch(robot.frames, robot.odometry, transforms=not robot.options.publish_tf)
+        self._correction = MapToOdom()
+        self._requests = Requests(robot.topics.named_requests, robot.topics.results)
         self._pending: tuple[Time, Observation, str] | None = None
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
         self._transformed = 0  # the time of the last transform that was published, nanoseconds
 
     def use(self, maps: Maps, *, kept: bool = False) -> None:
         """Take other maps, and forget the pose unless it is kept; the walls of a single map are published at once."""
-        self._maps = maps
+        self.maps = maps
         if not kept:
             self._map_name, self._localizer_map = UNNAMED, None
             self.begin_again()
@@ -72,17 +61,17 @@ class Localization:
             self._publish_walls(None)
 
     def _publish_walls(self, map_id: str | None) -> None:
-        if self._maps is not None:
-            walls, frame = self._maps.walls_of(map_id), self._maps.frame_of(map_id)
+        if self.maps is not None:
+            walls, frame = self.maps.walls_of(map_id), self.maps.frame_of(map_id)
             self._topics.walls.publish(map_marker(walls, frame))
 
     def _frame_of(self, scan: Observation | None) -> str:
-        return "map" if scan is None or self._maps is None else self._maps.frame_of(scan.map_id)
+        return "map" if scan is None or self.maps is None else self.maps.frame_of(scan.map_id)
 
     @property
-    def odom_frame(self) -> str:
-        """The odometry frame: as odometry names it, else that of the options."""
-        return self._options.frame(self._odometry.frame or self._options.odom_frame)
+    def map_frames(self) -> Collection[str]:
+        """The frames of the maps."""
+        return () if self.maps is None else self.maps.frames.values()
 
     def begin_again(self) -> None:
         """Forget the pose: the robot was carried, or the map has changed."""
@@ -98,31 +87,26 @@ class Localization:
             self.begin_again()
         self._requests.expire()
 
-    def take_localizer(self, pose: PoseWithCovarianceStamped) -> None:
-        """Take the pose of the robot's localizer.
+    def take_localizer(self) -> None:
+        """Take the poses of the robot's localizer; report those that cannot be used."""
+        for pose in self._topics.amcl.take():
+            frame = pose.header.frame_id.strip("/")
+            try:
+                if self.map_frames and frame and frame not in self.map_frames:
+                    expected = "expected one in the frame of a map; it is not used"
+                    raise FrameError(f"found a pose in {quoted(frame)}, {expected}")
+                self._watch.take(pose)
+            except FrameError as error:
+                self._health.problem(f"{self._topics.amcl.name}: {error}")
 
-        Raises
-        ------
-        FrameError
-            When it is no pose, or one in another frame than a map.
-        """
-        frame = pose.header.frame_id.strip("/")
-        if self._maps is not None and frame and frame not in self._maps.frames.values():
-            raise FrameError(f"found a pose in {quoted(frame)}, expected one in the frame of a map; it is not used")
-        self._watch.take(pose)
-
-    def take(
-        self, answer: linefix.AssociationResult, stamped: Time, received: Callable[[int], int | None]
-    ) -> Observation | None:
-        """Take the result of a scan, and return it where it is agreed.
-
-        `received` returns when a scan with a stamp was received.
-        """
-        stamp = nanoseconds(stamped) or nanoseconds(self._clock.now())
-        got, doubted = received(stamp), self._agreement.doubts_odometry(stamp)
-        known = self._odometry.known(stamp, got, doubted=doubted)
-        if known is None and doubted and got is not None and not self._odometry.same_place(stamp, got):
-            self._health.warn(self._odometry.clocks(stamp, got), stamped, "clocks")
+    def take(self, answer: linefix.AssociationResult, stamped: Time, latency: int) -> bool:
+        """Take the result of a scan that was received so long after its stamp, ns; return whether it is agreed."""
+        stamp = nanoseconds(stamped) or nanoseconds(self._robot.clock.now())
+        received = stamp + latency
+        known = self._odometry.known(stamp, received)
+        if self._agreement.doubts_odometry(stamp) and not self._odometry.same_place(stamp, received):
+            known = None
+            self._health.problem(self._odometry.clocks(stamp, received), stamped, about="clocks", level=WARN)
         scan = observation_of(answer, known, stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
@@ -132,22 +116,27 @@ class Localization:
             self._pending = None
             self._health.note("a scan contradicts the agreed pose; drive on until a new pose is agreed")
         if event not in (Event.AGREED, Event.CONFIRMED):
-            return None
+            return False
         self._follow(scan.map_id)
-        names = self._frame_of(scan), self.odom_frame
+        frame = self._frame_of(scan)
         # The same coordinates on another map are another place, and the map of the localizer is known by what it got.
         agrees = None
         if scan.map_id == self._localizer_map:
-            agrees = self._watch.compare(scan, names, self._frames, self._odometry)
+            agrees = self._watch.compare(scan, frame, self._robot.odom_frame)
         else:
             self._initial.want()
         reason = self._initial.decide(event, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
-        self._publish_agreed(stamped, scan, reason)
-        return scan
+        agreed = stamped_pose(stamped, scan.pose, scan.covariance, frame)
+        self._topics.agreed.publish(agreed)
+        self._requests.answer(agreed, self._map_name)
+        if reason is not None:
+            self._pending = stamped, scan, reason
+            self.publish_initial()
+        return True
 
     def _follow(self, map_id: str | None) -> None:
         """Publish the map of the agreed pose where it is another one than before."""
-        name = UNNAMED if self._maps is None else self._maps.name_of(map_id)
+        name = UNNAMED if self.maps is None else self.maps.name_of(map_id)
         if name == self._map_name:
             return
         changed = f"the map changed from {self._map_name} to {name}" if self._map_name else f"the map is {name}"
@@ -156,16 +145,6 @@ class Localization:
         if map_id is not None:
             self._publish_walls(map_id)
             self._health.log(changed)
-
-    def _publish_agreed(self, stamp: Time, scan: Observation, reason: str | None) -> None:
-        if scan.pose is None or scan.covariance is None:
-            return
-        agreed = stamped_pose(stamp, scan.pose, scan.covariance, self._frame_of(scan))
-        self._topics.agreed.publish(agreed)
-        self._requests.answer(agreed, self._map_name)
-        if reason is not None:
-            self._pending = stamp, scan, reason
-            self.publish_initial()
 
     def publish_initial(self) -> None:
         """Publish the pose that waits to be, unless a subscriber has come that would not receive it yet.
@@ -179,10 +158,8 @@ class Localization:
         if self._pending is None or time.monotonic() < self._settled:
             return
         (stamp, scan, reason), self._pending = self._pending, None
-        if scan.pose is None or scan.covariance is None:
-            return
         if reason == "lost":
-            self._health.beat(State.LOST, self._clock.now(), self.values)
+            self._health.beat(State.LOST, self._robot.clock.now(), self.values)
         subscribed = self._topics.initial.subscribed
         self._initial.published(subscribed=subscribed, now=time.monotonic())
         self._watch.reset()
@@ -215,16 +192,20 @@ class Localization:
         next_one = self._transformed + TRANSFORM_PERIOD_NS
         self._transformed = next_one if 0 <= stamp - next_one < TRANSFORM_PERIOD_NS else stamp
         ahead = time_of(stamp + TRANSFORM_TOLERANCE_NS)
-        frames = self._frame_of(self._agreement.latest), self.odom_frame
+        frames = self._frame_of(self._agreement.latest), self._robot.odom_frame
         self._topics.tf.publish(transform_of(ahead, frames, map_from_odom))
 
-    def state(self, *, searched: bool) -> State:
-        """Return the state of the pose; `searched` is whether the last scans could be searched."""
+    def state(self, *, searched: bool, confirmed: bool) -> State:
+        """Return the state; whether the last scans could be searched, and may confirm a pose, is given."""
+        if self.maps is None:
+            return State.NO_MAP
         if self._agreement.latest is None:
             return State.SEARCHING if searched else State.NO_SCAN
         if self._agreement.contradicted:
             return State.CONTRADICTED
-        return State.LOST if self._watch.lost else State.AGREED
+        if self._watch.lost:
+            return State.LOST
+        return State.AGREED if confirmed else State.STALE
 
     @property
     def values(self) -> dict[str, str]:
@@ -235,7 +216,7 @@ class Localization:
             "scans that agree": f"{agreeing} of {self._options.agree}",
             "moved": f"{moved:.2f} m, {math.degrees(turned):.0f} degrees",
         }
-        if latest is not None and latest.pose is not None:
+        if latest is not None:
             values["pose"] = f"{latest.pose.x:.3f} {latest.pose.y:.3f} {latest.pose.theta:.4f}"
             values["stamp"] = f"{latest.stamp / 1e9:.3f}"
             values["map_id"] = self._map_name

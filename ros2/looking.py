@@ -12,17 +12,15 @@ import numpy as np
 import linefix
 from formats.logs.lasers import laser_of
 from formats.logs.sensors import time_increment_of
+from formats.logs.tuning import SAID_TILT
 from formats.report import Notes
 from linefix.ranges import motion_warning
 from registration import IDENTITY, InputError, RigidTransform
 
-from .clock import nanoseconds
-from .frames import Frames
-from .messages import LaserScan, Time
+from .frames import FrameError, Frames, Mount
+from .messages import LaserScan, Time, nanoseconds
 from .odometry import OdometryHistory, Speed
 from .options import MAX_NAME, NodeOptions, quoted
-from .transforms import FrameError, Mount
-from .tuning import LEVEL_TILT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +101,7 @@ def look_of(
     header, place = message.header, mount.base_from_laser
     look = Look(header.stamp, header.frame_id, laser, increment, place, mount.flipped, base_from_then)
     problems = {note.code: note.message for note in notes.assumed.values()}
-    if mount.tilt > LEVEL_TILT:
+    if mount.tilt > SAID_TILT:
         problems["tilted"] = (
             f"the scan plane is tilted by {math.degrees(mount.tilt):.0f} degrees, "
             "expected a horizontal plane; ranges are used without correction"
@@ -188,7 +186,7 @@ def looks_of(
     missing: list[str] = []
     for scan in scans:
         stamp, frame = scan.header.stamp, quoted(scan.header.frame_id)
-        step = odometry.step(looks[0].stamp if looks else stamp, stamp)
+        step = odometry.between(nanoseconds(looks[0].stamp if looks else stamp), nanoseconds(stamp))
         try:
             mount = _mount_of(scan, frames, options, unprefixed)
             if step is None:

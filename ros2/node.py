@@ -5,30 +5,20 @@ from __future__ import annotations
 import gc
 import sys
 import time
-import weakref
 from collections.abc import Callable, Sequence
 
-import linefix
-from registration import IDENTITY
-
-from .clock import NS, Clock
 from .connecting import connect
-from .frames import Frames
-from .health import Health, State
 from .inputs import Inputs
 from .localization import Localization
 from .looking import Gathering, looks_of
-from .map_conversion import MapConverter
-from .maps import Maps
-from .messages import LaserScan, Odometry
-from .odometry import OdometryHistory
+from .maps import MapConverter, Maps
+from .messages import NS, LaserScan
 from .options import NodeOptions, quoted
-from .reporting import answer_marker, stamped_pose, values_of, verdict_of
+from .reporting import WARN, answer_marker, stamped_pose, values_of, verdict_of
+from .robot import Robot
 from .searching import Found, Searcher, search_options
-from .topics import Topics
-from .transforms import FrameError, planar
+from .topics import Waiting
 from .tuning import END_SECONDS, ODOMETRY_SECONDS, SAME_MAP, TRANSFORM_PERIOD_NS
-from .wire import Waiting
 
 BEAT = 0.2  # s between two checks whether to end
 MARGIN = 1e-3  # s; so that a waiting time is over at the next check
@@ -36,11 +26,6 @@ MARGIN = 1e-3  # s; so that a waiting time is over at the next check
 
 def _to_stderr(line: str) -> None:
     print(f"linefix: {line}", file=sys.stderr, flush=True)
-
-
-def _problem(node: Node | None, problem: str) -> None:
-    if node is not None:
-        node._health.problem(problem)
 
 
 class Node:
@@ -68,25 +53,16 @@ class Node:
         maps: Maps | None = None,
         log: Callable[[str], None] = _to_stderr,
     ) -> None:
-        self._options, self._maps, self._generation = options, maps, 0
-        self._clock, self._frames = Clock(simulated=options.use_sim_time), Frames()
-        self._odometry = OdometryHistory(self._clock)
+        self._options, self._unused = options, ""  # why the last map is not used
+        participant = connect(options.domain)
+        self._robot = Robot(participant, options, log)
+        self._topics, self._health, self._odometry = self._robot.topics, self._robot.health, self._robot.odometry
+        self._inputs, self._localization = Inputs(self._robot), Localization(self._robot)
         self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
-        self._unused = ""  # why the last map is not used
         self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
         self._beat = TRANSFORM_PERIOD_NS / NS if options.publish_tf else BEAT
-        participant = connect(options.domain)
-        # Not in a cycle of references: the garbage collector would leave the endpoints of DDS open.
-        node = weakref.ref(self)
-        self._topics = Topics(participant, options, lambda problem: _problem(node(), problem))
-        prefix = f"{options.namespace.strip('/')}/" if options.namespace else ""
-        names = prefix, options.hardware_id or options.namespace.strip("/")
-        self._health = Health(self._topics.diagnostics, self._topics.status, names, log)
-        self._inputs = Inputs(options, self._topics, self._odometry, self._clock, self._health.note)
-        shared = self._frames, self._odometry, self._clock
-        self._localization = Localization(options, self._topics, self._health, *shared)
         self._waiting = Waiting(participant, self._topics.subscriptions)
         self._searcher = Searcher(search_options(options), self._waiting.wake)
         self._converter = MapConverter(self._waiting.wake, options.surface) if options.map_topic else None
@@ -130,62 +106,45 @@ class Node:
 
     def turn(self) -> None:
         """Take the messages and results that have come, and search the newest scans."""
-        for message in self._topics.clock.take()[-1:] if self._topics.clock else ():
-            self._clock.take(message)
-        self._turn_transforms()
+        self._robot.take_clock()
+        self._robot.take_transforms()
+        self._localization.take_localizer()
         self._turn_maps()
         self._localization.take_requests()
-        for odometry in self._topics.odometry.take():
-            self._take_odometry(odometry)
+        self._robot.take_odometry(self._localization.map_frames)
         self._turn_results()
         self._localization.publish_initial()
         self._turn_scans()
         if not self._inputs.transform_stops:
             self._localization.publish_transform()
-        state, doubt = self._state, self._inputs.doubt
-        if state is State.AGREED and doubt:
-            state = State.STALE
+        self._robot.report_undecodable()
+        doubt = self._inputs.doubt
+        state = self._localization.state(searched=self._searched, confirmed=not doubt)
         values = {**self._localization.values, **self._inputs.values}
-        self._health.beat(state, self._clock.now(), values, doubt)
-
-    def _turn_transforms(self) -> None:
-        for topic in self._topics.transforms:
-            for message in topic.take():
-                for problem in self._frames.take(message, static=topic.static, prefix=topic.prefix):
-                    self._health.problem(f"{topic.subscription.name}: {problem}")
-                frame = self._options.frame(self._options.odom_frame)
-                newest = self._frames.newest(frame, self._options.base_of(frame))
-                if newest is not None:
-                    self._odometry.take_transform(*newest, frame)
-        for pose in self._topics.amcl.take():
-            try:
-                self._localization.take_localizer(pose)
-            except FrameError as error:
-                self._health.problem(f"{self._topics.amcl.name}: {error}")
+        self._health.beat(state, self._robot.clock.now(), values, doubt)
 
     def _turn_maps(self) -> None:
         if self._converter is None:
             return
-        for maps in self._topics.maps:
-            for grid in maps.take():
+        for topic in self._topics.maps:
+            for grid in topic.take():
                 self._inputs.map()
                 self._converter.take(grid)
         converted = self._converter.result()
         if converted is None:
             return
-        topic = self._topics.maps[0].name
+        name = self._topics.maps[0].name
         if converted.maps is None:
-            self._unused = f"the map on {topic} is not used: {converted.problem}"
+            self._unused = f"the map on {name} is not used: {converted.problem}"
             self._health.problem(self._unused)
             return
-        same = converted.maps.similarity(self._maps)
-        self._maps = converted.maps
-        self._generation += 1
-        self._localization.use(self._maps, kept=same >= SAME_MAP)
-        walls, frame = len(self._maps.walls_of(None)), self._maps.frame_of(None)
-        changed = f"; {100.0 * (1.0 - same):.1f} % of the walls are new or gone" if self._generation > 1 else ""
+        maps, before = converted.maps, self._localization.maps
+        same = maps.similarity(before)
+        self._localization.use(maps, kept=same >= SAME_MAP)
+        walls, frame = len(maps.walls_of(None)), maps.frame_of(None)
+        changed = f"; {100.0 * (1.0 - same):.1f} % of the walls are new or gone" if before is not None else ""
         kept = "" if not changed else ", the pose is kept" if same >= SAME_MAP else ", the pose is discarded"
-        self._health.log(f"map from {topic}: {converted.size}, {walls} walls, frame {quoted(frame)}{changed}{kept}")
+        self._health.log(f"map from {name}: {converted.size}, {walls} walls, frame {quoted(frame)}{changed}{kept}")
 
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
@@ -219,35 +178,10 @@ class Node:
             self._held = None
             self._take_result(found)
 
-    def _take_odometry(self, message: Odometry) -> None:
-        name, frame = self._topics.odometry.name, message.header.frame_id.strip("/")
-        try:
-            if self._maps is not None and frame in self._maps.frames.values():
-                raise FrameError(
-                    f"found odometry in {quoted(frame)}, the frame of the map, expected a frame of its own, such as "
-                    "odom; choose another topic with --odom"
-                )
-            self._odometry.take(message, self._child_from_base(message.child_frame_id), name)
-        except ValueError as error:  # those of the libraries are such, too
-            self._health.problem(f"{name}: {error}", message.header.stamp)
-
-    def _child_from_base(self, child: str) -> linefix.RigidTransform:
-        """Return where the base is in the child frame of odometry."""
-        child = self._options.frame(child)
-        base = self._options.base_of(child)
-        if child in ("", base):
-            return IDENTITY
-        matrix = self._frames.between(child, base)
-        if matrix is None:
-            raise FrameError(
-                f"found odometry of {quoted(child)}, expected a transform from it to {quoted(base)}; publish one, "
-                "or set the base frame with --base"
-            )
-        return planar(matrix)[0]
-
     def _search(self, scans: Sequence[LaserScan]) -> None:
         stamp = scans[0].header.stamp
-        if self._maps is None:
+        maps = self._localization.maps
+        if maps is None:
             converting = self._converter is not None and self._converter.busy
             problem = (
                 "the map is being converted; scans are searched afterwards"
@@ -256,33 +190,30 @@ class Node:
             )
             self._health.problem(f"{self._topics.maps[0].name}: {problem}", stamp)
             return
-        looks, missing = looks_of(scans, self._frames, self._options, self._odometry, self._topics.unprefixed)
+        looks, missing = looks_of(scans, self._robot.frames, self._options, self._odometry, self._topics.unprefixed)
         for problem in missing:
             self._health.problem(problem, stamp)
         for look in looks:
             for code, note in look.notes.items():
-                self._health.warn(f"{quoted(look.frame)}: {note}", stamp, f"{code} {look.frame}")
+                told, about = f"{quoted(look.frame)}: {note}", f"{code} {look.frame}"
+                self._health.problem(told, stamp, about=about, level=WARN)
         self._searched = bool(looks)
         if looks:
             self._inputs.searched()
-            self._searcher.submit(self._maps.index, looks, self._generation)
+            self._searcher.submit(maps, looks)
 
     def _take_result(self, found: Found) -> None:
         answer, stamp = found.answer, found.stamp
         if answer is None:
             self._health.problem(found.problem, stamp)
             return
-        if found.generation != self._generation or self._maps is None:
+        if found.maps is not self._localization.maps:
             return  # the map has changed meanwhile
-        frame = self._maps.frame_of(answer.map_id)
+        frame = found.maps.frame_of(answer.map_id)
         if answer.usable and answer.pose is not None and answer.covariance is not None:
             self._topics.pose.publish(stamped_pose(stamp, answer.pose, answer.covariance, frame))
         self._topics.markers.publish(answer_marker(answer, stamp, frame))
         if not self._inputs.shared:
-            agreed = self._localization.take(answer, stamp, self._inputs.received)
-            self._inputs.result(usable=answer.usable, agreed=agreed is not None)
+            agreed = self._localization.take(answer, stamp, self._inputs.latency)
+            self._inputs.result(usable=answer.usable, agreed=agreed)
         self._health.publish("scan", stamp, verdict_of(answer), values_of(answer, 1e3 * found.seconds))
-
-    @property
-    def _state(self) -> State:
-        return State.NO_MAP if self._maps is None else self._localization.state(searched=self._searched)

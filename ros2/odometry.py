@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from formats.logs.tracks import Known, Track
-from formats.logs.tuning import JITTER
+from formats.logs.tuning import JITTER, STALE_NS
 from registration import IDENTITY, RigidTransform
 
-from .clock import NS, Clock, nanoseconds
-from .messages import Odometry, Time
-from .transforms import Floats, matrix_in_space, matrix_of, planar
-from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, SAME_PLACE, STALE_NS
+from .clock import Clock, Confirmation
+from .frames import Floats, matrix_in_space, matrix_of, planar
+from .messages import NS, Odometry, Time, nanoseconds
+from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, SAME_PLACE
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
@@ -60,7 +60,7 @@ class OdometryHistory:
         self._tracks = 0  # that came before, of other sources
         self._speeds: deque[tuple[int, Speed]] = deque(maxlen=KEPT)
         self._received = 0  # the newest value, by the clock
-        self._held: tuple[int, Floats, int] | None = None  # a value whose stamp the next one has to confirm
+        self._confirmation = Confirmation[tuple[int, Floats, int]](CLOCK_BACK_NS)
         self._switched: deque[tuple[float, str]] = deque(maxlen=SWITCHES)  # times of messages in another frame
         self._transform: tuple[int, Floats] | None = None  # that messages have to reach before it is compared
         self._apart: tuple[float, str] = -math.inf, ""  # when it differed from messages, and by how much
@@ -111,7 +111,7 @@ class OdometryHistory:
         self._transform, known = None, self._track.known(then)
         if known is None:
             return
-        step = planar(np.linalg.inv(known.matrix) @ matrix)[0]
+        step = planar(np.linalg.inv(known.matrix) @ matrix)
         distance, angle = math.hypot(step.x, step.y), abs(step.theta)
         self._apart = -math.inf, ""
         if max(distance, angle) > JITTER:
@@ -119,19 +119,17 @@ class OdometryHistory:
 
     def _add(self, stamp: int, odom_from_base: Floats, frame: str, source: str) -> None:
         """Add a value; a stamp far from the time by odometry counts when the next one confirms its clock."""
-        now, held, self._held = self._clock.steady(), self._held, None
+        now = self._clock.steady()
         if (frame, source) != (self.frame, self.source):
             if source == self.source:
                 self._switched.append((now / NS, self.frame))
             self.frame, self.source, self._track = frame, source, Track(static=False, most=KEPT)
             self._tracks += 1
-        elif abs(self._track.newest[0] + now - self._received - stamp) > CLOCK_BACK_NS:
-            if held is None or not 0 < stamp - held[0] <= CLOCK_BACK_NS:
-                self._held = stamp, odom_from_base, now
-                return
-            self._track.add(held[0], held[1], received=held[2])
-        self._received = now
-        self._track.add(stamp, odom_from_base, received=now)
+        expected = self._track.newest[0] + now - self._received if len(self._track) else stamp
+        fits = abs(expected - stamp) <= CLOCK_BACK_NS
+        for then, matrix, received in self._confirmation.take(stamp, (stamp, odom_from_base, now), fits=fits):
+            self._track.add(then, matrix, received=received)
+            self._received = now
 
     @property
     def newest(self) -> tuple[int, RigidTransform, Known] | None:
@@ -139,7 +137,7 @@ class OdometryHistory:
         known = self.known(self._track.newest[0]) if len(self._track) else None
         if known is None or self.silent_s > ENDED_SECONDS:
             return None
-        return self._track.newest[0] + self._clock.steady() - self._received, planar(known.matrix)[0], known
+        return self._track.newest[0] + self._clock.steady() - self._received, planar(known.matrix), known
 
     @property
     def silent_s(self) -> float:
@@ -194,21 +192,12 @@ class OdometryHistory:
         if begin == end:
             return IDENTITY
         a, b = (self._track.at(one) if len(self._track) else None for one in (begin, end))
-        return None if a is None or b is None else planar(a)[0].inverse().compose(planar(b)[0])
+        return None if a is None or b is None else planar(a).inverse().compose(planar(b))
 
-    def step(self, begin: Time, end: Time) -> RigidTransform | None:
-        """Return `between` of two stamps of messages."""
-        return self.between(nanoseconds(begin), nanoseconds(end))
-
-    def known(self, stamp: int, received: int | None = None, *, doubted: bool = False) -> Known | None:
-        """Return odom_from_base of something with a stamp and a time of reception; None where it is not known.
-
-        If scans contradict the odometry (`doubted`), the pose is known only where `same_place` holds.
-        """
+    def known(self, stamp: int, received: int | None = None) -> Known | None:
+        """Return odom_from_base of something with a stamp and a time of reception; None where it is not known."""
         known = self._track.known(stamp, received) if len(self._track) else None
-        if known is None or (doubted and received is not None and not self.same_place(stamp, received)):
-            return None
-        return replace(known, part=(self._tracks, *known.part))
+        return None if known is None else replace(known, part=(self._tracks, *known.part))
 
     def same_place(self, stamp: int, received: int) -> bool:
         """Return whether the clocks of a scan and of odometry agree, or the robot hardly moves between their times."""

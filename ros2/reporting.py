@@ -49,8 +49,8 @@ def at_least(covariance: Floats, sigma: float, sigma_theta: float) -> Floats:
         Metres, radians.
     """
     scale = np.array([1.0, 1.0, sigma / sigma_theta if sigma > 0.0 and sigma_theta > 0.0 else 1.0])
-    widened = covariance * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(widened)
+    scaled = covariance * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     floor: Floats = (vectors * np.maximum(values, sigma**2)) @ vectors.T / np.outer(scale, scale)
     return floor
 

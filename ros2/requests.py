@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from .messages import DiagnosticStatus, PoseWithCovarianceStamped, String
 from .options import MAX_NAME
 from .reporting import ERROR, OK, status_of
+from .topics import Publisher, Subscription
 from .tuning import RESULT_SECONDS
-from .wire import Publisher, Subscription
 
 MOST_REQUESTS = 100  # that wait for a pose
 

@@ -7,16 +7,18 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 import linefix
 from formats.logs.tracks import Known
-from registration import InputError
+from registration import IDENTITY, InputError
 
 from .agreement import Observation, Place
-from .clock import NS
+from .frames import planar
 from .looking import Look
-from .messages import Time
+from .maps import Maps
+from .messages import NS, Time
 from .options import NodeOptions
-from .transforms import planar
 from .tuning import INCONCLUSIVE_NATS, RIVAL_NATS, SEARCH_SECONDS
 
 OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
@@ -25,9 +27,10 @@ OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be
 def observation_of(answer: linefix.AssociationResult, known: Known | None, stamp: int) -> Observation:
     """Return an answer for the agreement, with odom_from_base at its stamp (nanoseconds)."""
     best = 0.0 if answer.diagnostics is None else answer.diagnostics.score
-    odometry = () if known is None else (planar(known.matrix)[0], known.part, known.unknown_ns / NS)
+    covariance = np.zeros((3, 3)) if answer.covariance is None else answer.covariance
+    odometry = () if known is None else (planar(known.matrix), known.part, known.unknown_ns / NS)
     return replace(
-        Observation(stamp, answer.pose, answer.covariance, answer.usable, *odometry),
+        Observation(stamp, answer.pose or IDENTITY, covariance, answer.usable, *odometry),
         others=tuple(Place(one.pose, one.map_id) for one in answer.alternatives),
         conclusive=_conclusive(answer),
         rival=any(one.score > best - RIVAL_NATS for one in answer.alternatives),
@@ -74,15 +77,15 @@ class Found:
         Why it cannot be searched.
     seconds : float
         That the search took.
-    generation : int
-        Of the map that was searched, as it was given.
+    maps : Maps
+        Those that were searched.
     """
 
     stamp: Time
     answer: linefix.AssociationResult | None
     problem: str
     seconds: float
-    generation: int
+    maps: Maps
 
 
 class Searcher:
@@ -107,10 +110,10 @@ class Searcher:
         """Return whether a result is still to be taken."""
         return self._search is not None
 
-    def submit(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> None:
+    def submit(self, maps: Maps, looks: Sequence[Look]) -> None:
         """Search a scan; only while not `busy`."""
         self._deadline = linefix.Deadline(time.monotonic() + SEARCH_SECONDS)
-        self._search = self._pool.submit(self._searched, index, looks, generation)
+        self._search = self._pool.submit(self._searched, maps, looks)
         self._search.add_done_callback(lambda _: self._found())
 
     def result(self) -> Found | None:
@@ -126,12 +129,12 @@ class Searcher:
         self._pool.shutdown(wait=False)
         return self._search is None or not wait([self._search], seconds).not_done
 
-    def _searched(self, index: linefix.MapIndex | linefix.MapSet, looks: Sequence[Look], generation: int) -> Found:
+    def _searched(self, maps: Maps, looks: Sequence[Look]) -> Found:
         begun, answer, problem = time.monotonic(), None, ""
         try:
-            answer = locate(index, looks, self._options, self._deadline)
+            answer = locate(maps.index, looks, self._options, self._deadline)
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan
             problem = f"a defect of linefix; please report it: {type(error).__name__}: {error}"
-        return Found(looks[0].stamp, answer, problem, time.monotonic() - begun, generation)
+        return Found(looks[0].stamp, answer, problem, time.monotonic() - begun, maps)

@@ -12,8 +12,6 @@ MAX_MOUNT = 100.0  # m from the base to a laser; the longest vehicles with laser
 MAX_GRID_BYTES = 64 * 2**20  # of an OccupancyGrid: 64 million cells
 MAX_SPEED = 100.0  # m/s
 MAX_TURN_RATE = 100.0  # rad/s
-LEVEL_TILT = math.radians(2.0)  # below this, ranges are less than 0.1 % too long
-STALE_NS = 500_000_000  # ns; a moving transform is not used this long after its last value
 CLOCK_BACK_NS = 1_000_000_000  # ns; stamps that jump back by more are those of a clock that was set back
 
 CLOCK_AHEAD_NS = 5_000_000_000  # ns by which a scan may be newer than the last one; a laser without return has 1 Hz
@@ -70,7 +68,6 @@ MISSED_PERIODS = 3  # of scans, at least, before they count as ended: slow laser
 SEVERAL_SCANS = 3  # within `ENDED_SECONDS`, from which on a publisher counts: drivers start again
 CLOCKS_AGREE = 0.2  # s by which the same times may differ where scans contradict odometry: a scan takes 0.1 s
 SAME_PLACE = 0.03  # m and rad between the places of the robot at two times that are one place, as ODOMETRY_DISTANCE
-CLOCKS_APART = 0.5  # s by which the times from stamp to reception of scans and of odometry may differ
 SILENT_SECONDS = 10.0  # s without scans, a map or a transform, after which that is logged
 RESULT_SECONDS = 30.0  # s after which a request without an agreed pose is answered
 LOG_SECONDS = 60.0  # s within which the same line is logged once

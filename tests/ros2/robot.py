@@ -20,7 +20,7 @@ import numpy as np
 
 import linefix
 from ros2 import Maps, Node, NodeOptions, messages
-from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
+from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 ROOT = Path(__file__).parent.parent.parent
 LOOPBACK = (

@@ -13,7 +13,7 @@ import threading
 from ros2 import domain_of
 from ros2.connecting import connect
 from ros2.messages import String
-from ros2.wire import RELIABLE, Publisher, Subscription
+from ros2.topics import RELIABLE, Publisher, Subscription
 
 
 def speak(name: str) -> None:

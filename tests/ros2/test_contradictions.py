@@ -15,9 +15,9 @@ from ros2 import Maps, NodeOptions, messages
 from ros2.agreement import Agreement, Event, Observation
 from ros2.clock import Clock, time_of
 from ros2.deciding import MapToOdom
-from ros2.map_conversion import convert
+from ros2.maps import convert
 from ros2.odometry import OdometryHistory
-from ros2.wire import RELIABLE, SENSOR, STREAM, Publisher
+from ros2.topics import RELIABLE, SENSOR, STREAM, Publisher
 
 from .robot import ROOM, Robot, grid_of_room, is_at_truth, mount, quaternion, running, scan, wait_until
 from .test_agreement import SECOND, drive, events, first_agreed

@@ -13,7 +13,7 @@ from cyclonedds.domain import DomainParticipant
 import linefix
 from ros2 import NodeOptions, messages
 from ros2.odometry import OdometryHistory
-from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
+from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 from .robot import (
     BASE_FROM_LASER,

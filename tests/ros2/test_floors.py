@@ -14,7 +14,7 @@ import pytest
 
 import linefix
 from ros2 import NodeOptions, messages
-from ros2.wire import LATCHED, RELIABLE, Publisher, Subscription
+from ros2.topics import LATCHED, RELIABLE, Publisher, Subscription
 
 from .robot import FLOORS, MAP_FROM_BASE, bridge, deliver, floors, mount, running
 from .test_fleet import Fleet, amcl_at, moved, stamp_of

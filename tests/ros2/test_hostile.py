@@ -14,8 +14,8 @@ import pytest
 import linefix
 from ros2 import NodeOptions, messages
 from ros2.frames import Frames
+from ros2.topics import LATCHED, RELIABLE, Publisher
 from ros2.tuning import MAX_FRAMES
-from ros2.wire import LATCHED, RELIABLE, Publisher
 
 from .robot import PATIENCE, Robot, bridge, grid_of_room, is_at_truth, mount, running, scan, wait_until
 

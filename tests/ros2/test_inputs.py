@@ -11,8 +11,8 @@ from cyclonedds.qos import Policy, Qos
 
 import linefix
 from ros2 import NodeOptions, messages
-from ros2.map_conversion import MapConverter, digest_of
-from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
+from ros2.maps import MapConverter, digest_of
+from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 from .robot import PATIENCE, Robot, grid_of_room, running, scan, wait_until
 

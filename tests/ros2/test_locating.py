@@ -11,12 +11,11 @@ from linefix_client import Pose, base_from_laser
 import linefix
 from registration import IDENTITY
 from ros2 import messages
-from ros2.frames import Frames
+from ros2.frames import Frames, Mount
 from ros2.looking import look_of
 from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
 from ros2.searching import locate
-from ros2.transforms import Mount
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 WALLS = linefix.Segments.from_array(ROOM)

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from itertools import count
 from typing import Any
 
 import numpy as np
 import pytest
-from cyclonedds.idl import IdlStruct
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from ros2 import messages
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
-SERIALIZED = (IdlStruct, messages.SerializedGrid, messages.SerializedTransforms)
-ALL: dict[str, Any] = {
-    f"{re.split('[.:]', kind.__idl_typename__)[0]}/msg/{name}": kind  # type: ignore[attr-defined]
+ALL = [
+    f"{kind.__idl_typename__.partition('::')[0]}/msg/{name}"
     for name, kind in vars(messages).items()
-    if isinstance(kind, type) and issubclass(kind, IdlStruct) and kind not in SERIALIZED
-}
+    if hasattr(kind, "__idl_typename__") and not name.startswith("Serialized")
+]
 
 
 def filled(name: str, numbers: Any) -> tuple[Any, Any]:
@@ -28,7 +25,7 @@ def filled(name: str, numbers: Any) -> tuple[Any, Any]:
     ours, theirs = {}, {}
     for field, described in TYPES.get_msgdef(name).fields:
         ours[field], theirs[field] = value(described, numbers)
-    return ALL[name](**ours), TYPES.types[name](**theirs)
+    return messages.message(name)(**ours), TYPES.types[name](**theirs)
 
 
 def value(described: Any, numbers: Any) -> tuple[Any, Any]:

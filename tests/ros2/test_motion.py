@@ -11,13 +11,12 @@ import pytest
 import linefix
 from registration import IDENTITY
 from ros2 import messages
-from ros2.frames import Frames
+from ros2.frames import Frames, Mount
 from ros2.looking import Look, look_of, looks_of, motion_of
 from ros2.odometry import OdometryHistory, Speed
 from ros2.options import NodeOptions
 from ros2.searching import locate
-from ros2.transforms import Mount
-from ros2.wire import SENSOR, Publisher
+from ros2.topics import SENSOR, Publisher
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, mount, running
 

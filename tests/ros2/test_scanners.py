@@ -15,7 +15,7 @@ from ros2.looking import Gathering, looks_of
 from ros2.odometry import OdometryHistory
 from ros2.options import NodeOptions
 from ros2.searching import locate
-from ros2.wire import SENSOR, Publisher
+from ros2.topics import SENSOR, Publisher
 
 from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, quaternion
 
@@ -117,19 +117,19 @@ def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
 
 def test_odometry_is_interpolated_and_forgotten() -> None:
     told = OdometryHistory()
-    begin, end = messages.Time(5, 0), messages.Time(5, 250_000_000)
-    assert told.step(begin, begin) == HERE
-    assert told.step(begin, end) is None
+    begin, end = 5 * messages.NS, 5 * messages.NS + messages.NS // 4
+    assert told.between(begin, begin) == HERE
+    assert told.between(begin, end) is None
     told.take(odometry(5, 0, HERE))
     told.take(odometry(5, 500_000_000, linefix.RigidTransform(1.0, 0.0, 0.4)))
-    half = told.step(begin, end)
+    half = told.between(begin, end)
     assert half is not None
     assert (half.x, half.y, half.theta) == pytest.approx((0.5, 0.0, 0.2))
-    assert told.step(begin, messages.Time(7, 0)) is None  # no odometry for a second
+    assert told.between(begin, 7 * messages.NS) is None  # no odometry for a second
     told.take(odometry(2, 0, HERE))  # the clock went back
-    assert told.step(begin, end) is not None  # a single stamp may be wrong
+    assert told.between(begin, end) is not None  # a single stamp may be wrong
     told.take(odometry(2, 100_000_000, HERE))
-    assert told.step(begin, end) is None
+    assert told.between(begin, end) is None
     broken = messages.Odometry()
     broken.pose.pose.orientation = messages.Quaternion(0.0, 0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="quaternion"):
