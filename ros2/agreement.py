@@ -168,7 +168,6 @@ class Agreement:
     _newest: int | None = None
     _confirmation: Confirmation[Observation] = field(default_factory=Confirmation)
     _unexplained: int = 0  # scans since the last agreement that contradict odometry
-    _contradiction: int | None = None  # the stamp of the last of all such scans
 
     @property
     def latest(self) -> Observation | None:
@@ -185,10 +184,6 @@ class Agreement:
         """Return whether so many scans contradict the agreed hypothesis that it is not to be used any more."""
         return self._agreed is not None and self._agreed.against >= tuning.LOST_SCANS
 
-    def doubts_odometry(self, stamp: int) -> bool:
-        """Return whether a scan contradicts odometry not long before a time, nanoseconds."""
-        return self._contradiction is not None and stamp - self._contradiction <= tuning.FORGOTTEN_NS
-
     @property
     def progress(self) -> tuple[int, float, float]:
         """Scans for the best hypothesis less those against it, metres and radians that the robot has moved."""
@@ -198,7 +193,7 @@ class Agreement:
     def reset(self) -> None:
         """Forget everything, as when the robot was carried, or the map changed."""
         self._hypotheses, self._agreed, self._newest = [], None, None
-        self._confirmation, self._unexplained, self._contradiction = Confirmation(), 0, None
+        self._confirmation, self._unexplained = Confirmation(), 0
 
     def take(self, scan: Observation) -> Event:
         """Take the next scan.
@@ -234,7 +229,7 @@ class Agreement:
         if scan.usable and not supported:
             supported = [self._begin(scan)]
             if scan.odometry is not None and against:
-                self._unexplained, self._contradiction = self._unexplained + 1, scan.stamp
+                self._unexplained += 1
         if self._agreed is not None and self._agreed in supported:
             self._agreed.against = 0
             return Event.CONFIRMED

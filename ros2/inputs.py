@@ -69,9 +69,8 @@ class Inputs:
             self._senders.append((now, scan.header.frame_id, getattr(info, "publication_handle", None)))
         self.latency = received - stamp
         offset = self._odometry.clock_offset(stamp, received)
-        self._apart = (
-            self._apart + 1 if abs(offset) * NS > CLOCKS_APART_NS and self._odometry.silent_s < ENDED_SECONDS else 0
-        )
+        apart = abs(offset) > CLOCKS_APART_NS and self._odometry.silent_s < ENDED_SECONDS
+        self._apart = self._apart + 1 if apart else 0
 
     def map(self) -> None:
         """Note that a map has come: if it is not used, that is another problem."""
@@ -200,7 +199,8 @@ class Inputs:
     @property
     def _clocks(self) -> str:
         now = self._clock.steady()
-        return self._odometry.clocks(now - self.latency, now)
+        offset = self._odometry.clock_offset(now - self.latency, now)
+        return f"{self._odometry.clocks(offset)} not used while the robot moves"
 
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._robot.options.domain

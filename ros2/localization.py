@@ -14,6 +14,7 @@ from .clock import time_of
 from .deciding import InitialPose, MapToOdom, Watch
 from .frames import FrameError
 from .health import State
+from .lag import Lag
 from .maps import UNNAMED, Maps
 from .messages import NS, String, Time, nanoseconds
 from .options import quoted
@@ -45,7 +46,7 @@ class Localization:
         self._localizer_map: str | None = None  # of the last pose that was published to a localizer
         self._agreement, self._initial = Agreement(robot.options.agree), InitialPose(robot.options.when)
         self._watch = Watch(robot.frames, robot.odometry, transforms=not robot.options.publish_tf)
-        self._correction = MapToOdom()
+        self._correction, self._lag = MapToOdom(), Lag(robot.odometry)
         self._requests = Requests(robot.topics.named_requests, robot.topics.results)
         self._pending: tuple[Time, Observation, str] | None = None
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
@@ -99,15 +100,22 @@ class Localization:
             except FrameError as error:
                 self._health.problem(f"{self._topics.amcl.name}: {error}")
 
+    def awaits_odometry(self, stamped: Time, latency: int) -> bool:
+        """Return whether odometry of a scan has still to come; `latency` as of `take`."""
+        stamp = nanoseconds(stamped)
+        return self._odometry.awaited(stamp + self._lag.shift(stamp, stamp + latency))
+
     def take(self, answer: linefix.AssociationResult, stamped: Time, latency: int) -> bool:
         """Take the result of a scan that was received so long after its stamp, ns; return whether it is agreed."""
         stamp = nanoseconds(stamped) or nanoseconds(self._robot.clock.now())
         received = stamp + latency
-        known = self._odometry.known(stamp, received)
-        if self._agreement.doubts_odometry(stamp) and not self._odometry.same_place(stamp, received):
-            known = None
-            self._health.problem(self._odometry.clocks(stamp, received), stamped, about="clocks", level=WARN)
-        scan = observation_of(answer, known, stamp)
+        if answer.usable:
+            self._lag.take(observation_of(answer, None, stamp), received)
+        shift = self._lag.shift(stamp, received)
+        if shift:
+            told = f"{self._odometry.clocks(shift)} used by its time of reception"
+            self._health.problem(told, stamped, about="clocks", level=WARN)
+        scan = observation_of(answer, self._odometry.known(stamp + shift, received), stamp)
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
             self._correction = MapToOdom()  # where the clock was set back, the agreement forgets the pose

@@ -173,7 +173,7 @@ class Node:
                     return
                 self._held = found, time.monotonic() + ODOMETRY_SECONDS
             found, until = self._held
-            if self._odometry.awaited(found.stamp) and time.monotonic() < until:
+            if time.monotonic() < until and self._localization.awaits_odometry(found.stamp, self._inputs.latency):
                 return
             self._held = None
             self._take_result(found)

@@ -14,8 +14,8 @@ from registration import IDENTITY, RigidTransform
 
 from .clock import Clock, Confirmation
 from .frames import Floats, matrix_in_space, matrix_of, planar
-from .messages import NS, Odometry, Time, nanoseconds
-from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE, SAME_PLACE
+from .messages import NS, Odometry, nanoseconds
+from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE_NS, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 FRESH_NS = NS // 5  # a speed does not hold for longer
@@ -162,22 +162,19 @@ class OdometryHistory:
         when, told = self._apart
         return told if self._clock.steady() / NS - when < ENDED_SECONDS else ""
 
-    def clock_offset(self, stamp: int, received: int) -> float:
-        """Return how many seconds longer after its stamp a scan was received than odometry was; 0 without odometry."""
-        return (received - stamp - self._track.latency(stamp, received)) / NS if len(self._track) else 0.0
+    def clock_offset(self, stamp: int, received: int) -> int:
+        """Return how many nanoseconds longer after its stamp a scan was received than odometry was; 0 without it."""
+        return received - stamp - self._track.latency(stamp, received) if len(self._track) else 0
 
-    def clocks(self, stamp: int, received: int) -> str:
-        """Return by how much the clock of a scan differs from that of odometry, with the remedy."""
-        offset = self.clock_offset(stamp, received)
-        return (
-            f"the stamps of scans are {abs(offset):.1f} s {'behind' if offset > 0.0 else 'ahead of'} those of odometry "
-            f"on {self.source}; expected at most {CLOCKS_AGREE:g} s. Synchronize the clocks; until then, odometry is "
-            "not used while the robot moves"
-        )
+    def clocks(self, offset: int) -> str:
+        """Return that the clock of scans differs from that of odometry by so many nanoseconds, and the remedy."""
+        side = "behind" if offset > 0 else "ahead of"
+        found = f"the stamps of scans are {abs(offset) / NS:.1f} s {side} those of odometry on {self.source}"
+        return f"{found}; expected at most {CLOCKS_AGREE_NS / NS:g} s. Synchronize the clocks; until then, odometry is"
 
-    def awaited(self, stamp: Time) -> bool:
+    def awaited(self, stamp: int) -> bool:
         """Return whether odometry arrives, but has not reached a stamp."""
-        return bool(len(self._track)) and 0 < nanoseconds(stamp) - self._track.newest[0] <= STALE_NS
+        return bool(len(self._track)) and 0 < stamp - self._track.newest[0] <= STALE_NS
 
     def speed(self, at: int) -> Speed | None:
         """Return the speed of the robot at a time, nanoseconds; None where it is not known."""
@@ -194,15 +191,11 @@ class OdometryHistory:
         a, b = (self._track.at(one) if len(self._track) else None for one in (begin, end))
         return None if a is None or b is None else planar(a).inverse().compose(planar(b))
 
+    def begin_part(self) -> None:
+        """Begin a new part: poses before and after it are not comparable, because they are looked up at other times."""
+        self._tracks += 1
+
     def known(self, stamp: int, received: int | None = None) -> Known | None:
         """Return odom_from_base of something with a stamp and a time of reception; None where it is not known."""
         known = self._track.known(stamp, received) if len(self._track) else None
         return None if known is None else replace(known, part=(self._tracks, *known.part))
-
-    def same_place(self, stamp: int, received: int) -> bool:
-        """Return whether the clocks of a scan and of odometry agree, or the robot hardly moves between their times."""
-        offset = self.clock_offset(stamp, received)
-        if abs(offset) <= CLOCKS_AGREE:
-            return True
-        step = self.between(stamp, stamp + round(offset * NS))
-        return step is not None and max(math.hypot(step.x, step.y), abs(step.theta)) <= SAME_PLACE
