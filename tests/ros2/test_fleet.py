@@ -141,9 +141,9 @@ def test_the_result_of_a_scan_waits_for_its_odometry(
     """By the odometry before, the scan would contradict the agreed pose, and the pose would be corrected."""
     held: list[float] = []  # stamps of results that the node holds back
 
-    def awaited(history: OdometryHistory, stamp: messages.Time, before: Any = OdometryHistory.awaited) -> bool:
+    def awaited(history: OdometryHistory, stamp: int, before: Any = OdometryHistory.awaited) -> bool:
         waits: bool = before(history, stamp)
-        held.extend([stamp.sec + 1e-9 * stamp.nanosec] * waits)
+        held.extend([stamp / messages.NS] * waits)
         return waits
 
     monkeypatch.setattr("ros2.node.ODOMETRY_SECONDS", 3600.0)
