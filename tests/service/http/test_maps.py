@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sqlite3
-
 import httpx
 
 from linefix.documents import examples
 from tests.running import RunningService, until
+from tests.service.asking import answered
+from tests.service.maps.stores import alter
 
 
 def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:
@@ -65,9 +65,6 @@ def test_revisions_and_conditions(client: httpx.Client) -> None:
     client.delete(url)
 
 
-REVERSED = [[x2, y2, x1, y1] for x1, y1, x2, y2 in examples.SEEN]
-
-
 def test_properties_go_with_the_map(client: httpx.Client) -> None:
     """Put, got, listed; a change of one is a new revision with another tag."""
     url = "/v1/maps/properties"
@@ -84,33 +81,7 @@ def test_properties_go_with_the_map(client: httpx.Client) -> None:
     assert len(set(tags)) == len(tags)
     assert client.get(url, headers={"if-none-match": tags[-2]}).status_code == 200
     assert client.get(url, headers={"if-none-match": tags[-1]}).status_code == 304
-    for wrong in ("no", 0, 1, []):
-        refused = client.put(url, json=plain | {"oriented": wrong})
-        assert (refused.status_code, refused.json()["errors"][0]["pointer"]) == (422, "/oriented")
     client.delete(url)
-
-
-def test_a_property_counts_unless_the_request_says_otherwise(client: httpx.Client) -> None:
-    """Stored or sent, alone or in a batch: a scan that runs the other way fits where directions mean nothing."""
-    undirected = {"segments": examples.WALLS, "oriented": False}
-    client.put("/v1/maps/undirected", json=undirected).raise_for_status()
-    scan = {"segments": REVERSED, "viewpoint": None}
-    for where in ({"map_id": "undirected"}, undirected, {**undirected, "meta": "a file of its own"}):
-        for options, usable in (({}, True), ({"oriented": None}, True), ({"oriented": True}, False)):
-            one = client.post("/v1/associate", json={"map": where, "scan": scan, "options": options}).json()
-            assert one["usable"] is usable, (where, options)
-            many = client.post("/v1/associate:batch", json={"map": where, "scans": [scan], "options": options}).json()
-            assert many["results"][0]["result"]["usable"] is usable
-    directed = {"segments": examples.WALLS}
-    asked = {"map": directed, "scan": scan, "options": {"oriented": False}}
-    assert client.post("/v1/associate", json=asked).json()["usable"]
-
-
-def test_a_property_counts_for_known_correspondences(client: httpx.Client) -> None:
-    scan = {"segments": REVERSED}
-    for own, option, usable in ((None, {}, False), (False, {}, True), (False, {"oriented": True}, False)):
-        body = {"map": {"segments": examples.WALLS, "oriented": own}, "scan": scan, "options": option}
-        assert client.post("/v1/register", json=body).json()["usable"] is usable, (own, option)
 
 
 def test_a_listing_has_pages(client: httpx.Client) -> None:
@@ -132,49 +103,33 @@ def test_a_listing_has_pages(client: httpx.Client) -> None:
     assert (rest["corrupt"], client.get("/v1/maps", params={"cursor": "zzz"}).json()["next"]) == ([], None)
 
 
-def test_a_changed_map_is_searched_in_its_new_form(client: httpx.Client) -> None:
-    body = {"map": {"map_id": "changing"}, "scan": {"segments": examples.SEEN}}
-    client.put("/v1/maps/changing", json=examples.MAP)
-    assert client.post("/v1/associate", json=body).json()["map"] == {"map_id": "changing", "revision": 1}
-    client.put("/v1/maps/changing", json={"segments": examples.WALLS, "frame_id": "other"})
-    answer = client.post("/v1/associate", json=body).json()
-    assert answer["map"] == {"map_id": "changing", "revision": 2}
-    assert answer["frame_id"] == "other"
-    client.delete("/v1/maps/changing")
-    assert client.post("/v1/associate", json=body).json()["code"] == "unknown_map"
-
-
 def test_a_damaged_map_is_named_and_not_served(service: RunningService) -> None:
-    running = service
-    running.client.put("/v1/maps/damaged", json=examples.MAP)
-    running.client.put("/v1/maps/whole", json=examples.MAP)
-    with sqlite3.connect(running.data_dir / "maps.sqlite3") as database:
-        database.execute(
-            "UPDATE map_documents SET document = CAST(replace(document, '4', '5') AS BLOB) WHERE map_id = 'damaged'"
-        )
-    database.close()
-    assert running.client.get("/v1/maps/damaged").json()["code"] == "map_corrupt"
-    body = {"map": {"map_id": "damaged"}, "scan": {"segments": examples.SEEN}}
-    assert running.client.post("/v1/associate", json=body).status_code == 409
-    assert running.client.get("/v1/maps/whole").status_code == 200
-    listed = running.client.get("/v1/maps").json()
-    assert ("whole" in {item["map_id"] for item in listed["maps"]}, listed["corrupt"]) == (True, ["damaged"])
-    until(lambda: "map quarantined" in running.log())  # lines are written by a thread of their own
-    quarantined = [line for line in running.log().splitlines() if "map quarantined" in line]
-    assert len(quarantined) == 1
-    assert '"damaged"' in quarantined[0]
-    assert running.client.put("/v1/maps/damaged", json=examples.MAP).status_code == 200
-    assert running.client.get("/v1/maps/damaged").json() == examples.MAP
+    client = service.client
     for name in ("damaged", "whole"):
-        running.client.delete(f"/v1/maps/{name}")
+        client.put(f"/v1/maps/{name}", json=examples.MAP).raise_for_status()
+    alter(
+        f"sqlite:///{service.data_dir / 'maps.sqlite3'}",
+        "UPDATE map_documents SET document = CAST(replace(document, '4', '5') AS BLOB) WHERE map_id = 'damaged'",
+    )
+    body = {"map": {"map_id": "damaged"}, "scan": {"segments": examples.SEEN}}
+    for answer in (client.get("/v1/maps/damaged"), client.post("/v1/associate", json=body)):
+        assert (answer.status_code, answer.json()["code"]) == (409, "map_corrupt")
+    listed = client.get("/v1/maps").json()
+    assert ("whole" in {item["map_id"] for item in listed["maps"]}, listed["corrupt"]) == (True, ["damaged"])
+    until(lambda: "map quarantined" in service.log())  # lines are written by a thread of their own
+    (quarantined,) = [line for line in service.log().splitlines() if "map quarantined" in line]
+    assert '"damaged"' in quarantined
+    assert client.put("/v1/maps/damaged", json=examples.MAP).status_code == 200
+    assert client.get("/v1/maps/damaged").json() == examples.MAP
+    for name in ("damaged", "whole"):
+        client.delete(f"/v1/maps/{name}")
 
 
 def test_what_is_stored_can_be_searched(client: httpx.Client) -> None:
     """Two pieces of one wall are longer together than a segment may be."""
     segments = [[0.0, 0.0, 6e3, 0.0], [6e3, 0.0, 1.2e4, 0.0], [1.2e4, 0.0, 1.2e4, 50.0], [0.0, 50.0, 0.0, 0.0]]
     assert client.put("/v1/maps/long", json={"segments": segments}).status_code == 201
+    asked = {"map": {"map_id": "long"}, "scan": {"segments": [[1.0, -1.0, 5.0, -1.0]]}}
     for oriented in (True, False):
-        body = {"map": {"map_id": "long"}, "scan": {"segments": [[1.0, -1.0, 5.0, -1.0]]}}
-        answer = client.post("/v1/associate", json={**body, "options": {"oriented": oriented}})
-        assert answer.status_code == 200, answer.text
+        answered(client, "/v1/associate", asked, options={"oriented": oriented})
     client.delete("/v1/maps/long")
