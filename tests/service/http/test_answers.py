@@ -8,7 +8,6 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from pytest import approx
 
 from linefix.documents import examples
 from linefix.warmup import ROOM
@@ -27,16 +26,24 @@ RECTANGLE = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]
 CORNER = {"segments": [[-3.5, 1.0, -3.5, -3.0], [-3.5, -3.0, 2.5, -3.0]]}
 REVERSED = {"segments": [[x2, y2, x1, y1] for x1, y1, x2, y2 in examples.SEEN]}
 FRONT = Scanner(541, -0.75 * math.pi, 1.5 * math.pi / 540, range_max=30.0, sigma=0.01)
-STUCK = scanned()
-POINTS = [
-    [r * math.cos(a), r * math.sin(a)]
-    for r, a in zip(STUCK["ranges"], np.arange(720) * math.tau / 720 - math.pi, strict=True)
-]
+LASER, SAME = scanned(), {(k, k) for k in range(6)}
+SEEN = LASER["ranges"]
+TURN = np.arange(720) * math.tau / 720 - math.pi
+POINTS = (np.array(SEEN)[:, None] * np.stack([np.cos(TURN), np.sin(TURN)], axis=1)).tolist()
 
 
 def found(distance: float = 1e-6) -> dict[str, Any]:
     """Return what the answer has where the pose is that of the example."""
-    return {"status": "ok", "usable": True, "pose": approx(AT, abs=distance)}
+    return {"status": "ok", "usable": True, "pose": pytest.approx(AT, abs=distance)}
+
+
+def ranges(told: list[float | None], **more: Any) -> dict[str, Any]:
+    return {**LASER, "ranges": told, **more}
+
+
+def view(mount: RigidTransform, first: int = 0, before: Any = (), last: int = 6) -> dict[str, Any]:
+    """Return what a sensor with a mount sees of the room's walls from the first to the last, after something else."""
+    return {"segments": [*before, *seen_from(HERE.compose(mount))[first:last]], "pose": pose_json(mount)}
 
 
 def mounted(*, flipped: bool) -> dict[str, Any]:
@@ -51,187 +58,92 @@ def of_map(own: bool | None) -> dict[str, Any]:
     return {"segments": examples.WALLS, "oriented": own}
 
 
-REGISTERED = {
-    **found(1e-12),
-    "residuals.scan": [0, 1],
-    "residuals.map": [0, 1],
-    "diagnostics.pairs": 2,
-    "diagnostics.dof": 1,
-    # 8 m and 4 m of wall at 5 cm a point, 2 cm of noise each.
-    "residuals.weight": approx([160 / 4e-4, 80 / 4e-4]),
-    "diagnostics.reliability": approx(2 * math.sqrt(160 * 80) / 240),
-    "diagnostics.ambiguity_at": None,
-    "unobservable": None,
-    "timing_ms": lambda told: told.keys() == {"decode", "search", "total"},
-    "request_id": len,
-}
 OF_PAPER = {"estimator": "one_step", "rotation": "mitsuta"}
 NO_MATCH = {"status": "no_match", "pose": None, "usable": False, "reasons.code": ["not_on_map"]}
 DEGENERATE = {"status": "degenerate", "usable": False, "probability": None, "unobservable": len}
-# What is asked, parts in place of those of an example, and what the answer has: values, or functions of them.
+# 8 m and 4 m of wall at 5 cm a point, 2 cm of noise each.
+REGISTERED = {
+    **found(1e-12), "residuals.scan": [0, 1], "residuals.map": [0, 1], "diagnostics.pairs": 2, "diagnostics.dof": 1,
+    "residuals.weight": pytest.approx([160 / 4e-4, 80 / 4e-4]), "unobservable": None, "request_id": len,
+    "diagnostics.reliability": pytest.approx(2 * (160 * 80) ** 0.5 / 240), "diagnostics.ambiguity_at": None,
+}  # fmt: skip
+FIELDS_OF_CUT = ("point_counts", "centroids", "spreads", "sigmas", "rms")
+# What is asked, parts in place of those of an example, and what the answer has: values, or conditions on them.
 ANSWERS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "pairs": (REGISTER, {}, REGISTERED),
     "pairs, i with i by default": (REGISTER, {"correspondences": None}, REGISTERED),
     "pairs, the paper's estimator": (
-        REGISTER,
-        {"options": {**OF_PAPER, "evaluate_at": AT, "k_rotation": 2.0}, "weighting": "uniform"},
-        {
-            "covariance": None,
-            "pose": approx(AT, abs=1e-9),
-            "residuals.weight": [1.0, 1.0],
-            "diagnostics.ambiguity_at.total": approx(0.0, abs=1e-9),
-            "diagnostics.ambiguity_before.rotation": approx(2.0 * 2 * (math.pi / 2) ** 2),
-        },
-    ),
+        REGISTER, {"options": {**OF_PAPER, "evaluate_at": AT, "k_rotation": 2.0}, "weighting": "uniform"},
+        {"covariance": None, "pose": pytest.approx(AT, abs=1e-9), "residuals.weight": [1.0, 1.0],
+         "diagnostics.ambiguity_at.total": pytest.approx(0.0, abs=1e-9),
+         "diagnostics.ambiguity_before.rotation": pytest.approx(2.0 * 2 * (math.pi / 2) ** 2)}),
     "pairs that are parallel": (
-        REGISTER,
-        {"correspondences": [[0, 0]]},
-        {
-            "status": "degenerate",
-            "usable": False,
-            "covariance": None,
-            "unobservable": lambda told: np.abs(told) == approx([1.0, 0.0], abs=1e-9),
-        },
-    ),
+        REGISTER, {"correspondences": [[0, 0]]},
+        {"status": "degenerate", "usable": False, "covariance": None,
+         "unobservable": lambda told: np.abs(told) == pytest.approx([1.0, 0.0], abs=1e-9)}),
     "no pairs": (REGISTER, {"correspondences": []}, {"status": "degenerate", "pose": None, "residuals": []}),
     "pairs with weights": (REGISTER, {"weights": [3.0, 5.0]}, {"residuals.weight": [3.0, 5.0]}),
-    **{
-        f"pairs, reversed, of a map that is oriented: {own}, {option}": (
-            REGISTER,
-            {"map": of_map(own), "scan": REVERSED, "options": option, "correspondences": None},
-            {"usable": usable},
-        )
-        for own, option, usable in ((None, {}, False), (False, {}, True), (False, {"oriented": True}, False))
-    },
+    **{f"pairs, reversed, of a map that is oriented: {own}, {option}":
+       (REGISTER, {"map": of_map(own), "scan": REVERSED, "options": option, "correspondences": None},
+        {"usable": usable})
+       for own, option, usable in ((None, {}, False), (False, {}, True), (False, {"oriented": True}, False))},
     "segments": (
-        ASSOCIATE,
-        {"client_ref": {"n": 1}, "scan": {**examples.ASSOCIATE["scan"], "stamp": [7, "s"]}},
-        {
-            **found(),
-            "correspondences": lambda told: {(one["scan"], one["map"]) for one in told} == {(i, i) for i in range(6)},
-            "frame_id": "map",
-            "child_frame_id": "laser",
-            "stamp": [7, "s"],
-            "client_ref": {"n": 1},
-            "map": None,
-            "unmatched_scan": [],
-            "segments": None,
-            "reasons": [],
-            "search.complete": True,
-            "timing_ms": lambda told: told.keys() == {"decode", "search", "total"},
-        },
-    ),
+        ASSOCIATE, {"client_ref": {"n": 1}, "scan": {**examples.ASSOCIATE["scan"], "stamp": [7, "s"]}},
+        {**found(), "correspondences": lambda told: {(one["scan"], one["map"]) for one in told} == SAME,
+         "frame_id": "map", "child_frame_id": "laser", "stamp": [7, "s"], "client_ref": {"n": 1}, "map": None,
+         "unmatched_scan": [], "segments": None, "reasons": [], "search.complete": True,
+         "timing_ms": lambda told: told.keys() == {"decode", "search", "total"}}),
     "ranges, one of them null": (
-        ASSOCIATE,
-        {"scan": {"laser": {**scanned(), "range_min": 0.1} | {"ranges": [None, *STUCK["ranges"][1:]]}, "sigma": None}},
-        {**found(0.02), "segments": lambda told: len(told) >= len(ROOM), "warnings": []},
-    ),
+        ASSOCIATE, {"scan": {"laser": ranges([None, *SEEN[1:]], range_min=0.1), "sigma": None}},
+        {**found(0.02), "segments": lambda told: len(told) >= len(ROOM), "warnings": []}),
     "ranges that are stuck": (
-        ASSOCIATE,
-        {"scan": {"laser": {**STUCK, "ranges": [2.0] * 400 + STUCK["ranges"][400:]}}},
-        {"warnings.code": ["stuck_ranges"], "warnings.message": lambda told: told[0].endswith((".", "?"))},
-    ),
+        ASSOCIATE, {"scan": {"laser": ranges([2.0] * 400 + SEEN[400:])}},
+        {"warnings.code": ["stuck_ranges"], "warnings.message": lambda told: told[0].endswith((".", "?"))}),
     "ranges in feet": (
-        ASSOCIATE,
-        {"scan": {"laser": {**STUCK, "ranges": [3.28 * r for r in STUCK["ranges"]]}}},
-        {"warnings.code": lambda told: "scan_exceeds_map" in told},
-    ),
+        ASSOCIATE, {"scan": {"laser": ranges([3.28 * r for r in SEEN])}},
+        {"warnings.code": lambda told: "scan_exceeds_map" in told}),
     "points": (ASSOCIATE, {"scan": {"points": POINTS}}, found(0.02)),
-    **{
-        f"a scan of no {kind}": (ASSOCIATE, {"scan": scan}, NO_MATCH)
-        for kind, scan in {
-            "segments": {"segments": []},
-            "points": {"points": []},
-            "ranges": {"laser": {**STUCK, "ranges": [None] * 10}},
-        }.items()
-    },
+    **{f"a scan of nothing: {[*scan]}": (ASSOCIATE, {"scan": scan}, NO_MATCH)
+       for scan in ({"segments": []}, {"points": []}, {"laser": ranges([None] * 10)})},
     "a single wall": (
-        ASSOCIATE,
-        {"scan": {"segments": examples.SEEN[:1]}},
-        {"usable": False, "reasons": lambda told: told and {*told[0]} == {"code", "message"}},
-    ),
+        ASSOCIATE, {"scan": {"segments": examples.SEEN[:1]}},
+        {"usable": False, "reasons": lambda told: told and {*told[0]} == {"code", "message"}}),
     "a soft prior": (ASSOCIATE, {"prior": {**AT, "covariance": np.diag([0.1] * 3).tolist()}}, {"status": "ok"}),
     "a hard prior": (ASSOCIATE, {"prior": {**AT, "radius": 1.0, "angle": 0.5}}, {"status": "ok"}),
     "the paper's estimator": (ASSOCIATE, {"options": OF_PAPER}, {**found(), "covariance": None}),
     # Its critical wall, down to where alternatives were looked for, and the paper's measures of each alternative.
     "a corner of a rectangle": (
-        ASSOCIATE,
-        {"map": RECTANGLE, "scan": CORNER, "options": {"sampling": "random", "seed": 4}},
-        {
-            "search.sampling": "random",
-            "search.seed": 4,
-            "search.complete_above": lambda told: 0.5 < told < 1.0,
-            "diagnostics.critical_wall.displacement": lambda told: told > 1.0,
-            "diagnostics.critical_wall.scan": lambda told: len(told) == 1,
-            "diagnostics.critical_wall.map": lambda told: len(told) == 1,
-            "diagnostics.critical_wall.direction": lambda told: math.hypot(*told) == approx(1.0),
-            "alternatives.ambiguity.total": lambda told: told and min(told) >= 0.0,
-            "alternatives.reliability": lambda told: 0.0 <= min(told) <= max(told) <= 1.0,
-        },
-    ),
+        ASSOCIATE, {"map": RECTANGLE, "scan": CORNER, "options": {"sampling": "random", "seed": 4}},
+        {"search.sampling": "random", "search.seed": 4, "search.complete_above": lambda told: 0.5 < told < 1.0,
+         "diagnostics.critical_wall": lambda wall: wall["displacement"] > 1.0 and len(wall["scan"] + wall["map"]) == 2,
+         "diagnostics.critical_wall.direction": lambda told: math.hypot(*told) == pytest.approx(1.0),
+         "alternatives.ambiguity.total": lambda told: told and min(told) >= 0.0,
+         "alternatives.reliability": lambda told: 0.0 <= min(told) <= max(told) <= 1.0}),
     "one wall of a corridor": (ASSOCIATE, {"map": CORRIDOR, "scan": {"segments": ALONG[:1]}}, DEGENERATE),
     "both walls of a corridor": (ASSOCIATE, {"map": CORRIDOR, "scan": {"segments": ALONG}}, DEGENERATE),
     "a sensor with its mount": (
-        ASSOCIATE,
-        {"scan": {"views": [{"segments": seen_from(HERE.compose(LEFT)), "pose": pose_json(LEFT)}], "stamp": 7}},
-        {**found(), "child_frame_id": "base_link", "stamp": 7, "segments": [None]},
-    ),
+        ASSOCIATE, {"scan": {"views": [view(LEFT)], "stamp": 7}},
+        {**found(), "child_frame_id": "base_link", "stamp": 7, "segments": [None]}),
     "views, whose segments are named by view and index": (
-        ASSOCIATE,
-        {
-            "scan": {
-                "views": [
-                    {"segments": seen_from(HERE.compose(LEFT))[:4], "pose": pose_json(LEFT)},
-                    {
-                        "segments": [[0.5, 0.5, 0.7, 0.9], *seen_from(HERE.compose(RIGHT))[2:]],
-                        "pose": pose_json(RIGHT),
-                    },
-                ]
-            }
-        },
-        {
-            **found(1e-3),
-            "unmatched_scan": [{"view": 1, "scan": 0}],
-            "correspondences": lambda told: (
-                {(one["view"], one["scan"], one["map"]) for one in told}
-                == {(0, k, k) for k in range(4)} | {(1, k, k + 1) for k in range(1, 5)}
-            ),
-        },
-    ),
-    **{
-        f"two scanners, upside down: {flipped}": (
-            ASSOCIATE,
-            {"scan": mounted(flipped=flipped)},
-            {
-                **found(0.02),
-                "child_frame_id": "base",
-                # In the frame that the views share.
-                "segments": lambda told: (
-                    len(told) == 2 and HERE.apply(np.array(told[1]).reshape(-1, 2, 2))[..., 0].min() > -4.05
-                ),
-                "correspondences.view": lambda told: {*told} == {0, 1},
-            },
-        )
-        for flipped in (False, True)
-    },
-    **{
-        f"a step of {cov[0][0]} m^2, exact otherwise": (
-            ASSOCIATE,
-            {"scan": {"views": [VIEW, {**VIEW, "covariance": cov}]}},
-            found(0.02),
-        )
-        for cov in (np.zeros((3, 3)).tolist(), np.diag([0.01, 0, 0]).tolist())
-    },
+        ASSOCIATE, {"scan": {"views": [view(LEFT, last=4), view(RIGHT, 2, [[0.5, 0.5, 0.7, 0.9]])]}},
+        {**found(1e-3), "unmatched_scan": [{"view": 1, "scan": 0}],
+         "correspondences": lambda told: {(one["view"], one["scan"], one["map"]) for one in told}
+         == {(0, k, k) for k in range(4)} | {(1, k, k + 1) for k in range(1, 5)}}),
+    # Segments are in the frame that the views share.
+    **{f"two scanners, one upside down: {flipped}": (
+        ASSOCIATE, {"scan": mounted(flipped=flipped)},
+        {**found(0.02), "child_frame_id": "base", "correspondences.view": lambda told: {*told} == {0, 1},
+         "segments": lambda told: len(told) == 2 and HERE.apply(np.reshape(told[1], (-1, 2)))[:, 0].min() > -4.05})
+       for flipped in (False, True)},
+    **{f"a step of {variance} m^2 along x, exact otherwise": (
+        ASSOCIATE, {"scan": {"views": [VIEW, {**VIEW, "covariance": np.diag([variance, 0, 0]).tolist()}]}}, found(0.02))
+       for variance in (0.0, 0.01)},
     # Counter-clockwise, free space on the left: up the wall at x = 2, then back along y = 2.
     "a corner, vectorized": (
-        VECTORIZE,
-        examples.VECTORIZE,
-        {
-            "segments": lambda told: np.allclose(told, [[2.0, 0.0, 2.0, 2.0], [2.0, 2.0, 0.1, 2.0]], atol=0.05),
-            **dict.fromkeys(("point_counts", "centroids", "spreads", "sigmas", "rms"), lambda told: len(told) == 2),
-        },
-    ),
-}
+        VECTORIZE, examples.VECTORIZE,
+        {"segments": lambda told: np.allclose(told, [[2.0, 0.0, 2.0, 2.0], [2.0, 2.0, 0.1, 2.0]], atol=0.05),
+         **dict.fromkeys(FIELDS_OF_CUT, lambda told: len(told) == 2)}),
+}  # fmt: skip
 
 
 def at(value: Any, place: str) -> Any:
@@ -328,7 +240,7 @@ def test_a_bad_scan_in_a_batch_is_one_error_item(client: httpx.Client) -> None:
 
 
 def test_what_vectorize_gives_can_be_sent_back(client: httpx.Client) -> None:
-    cut = answered(client, VECTORIZE, laser=STUCK)
+    cut = answered(client, VECTORIZE, laser=LASER)
     scan = {name: cut[name] for name in ("segments", "point_counts", "centroids", "spreads")}
     answer = answered(client, ASSOCIATE, examples.ASSOCIATE, scan={**scan, "sigma": cut["sigmas"]})
-    assert (answer["status"], answer["pose"]) == ("ok", approx(AT, abs=0.02))
+    assert (answer["status"], answer["pose"]) == ("ok", pytest.approx(AT, abs=0.02))

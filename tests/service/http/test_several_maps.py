@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import httpx
-from pytest import approx
+import pytest
 
 from linefix.documents import examples
 from tests.service.asking import HERE, answered, pose_json
@@ -26,7 +26,7 @@ def test_the_map_of_the_pose_is_named_and_all_are_listed(client: httpx.Client) -
     answer = asked(client)
     assert (answer["status"], answer["usable"], answer["frame_id"]) == ("ok", True, "room_frame")
     assert answer["map"] == {"map_id": "room", "revision": None}
-    assert answer["pose"] == approx(pose_json(HERE), abs=1e-6)
+    assert answer["pose"] == pytest.approx(pose_json(HERE), abs=1e-6)
     assert {(pair["scan"], pair["map"]) for pair in answer["correspondences"]} == {(i, i) for i in range(6)}
     best, other = answer["maps"]
     assert best.keys() == {"map_id", "revision", "status", "score", "probability", "pose"}
