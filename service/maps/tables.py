@@ -164,13 +164,10 @@ def require_tables(engine: Engine, writer: Engine) -> None:
 
 def _are_there(connection: Connection) -> bool:
     """Return whether the tables are there; raise `StoreError` where they are not those above."""
-    found = inspect(connection)
     wanted = {name: set(table.columns.keys()) for name, table in metadata.tables.items()}
-    there = {
-        name: set(connection.execute(text(f"SELECT * FROM {name} LIMIT 0")).keys())
-        for name in wanted
-        if found.has_table(name)
-    }
+    there = _found(connection)
+    if 0 < len(there) < len(wanted):  # another worker has just created them, all in one transaction
+        there = _found(connection)
     if not there:
         return False
     version = None
@@ -184,6 +181,13 @@ def _are_there(connection: Connection) -> bool:
     if there != wanted:
         raise damaged()
     return True
+
+
+def _found(connection: Connection) -> dict[str, set[str]]:
+    """Return the columns of those of the tables that are there."""
+    found = inspect(connection)
+    names = [name for name in metadata.tables if found.has_table(name)]
+    return {name: set(connection.execute(text(f"SELECT * FROM {name} LIMIT 0")).keys()) for name in names}
 
 
 def digest(document: object) -> str:
