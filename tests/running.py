@@ -77,6 +77,28 @@ class RunningService:
         with socket.create_connection(("127.0.0.1", self.port), timeout, (source, 0)) as connection:
             yield connection
 
+    def talk(self, *pieces: bytes, pause: float = 0.0, end: bool = False) -> bytes:
+        """Send pieces below HTTP; return everything that is answered until the service closes the connection."""
+        answer = b""
+        with self.connection(PATIENCE) as connection, suppress(ConnectionError):
+            with suppress(ConnectionError):
+                for piece in pieces:
+                    connection.sendall(piece)
+                    time.sleep(pause)
+                if end:
+                    connection.shutdown(socket.SHUT_WR)
+            while part := connection.recv(65_536):
+                answer += part
+        return answer
+
+    @contextmanager
+    def grows_by_less_than(self, megabytes: float) -> Iterator[None]:
+        """Fail where its processes together have held more than so much more within the block."""
+        with self.peak_mb() as peak:
+            before = self.memory_mb()
+            yield
+            assert peak() - before < megabytes
+
 
 def client_of(url: str, timeout: float = PATIENCE, **headers: str) -> httpx.Client:
     """Return a client with connections of its own.

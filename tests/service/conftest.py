@@ -14,6 +14,8 @@ import pytest
 from service.database_location import database_url
 from service.maps import MapStore
 
+from .maps.stores import Lookup
+
 SERVER = "LINEFIX_TEST_POSTGRESQL"
 LOCAL = "postgresql://postgres@127.0.0.1:5432/test"
 
@@ -60,3 +62,11 @@ def store(database: str) -> Iterator[MapStore]:
     opened.open()
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def lookup(tmp_path: Path) -> Iterator[Lookup]:
+    made = Lookup(tmp_path)
+    yield made
+    made.parser.close()
+    made.store.close()

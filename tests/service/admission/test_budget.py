@@ -2,67 +2,40 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack, nullcontext
+
 import pytest
 
 from service.admission.budget import ByteBudget
 from service.errors import ShareHeldError, TooMuchHeldError
 
+# Bytes of all, and of the largest piece; what is taken and given back in turn: by a, by A, which is of the same holder,
+# or by b; whether all together (!) or the holder (?) would have too much then; and what is held at the end.
+TAKEN = {
+    "no more than there are": (10, 7, "a4 b5 a1 a-2 a2 a1! b1!", 10),
+    "nobody has more than half": (10, 0, "a3 A2 a1? A1? b5 a-1 b1? A1 a1? A1?", 10),
+    "nor is there half of one": (1, 0, "a1?", 0),
+    "the largest piece may always come": (10, 8, "a8 a1? b3! b2", 10),
+}
 
-def test_all_together_hold_no_more_than_allowed() -> None:
-    budget = ByteBudget(10, least_share=7)
-    with budget.account(b"one") as one, budget.account(b"other") as other:
-        one.take(4)
-        other.take(5)
-        one.take(1)
-        one.take(-2)
-        one.take(2)
-        assert budget.held == 10
-        for account in (one, other):
-            with pytest.raises(TooMuchHeldError):
-                account.take(1)
-        assert (one.taken, other.taken, budget.held) == (5, 5, 10)
+
+@pytest.mark.parametrize("kind", TAKEN)
+def test_what_is_held(kind: str) -> None:
+    most, least_share, steps, held = TAKEN[kind]
+    budget = ByteBudget(most, least_share=least_share)
+    with ExitStack() as stack:
+        accounts = {name: stack.enter_context(budget.account(name.lower().encode())) for name in "aAb"}
+        for step in steps.split():
+            error = {"!": TooMuchHeldError, "?": ShareHeldError}.get(step[-1])
+            with nullcontext() if error is None else pytest.raises(error):
+                accounts[step[0]].take(int(step[1:].rstrip("!?")))
+        assert budget.held == sum(account.taken for account in accounts.values()) == held
     assert budget.held == 0
 
 
 def test_what_one_gives_back_another_may_take() -> None:
     budget = ByteBudget(10, least_share=10)
-    with budget.account() as one:
-        one.take(10)
-    with pytest.raises(ShareHeldError), budget.account() as failing:
-        failing.take(11)
-    with pytest.raises(ZeroDivisionError), budget.account() as failing:
-        failing.take(10 // budget.held)
-    with budget.account() as other:
-        other.take(10)
-        assert budget.held == 10
-
-
-def test_nobody_holds_more_than_half() -> None:
-    budget = ByteBudget(10)
-    with budget.account(b"one") as one, budget.account(b"one") as again, budget.account(b"other") as other:
-        one.take(3)
-        again.take(2)
-        for account in (one, again):
-            with pytest.raises(ShareHeldError):
-                account.take(1)
-        other.take(5)
-        one.take(-1)
-        with pytest.raises(ShareHeldError):
-            other.take(1)
-        again.take(1)
-        for account in (one, again):  # the rest was held all the time
-            with pytest.raises(ShareHeldError):
-                account.take(1)
-    with ByteBudget(1).account() as one, pytest.raises(ShareHeldError):
-        one.take(1)
-
-
-def test_the_largest_piece_may_always_come() -> None:
-    budget = ByteBudget(10, least_share=8)
-    with budget.account(b"one") as one, budget.account(b"other") as other:
-        one.take(8)
-        with pytest.raises(ShareHeldError):
-            one.take(1)
-        with pytest.raises(TooMuchHeldError):
-            other.take(3)
-        other.take(2)
+    for count, error in ((10, None), (11, ShareHeldError), (0, ZeroDivisionError), (10, None)):
+        with nullcontext() if error is None else pytest.raises(error), budget.account() as account:
+            account.take(count or 10 // budget.held)
+            assert budget.held == 10

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -19,6 +20,7 @@ from service.http.bodies import receive_body
 from tests.running import RunningService
 
 PACKED = {"content-encoding": "gzip"}
+LARGE = random.Random(0).randbytes(3 << 20)  # does not get smaller
 
 
 def receive(timeout: float, pause: float = 0.0, waited: float = 0.0, worked: float = 0.0) -> None:
@@ -73,6 +75,30 @@ def test_a_body_is_the_same_and_has_the_same_limit_whichever_way_it_comes(narrow
     answer = narrow.client.post("/v1/register", **WAYS[way](body.ljust(200_001)))
     assert (answer.status_code, answer.json()["code"]) == (413, "too_large")
     assert answer.json()["detail"] == "expected a body of at most 200000 bytes, unpacked; found more"
+
+
+ONE = gzip.compress(b"{}", mtime=0)
+NOT_PACKED = {
+    "not gzip": (b"not gzip", "is not gzip"), "nothing": (b"", "cut short"), "cut short": (ONE[:-4], "cut short"),
+    "large, cut short": (gzip.compress(LARGE, 1)[:2_000_000], "cut short"),
+    "more bytes": (ONE + b"more", "follow"), "a second member": (ONE * 2, "follow"),
+    "a large one, and more bytes": (gzip.compress(LARGE, 1) + b"x", "follow"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", NOT_PACKED)
+def test_what_is_not_one_member_of_gzip(client: httpx.Client, kind: str) -> None:
+    sent, said = NOT_PACKED[kind]
+    answer = client.post("/v1/register", content=sent, headers=PACKED)
+    assert (answer.status_code, answer.json()["code"]) == (400, "invalid_json")
+    assert said in answer.json()["detail"]
+
+
+def test_what_unpacks_to_more_than_is_allowed_is_never_held(service: RunningService) -> None:
+    """300 KB that would be 300 MB."""
+    bomb = gzip.compress(bytes(300_000_000), 9)
+    with service.grows_by_less_than(80.0):
+        assert service.client.post("/v1/register", content=bomb, headers=PACKED).status_code == 413
 
 
 def test_a_length_over_the_limit_is_refused_before_the_body_comes(service: RunningService) -> None:

@@ -3,6 +3,7 @@ the others miss."""
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Iterator
@@ -24,10 +25,8 @@ from tests.service.importing.forms import SQUARE, TYPE, form, room_grid
 CASES = int(os.environ.get("FUZZ_CASES", "300"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
 HELD = [
-    checks.status_code_conformance,
-    checks.content_type_conformance,
-    checks.response_schema_conformance,
-    checks.response_headers_conformance,
+    *(checks.status_code_conformance, checks.content_type_conformance),
+    *(checks.response_schema_conformance, checks.response_headers_conformance),
 ]
 LONGEST = 60.0  # s; an analysis may take half a minute, its deadline by default
 GROWTH = 32e6  # bytes that requests may leave behind
@@ -105,16 +104,8 @@ def assert_sane(response: httpx.Response) -> None:
     orjson.loads(response.content)
 
 
-LEAVES = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.sampled_from(
-        [0, -0.0, 5e-324, 1e-6, 1e9, 1e308, 2**53, 2**63, 2**64, 10**400, math.pi, "1.5", "NaN", "\x00", "\ud7ff"]
-    ),
-    st.floats(),
-    st.text(max_size=5),
-)
+ODD = [0, -0.0, 5e-324, 1e-6, 1e9, 1e308, 2**53, 2**63, 2**64, 10**400, math.pi, "1.5", "NaN", "\x00", "\ud7ff"]
+LEAVES = st.none() | st.booleans() | st.integers() | st.sampled_from(ODD) | st.floats() | st.text(max_size=5)
 ANYTHING = st.recursive(
     LEAVES,
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
@@ -134,24 +125,20 @@ def mutated(draw: st.DrawFn, path: str) -> Any:
     body = orjson.loads(orjson.dumps(BODIES[path]))
     for _ in range(draw(st.integers(1, 3))):
         place: Any = body
-        while True:
-            if not isinstance(place, dict | list) or not place:
-                break
-            keys = sorted(place) if isinstance(place, dict) else range(len(place))
-            key = draw(st.sampled_from(list(keys)))
-            if not isinstance(place[key], dict | list) or draw(st.integers(0, 3)) == 0:
-                if draw(st.booleans()):
-                    place[key] = draw(ANYTHING)
-                else:
-                    del place[key]
-                break
-            place = place[key]
+        while isinstance(place, dict | list) and place:
+            key = draw(st.sampled_from(sorted(place) if isinstance(place, dict) else [*range(len(place))]))
+            if isinstance(place[key], dict | list) and draw(st.integers(0, 3)):
+                place = place[key]
+                continue
+            if draw(st.booleans()):
+                place[key] = draw(ANYTHING)
+            else:
+                del place[key]
+            break
     return body
 
 
 def encoded(body: Any) -> bytes:
-    import json
-
     return json.dumps(body, ensure_ascii=True).encode()  # NaN and Infinity go out as they are
 
 
@@ -178,82 +165,52 @@ SIGMAS = st.sampled_from([0.0, 1e-12, 0.02, 10.0])
 @st.composite
 def extreme_segments(draw: st.DrawFn) -> list[list[float]]:
     """Segments at the limits of the contract: tiny, long, far out, far apart, on top of each other."""
-    x, y = draw(ORIGINS), draw(ORIGINS)
-    rows = []
+    origin, rows = [draw(ORIGINS), draw(ORIGINS)], []
     for _ in range(draw(st.integers(1, 6))):
-        scale = draw(SCALES)
-        at = [x + draw(PLACES), y + draw(PLACES)]
-        numbers = [draw(st.integers(-4, 4)) / 4 * scale for _ in range(4)]
-        rows.append([at[0] + numbers[0], at[1] + numbers[1], at[0] + numbers[2], at[1] + numbers[3]])
+        scale, (x, y) = draw(SCALES), [one + draw(PLACES) for one in origin]
+        a, b, c, d = (draw(st.integers(-4, 4)) / 4 * scale for _ in range(4))
+        rows.append([x + a, y + b, x + c, y + d])
     return rows
 
 
-EXTREME_PRIORS = st.none() | st.fixed_dictionaries(
-    {
-        "x": st.sampled_from([0.0, 1e9, -1e9]),
-        "y": st.sampled_from([0.0, 5e6]),
-        "theta": st.sampled_from([0.0, math.pi, -1e9, 1e9]),
-        "radius": st.sampled_from([0.0, 1e-9, 1.0, 1e9]),
-        "angle": st.sampled_from([0.0, 1e-9, math.tau, 1e9]),
-    }
+def any_of(**values: list[Any]) -> st.SearchStrategy[dict[str, Any]]:
+    return st.fixed_dictionaries({name: st.sampled_from(some) for name, some in values.items()})
+
+
+FAR = [0.0, 1e9, -1e9]
+EXTREME_PRIORS = st.none() | any_of(
+    x=FAR, y=[0.0, 5e6], theta=[*FAR, math.pi], radius=[0.0, 1e-9, 1.0, 1e9], angle=[0.0, 1e-9, math.tau, 1e9]
 )
 
 
 @fuzz(0.14)
-@given(
-    on=extreme_segments(),
-    seen=extreme_segments(),
-    sigma=SIGMAS,
-    oriented=st.booleans(),
-    prior=EXTREME_PRIORS,
-)
-def test_extreme_geometry(
-    client: httpx.Client, on: Any, seen: Any, sigma: float, oriented: bool, prior: dict[str, float] | None
-) -> None:
-    options = {"oriented": oriented}
+@given(data=st.data())
+def test_extreme_geometry(client: httpx.Client, data: st.DataObject) -> None:
+    on, seen = data.draw(extreme_segments()), data.draw(extreme_segments())
+    sigma, options = data.draw(SIGMAS), {"oriented": data.draw(st.booleans())}
     body = {"map": {"segments": on, "sigma": sigma}, "scan": {"segments": seen, "sigma": sigma}, "options": options}
-    assert_sane(client.post("/v1/associate", json={**body, "prior": prior}))
+    assert_sane(client.post("/v1/associate", json={**body, "prior": data.draw(EXTREME_PRIORS)}))
     pairs = [[i, min(i, len(on) - 1)] for i in range(len(seen))]
     for estimator in ("joint", "one_step"):
         known = {**body, "correspondences": pairs, "options": {**options, "estimator": estimator}}
         assert_sane(client.post("/v1/register", json=known))
 
 
-RANGES = st.lists(
-    st.none() | st.sampled_from([0.0, 1e-9, 0.1, 1.0, 1.0, 1.0, 30.0, 1e4, 1e9, -1.0]), min_size=0, max_size=60
-)
+RANGES = st.lists(st.none() | st.sampled_from([0.0, 1e-9, 0.1, 1.0, 1.0, 1.0, 30.0, 1e4, 1e9, -1.0]), max_size=60)
+EXTREME_LASERS = any_of(
+    angle_min=[*FAR, -math.pi], angle_increment=[1e-12, 1e-4, 0.01, math.tau / 60, -0.1, 1.0, -1.0],
+    range_min=[0.0, 0.1, 1.0], range_max=[1.0, 30.0, 1e9],
+)  # fmt: skip
 
 
 @fuzz(0.14)
-@given(
-    ranges=RANGES,
-    angle_min=st.sampled_from([0.0, -math.pi, 1e9, -1e9]),
-    increment=st.sampled_from([1e-12, 1e-4, 0.01, math.tau / 60, -0.1, 1.0, -1.0]),
-    bounds=st.tuples(st.sampled_from([0.0, 0.1, 1.0]), st.sampled_from([1.0, 30.0, 1e9])),
-    sigma=st.none() | st.sampled_from([1e-12, 0.02, 10.0]),
-    on=extreme_segments(),
-)
-def test_extreme_scans(
-    client: httpx.Client,
-    ranges: list[float | None],
-    angle_min: float,
-    increment: float,
-    bounds: tuple[float, float],
-    sigma: float | None,
-    on: list[list[float]],
-) -> None:
-    laser = {
-        "angle_min": angle_min,
-        "angle_increment": increment,
-        "ranges": ranges,
-        "range_min": bounds[0],
-        "range_max": bounds[1],
-    }
-    assert_sane(client.post("/v1/vectorize", json={"laser": laser, "options": {"sigma": sigma}}))
-    body = {"map": {"segments": on}, "scan": {"laser": laser, "sigma": sigma}}
-    assert_sane(client.post("/v1/associate", json=body))
+@given(laser=EXTREME_LASERS, ranges=RANGES, sigma=st.none() | SIGMAS, on=extreme_segments())
+def test_extreme_scans(client: httpx.Client, laser: Any, ranges: list[float | None], sigma: Any, on: Any) -> None:
+    laser = {**laser, "ranges": ranges}
     points = [[r or 0.0, float(i)] for i, r in enumerate(ranges)]
-    assert_sane(client.post("/v1/vectorize", json={"points": points, "options": {"sigma": sigma}}))
+    for scan in ({"laser": laser}, {"points": points}):
+        assert_sane(client.post("/v1/vectorize", json={**scan, "options": {"sigma": sigma}}))
+    assert_sane(client.post("/v1/associate", json={"map": {"segments": on}, "scan": {"laser": laser, "sigma": sigma}}))
 
 
 SVG = b'<svg xmlns="http://www.w3.org/2000/svg" width="9"><path d="M0 0h8v5h-8z"/><rect width="2" height="1"/></svg>'
@@ -292,6 +249,6 @@ def test_memory_stays_flat(fuzzed: RunningService, client: httpx.Client) -> None
     before = resident(fuzzed)
     for number in range(max(200, CASES // 20)):
         assert_sane(client.post(PATHS[number % 4], content=bodies[number % len(bodies)]))
-    assert resident(fuzzed) - before < GROWTH
     print(f"memory after {CASES} cases: {resident(fuzzed) / 1e6:.0f} MB")
+    assert resident(fuzzed) - before < GROWTH
     assert resident(fuzzed) < 512e6

@@ -59,8 +59,11 @@ def test_revisions_and_conditions(client: httpx.Client) -> None:
     assert (gone.status_code, gone.content) == (204, b"")
     assert client.delete(url).json()["code"] == "unknown_map"
     assert client.get(url).json()["code"] == "unknown_map"
+    # A map that was deleted is none, whatever revision it had.
+    assert client.put(url, json=examples.MAP, headers={"if-match": '"2"'}).status_code == 412
+    assert client.delete(url, headers={"if-match": '"2"'}).status_code == 412
     # A number is never used twice, so that an old tag cannot match a new map.
-    again = client.put(url, json=examples.MAP)
+    again = client.put(url, json=examples.MAP, headers={"if-none-match": '"1", "2"'})
     assert (again.status_code, again.headers["etag"]) == (201, '"3"')
     client.delete(url)
 

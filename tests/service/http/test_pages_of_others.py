@@ -7,7 +7,6 @@ import orjson
 import pytest
 
 from linefix.documents import examples
-from service.settings import SettingsError, read_settings
 from tests.issuing import ADMIN, PAGE, bearer
 from tests.running import JSON, RunningService
 
@@ -121,10 +120,3 @@ def test_none_is_named_by_default(client: httpx.Client) -> None:
     answer = asked_first(client, PAGE)
     assert answer.status_code == 403
     assert not any(name.startswith("access-control") for name in answer.headers)
-
-
-@pytest.mark.parametrize("origin", ["*", "fleet.example", f"{PAGE}/", f"{PAGE}/page", "null"])
-def test_an_origin_is_named_as_a_browser_does(monkeypatch: pytest.MonkeyPatch, origin: str) -> None:
-    monkeypatch.setenv("LINEFIX_CORS_ORIGINS", origin)
-    with pytest.raises(SettingsError, match="cors_origins"):
-        read_settings([])

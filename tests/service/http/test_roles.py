@@ -98,7 +98,7 @@ def test_a_role_is_good_for_what_asks_for_it(guarded: RunningService, method: st
             continue
         assert answer.is_success or ((method, path) in FORMS and answer.status_code == 415), answer.text
         if method == "DELETE":
-            _put_again(guarded)
+            assert call_with(guarded, "PUT", "/v1/maps/{map_id}", ADMIN).is_success
         if (method, path) not in NAMES_A_MAP:
             continue
         foreign = call_with(guarded, method, path, key, FOREIGN)
@@ -110,26 +110,15 @@ def test_a_role_is_good_for_what_asks_for_it(guarded: RunningService, method: st
             assert foreign.is_success, foreign.text
 
 
-def _put_again(guarded: RunningService) -> None:
-    assert call_with(guarded, "PUT", "/v1/maps/{map_id}", ADMIN).is_success
-
-
 def test_probes_and_pages_ask_for_no_key(guarded: RunningService) -> None:
     for path in ("/livez", "/readyz", "/metrics", "/version", "/docs", "/openapi.json", "/"):
         assert guarded.client.get(path).status_code == 200, path
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        "GET /v1/limits",
-        "POST /v1/associate",
-        "PUT /v1/maps/m",
-        "POST /v1/nothing",
-        "GET /%76%31/limits",
-        "HEAD /v1/maps",
-    ],
-)
+GUARDED_CALLS = "GET /v1/limits,POST /v1/associate,PUT /v1/maps/m,POST /v1/nothing,GET /%76%31/limits,HEAD /v1/maps"
+
+
+@pytest.mark.parametrize("call", GUARDED_CALLS.split(","))
 def test_everything_under_v1_asks_for_one(guarded: RunningService, call: str) -> None:
     """Also where the same path is in other letters."""
     method, path = call.split()
@@ -174,12 +163,9 @@ def test_what_is_no_route_is_for_whole_keys(guarded: RunningService) -> None:
         assert call_with(guarded, method, path, key_of(Role.WRITE)).json()["code"] == "forbidden"
 
 
-def told(service: RunningService, *lines: str | bytes) -> bytes:
+def told(service: RunningService, *lines: str) -> bytes:
     """Send lines of a head as they are; return all that comes back."""
-    head = b"\r\n".join(line if isinstance(line, bytes) else line.encode() for line in lines)
-    with service.connection() as connection:
-        connection.sendall(head + b"\r\nHost: x\r\nConnection: close\r\n\r\n")
-        return b"".join(iter(lambda: connection.recv(65_536), b""))
+    return service.talk("\r\n".join([*lines, "Host: x", "Connection: close", "\r\n"]).encode())
 
 
 READER, ASKER, WRITER = (key_of(role, PREFIX) for role in (Role.READ, Role.ASSOCIATE, Role.WRITE))

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -56,40 +57,27 @@ def test_what_is_kept(kind: str) -> None:
     assert f"linefix_map_cache_misses_total {len(built)}.0" in counts
 
 
-def test_callers_at_the_same_time_share_one_build() -> None:
-    cache = IndexCache(100, Metrics())
-    release, builds = threading.Event(), []
+@pytest.mark.parametrize("fails", [False, True])
+def test_callers_at_the_same_time_share_one_build(fails: bool) -> None:
+    """Also one that fails, which is not remembered."""
+    cache, release, builds = IndexCache(100, Metrics()), threading.Event(), []
 
     def build() -> CachedMap:
-        builds.append(1)
+        builds.append(a_map(2))
         release.wait(60)
-        return a_map(1)
+        if fails:
+            raise ZeroDivisionError
+        return builds[0]
 
     with ThreadPoolExecutor(4) as threads:
         asked = [threads.submit(cache.get, "a", build, NO_END) for _ in range(4)]
         time.sleep(0.05)
         release.set()
-        answers = [one.result(60) for one in asked]
-    assert len(builds) == 1
-    assert all(answer is answers[0] for answer in answers)
-
-
-def test_a_build_that_fails_is_told_to_all_that_wait_and_not_remembered() -> None:
-    cache = IndexCache(100, Metrics())
-    release = threading.Event()
-
-    def fail() -> CachedMap:
-        release.wait(60)
-        raise ZeroDivisionError
-
-    with ThreadPoolExecutor(2) as threads:
-        asked = [threads.submit(cache.get, "a", fail, NO_END) for _ in range(2)]
-        time.sleep(0.05)
-        release.set()
         for one in asked:
-            with pytest.raises(ZeroDivisionError):
-                one.result(60)
-    assert cache.get("a", lambda: a_map(1), NO_END).bytes == 1
+            with pytest.raises(ZeroDivisionError) if fails else nullcontext():
+                assert one.result(60) is builds[0]
+    assert len(builds) == 1
+    assert cache.get("a", lambda: a_map(1), NO_END).bytes == (1 if fails else 2)
 
 
 @pytest.mark.long

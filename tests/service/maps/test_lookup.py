@@ -2,84 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
-import orjson
 import pytest
 
 from association import Deadline, InvalidMapError, MapIndex
 from linefix.documents import examples
 from linefix.documents.errors import TooManyError
-from linefix.documents.parts import InlineMap, MapDocument, StoredMap
+from linefix.documents.parts import MapDocument, StoredMap
 from linefix.documents.several import MapPrefix, NamedMap
-from service.database_location import database_url
 from service.errors import BusyStoreError, IndexNotReadyError
-from service.maps import CachedMap, IndexCache, MapOutline, MapRecord, MapStore
-from service.maps.lookup import OVERHEAD, FoundMaps, MapLookup, outline_of
-from service.parsing.child import LARGE, Child
-from service.telemetry.metrics import Metrics
+from service.maps import MapOutline
+from service.maps.lookup import OVERHEAD, outline_of
+from service.parsing.child import LARGE
 
-
-class Lookup(MapLookup):
-    """A lookup with what it looks in."""
-
-    def __init__(self, folder: Path) -> None:
-        self.cache = IndexCache(10_000_000, Metrics())
-        self.store = MapStore(database_url(f"sqlite:///{folder / 'maps.sqlite3'}"))
-        self.parser = Child()
-        super().__init__(self.cache, self.store, self.parser)
-
-    def look(self, asked: InlineMap | StoredMap, *, oriented: bool | None) -> tuple[CachedMap, int | None]:
-        """Find and index, as for one request."""
-        if isinstance(asked, InlineMap):
-            return self.indexed(FoundMaps({None: asked}), oriented=oriented, deadline=Deadline()), None
-        found = self.find(asked.map_id, oriented=oriented)
-        record = found.maps[None]
-        assert isinstance(record, MapRecord)
-        return self.indexed(found, oriented=oriented, deadline=Deadline()), record.revision
-
-    def find(self, map_id: str, *, oriented: bool | None) -> FoundMaps:
-        """Find a stored map, with its document where it is not indexed."""
-        found = FoundMaps({None: self.store.record(map_id)})
-        if self.is_cached(found, oriented=oriented):
-            return found
-        stored = self.store.load(map_id)
-        return FoundMaps({None: stored.record}, stored.document)
-
-    def put(self, map_id: str, **parts: Any) -> None:
-        self.store.put(
-            map_id,
-            orjson.dumps(parts),
-            MapOutline(6, 0, (0.0, 0.0, 1.0, 1.0), None, parts.get("oriented")),
-        )
-
-
-@pytest.fixture
-def lookup(tmp_path: Path) -> Iterator[Lookup]:
-    made = Lookup(tmp_path)
-    yield made
-    made.parser.close()
-    made.store.close()
-
-
-def inline(**parts: Any) -> InlineMap:
-    return InlineMap.model_validate({"segments": examples.WALLS, **parts})
-
-
-def test_a_map_that_is_sent_again_is_not_indexed_again(lookup: Lookup) -> None:
-    first, revision = lookup.look(inline(), oriented=True)
-    assert revision is None
-    assert lookup.look(inline(), oriented=True)[0] is first
+from .stores import Lookup, inline
 
 
 @pytest.mark.parametrize(
     "parts", [{"sigma": 0.05}, {"frame_id": "other"}, {"segments": [*examples.WALLS[:-1], [-4.0, 3.0, -4.0, -3.001]]}]
 )
 def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, parts: dict[str, Any]) -> None:
-    plain, _ = lookup.look(inline(), oriented=True)
+    plain, revision = lookup.look(inline(), oriented=True)
+    assert revision is None
     other, _ = lookup.look(inline(**parts), oriented=True)
     assert other is not plain
     assert other.frames[None] == parts.get("frame_id", "map")
@@ -170,18 +117,10 @@ def test_several_maps_are_loaded_for_as_long_as_somebody_waits(lookup: Lookup, m
     assert loaded == ["m-0"]
 
 
-def document(rows: object) -> MapDocument:
-    return MapDocument.model_validate({"segments": rows})
-
-
-@pytest.mark.parametrize("width", [1e5, 1e5 + 0.001])
-def test_a_map_is_at_most_100_km_wide(width: float) -> None:
-    for rows in (
-        [[0.0, 0.0, 1.0, 0.0], [width - 1.0, 0.0, width, 0.0]],
-        [[0.0, 0.0, 0.0, 1.0], [0.0, width - 1.0, 0.0, width]],
-    ):
-        if width == 1e5:
-            assert outline_of(document(rows)).segments == 2
-        else:
-            with pytest.raises(InvalidMapError, match="extent"):
-                outline_of(document(rows))
+@pytest.mark.parametrize("across", [False, True])
+def test_a_map_is_at_most_100_km_wide(across: bool) -> None:
+    for width, fits in ((1e5, True), (1e5 + 0.001, False)):
+        rows = np.array([[0.0, 0.0, 1.0, 0.0], [width - 1.0, 0.0, width, 0.0]])
+        document = MapDocument.model_validate({"segments": (rows[:, [1, 0, 3, 2]] if across else rows).tolist()})
+        with nullcontext() if fits else pytest.raises(InvalidMapError, match="extent"):
+            assert outline_of(document).segments == 2

@@ -16,10 +16,10 @@ from service.errors import (
     UnknownMapError,
 )
 from service.maps import MapOutline, MapRecord, MapStore, Preconditions
-from service.maps.store import logger
+from service.maps.store import ANY, logger
 from service.maps.tables import row_of
 
-from .stores import ANY, BOX, alter, opened
+from .stores import BOX, alter, opened
 
 
 def test_a_map_lives_through_its_revisions(store: MapStore) -> None:

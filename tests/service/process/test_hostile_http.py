@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-import socket
-import threading
 import time
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
 
 import orjson
 import pytest
 
 from linefix.documents import examples
-from tests.running import PATIENCE, RunningService
+from tests.running import RunningService
 
 HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 CHUNKED = HEAD + b"Transfer-Encoding: chunked\r\n\r\n"
@@ -20,97 +19,72 @@ LIVEZ = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"
 LAST_LIVEZ = LIVEZ[:-2] + b"Connection: close\r\n\r\n"
 BODY = orjson.dumps(examples.ASSOCIATE)
 LAST_CHUNK = b"0\r\n"
-
-
-def ask(service: RunningService, *pieces: bytes, pause: float = 0.05, end: bool = False) -> bytes:
-    """Send pieces, and return everything that is answered until the service closes."""
-    answer = b""
-    with service.connection(PATIENCE) as connection:
-        with suppress(ConnectionError):
-            for piece in pieces:
-                connection.sendall(piece)
-                time.sleep(pause)
-            if end:
-                connection.shutdown(socket.SHUT_WR)
-        with suppress(ConnectionError):
-            while part := connection.recv(65_536):
-                answer += part
-    return answer
+LOCAL = b" HTTP/1.1\r\nHost: localhost\r\n"
 
 
 def statuses(answer: bytes) -> list[int]:
     return [int(status) for status in re.findall(rb"HTTP/1\.1 (\d{3})", answer) if status != b"100"]
 
 
-def pour(service: RunningService, head: bytes, piece: bytes, most: int) -> int:
+def pour(service: RunningService, head: bytes, piece: bytes, most: int, status: bytes = b"") -> int:
     """Send a head, then a piece again and again until the service has enough; return how many bytes it took."""
     sent = 0
     with service.connection(timeout=5.0) as connection, suppress(OSError):
         connection.sendall(head)
+        if status:
+            assert connection.recv(65_536)[9:].startswith(status)
         while sent < most:
             connection.sendall(piece)
             sent += len(piece)
     return sent
 
 
-TRAILERS = {
-    "many short": b"a: b\r\n" * 10_000,
-    "one long": b"c" * 60_000,
-    "of a body that is there": b"a: b\r\n" * 10_000,
+CHUNKED_LIVEZ = LIVEZ[:-2] + b"Transfer-Encoding: chunked\r\n\r\n" + LAST_CHUNK
+WHOLE = CHUNKED + b"%x\r\n%b\r\n" % (len(BODY), BODY)
+# What ends after some MB, though it is sent on and on: a head, and what follows it again and again.
+ENDLESS = {
+    "many short trailers": (CHUNKED_LIVEZ, b"a: b\r\n" * 10_000),
+    "one long trailer": (CHUNKED_LIVEZ + b"x: ", b"c" * 60_000),
+    "trailers of a body that is there": (WHOLE + LAST_CHUNK, b"a: b\r\n" * 10_000),
+    "what a chunk is called": (CHUNKED + b"1;", b"e" * 60_000),
 }
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(one, marks=pytest.mark.long) if one != "many short" else one for one in TRAILERS]
+    "kind", [pytest.param(one, marks=pytest.mark.long) if "trailers" not in one[:20] else one for one in ENDLESS]
 )
-def test_trailers_cost_nothing(service: RunningService, kind: str) -> None:
-    """121 MB of them took 2.9 GB, before a key was asked for."""
-    head = b"GET /livez HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + LAST_CHUNK
-    if kind == "of a body that is there":
-        head = CHUNKED + b"%x\r\n%b\r\n" % (len(BODY), BODY) + LAST_CHUNK
-    with service.peak_mb() as peak:
-        before = service.memory_mb()
-        sent = pour(service, head + (b"x: " if kind == "one long" else b""), TRAILERS[kind], 120_000_000)
-        assert peak() - before < 20.0
-    assert sent < 60_000_000
+def test_what_has_no_end_costs_nothing(service: RunningService, kind: str) -> None:
+    """121 MB of trailers took 2.9 GB, before a key was asked for."""
+    with service.grows_by_less_than(20.0):
+        assert pour(service, *ENDLESS[kind], 120_000_000) < 60_000_000
 
 
 def test_a_few_trailers_are_passed_over(service: RunningService) -> None:
-    sent = CHUNKED + b"%x\r\n%b\r\n0\r\nX-Checksum: 1\r\nHost: evil\r\n\r\n" % (len(BODY), BODY)
-    answer = ask(service, sent + LAST_LIVEZ)
+    answer = service.talk(WHOLE + b"0\r\nX-Checksum: 1\r\nHost: evil\r\n\r\n" + LAST_LIVEZ)
     assert answer.count(b"HTTP/1.1 200") == 2
 
 
-def test_what_a_chunk_is_called_has_an_end(service: RunningService) -> None:
-    assert pour(service, CHUNKED + b"1;", b"e" * 60_000, 120_000_000) < 60_000_000
+UNREAD = {
+    b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer wrong\r\n": b"40",
+    b"POST /nothing HTTP/1.1\r\nHost: localhost\r\n": b"404",
+    b"GET /livez HTTP/1.1\r\nHost: localhost\r\n": b"200",
+}
+FRAMES = {
+    b"Content-Length: 9000000\r\n\r\n": b"x" * 65_536,
+    b"Transfer-Encoding: chunked\r\n\r\n": b"10000\r\n" + b"x" * 65_536 + b"\r\n",
+}
 
 
-@pytest.mark.parametrize(
-    ("head", "status"),
-    [
-        (b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer wrong\r\n", b"40"),
-        (b"POST /nothing HTTP/1.1\r\nHost: localhost\r\n", b"404"),
-        (b"GET /livez HTTP/1.1\r\nHost: localhost\r\n", b"200"),
-    ],
-)
-@pytest.mark.parametrize("framing", [b"Content-Length: 9000000\r\n\r\n", b"Transfer-Encoding: chunked\r\n\r\n"])
-def test_what_is_refused_is_not_read_on(guarded: RunningService, head: bytes, status: bytes, framing: bytes) -> None:
+@pytest.mark.parametrize("head", UNREAD)
+@pytest.mark.parametrize("framing", FRAMES)
+def test_what_is_refused_is_not_read_on(guarded: RunningService, head: bytes, framing: bytes) -> None:
     """After a 401 the server read 4.9 GB more."""
-    piece = b"10000\r\n" + b"x" * 65_536 + b"\r\n" if b"chunked" in framing else b"x" * 65_536
-    with guarded.connection(timeout=5.0) as connection:
-        connection.sendall(head + framing)
-        assert connection.recv(65_536)[9:].startswith(status)
-        sent = 0
-        with suppress(OSError):
-            while sent < 150_000_000:
-                connection.sendall(piece)
-                sent += len(piece)
-        assert sent < 60_000_000
+    assert pour(guarded, head + framing, FRAMES[framing], 150_000_000, UNREAD[head]) < 60_000_000
 
 
 def test_an_unknown_key_ends_the_connection(guarded: RunningService) -> None:
     for key in (b"", b"Authorization: Bearer wrong\r\n"):
-        answer = ask(guarded, b"GET /v1/limits HTTP/1.1\r\nHost: localhost\r\n" + key + b"\r\n" + LIVEZ)
+        answer = guarded.talk(b"GET /v1/limits HTTP/1.1\r\nHost: localhost\r\n" + key + b"\r\n" + LIVEZ)
         assert answer[9:12] in (b"401", b"403")
         assert b"connection: close" in answer
         assert len(statuses(answer)) == 1
@@ -119,49 +93,36 @@ def test_an_unknown_key_ends_the_connection(guarded: RunningService) -> None:
 @pytest.mark.long
 def test_long_heads_leave_nothing_behind(guarded: RunningService) -> None:
     """A thousand connections with 31 KB each, without a key, took 98 MB, and the next thousand as much again."""
-    tail = b"x" * 31_000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n"
     before = guarded.memory_mb()
     for number in range(1000):
-        with guarded.connection() as connection:
-            connection.sendall(b"GET /v1/maps/%d" % number + tail)
-            while connection.recv(65_536):
-                pass
+        guarded.talk(b"GET /v1/maps/%d" % number + b"x" * 31_000 + LOCAL + b"\r\n")
     assert guarded.memory_mb() - before < 20.0
 
 
 def test_many_requests_at_once_are_all_answered_in_order(service: RunningService) -> None:
-    count = 3000
-    requests = b"".join(
-        b"GET /livez HTTP/1.1\r\nHost: localhost\r\nX-Request-Id: %d\r\n\r\n" % number for number in range(count)
-    )
+    numbers = range(3000)
+    requests = b"".join(LIVEZ[:-2] + b"X-Request-Id: %d\r\n\r\n" % number for number in numbers)
     answer = b""
-    with service.connection() as connection:
-        sending = threading.Thread(target=connection.sendall, args=(requests,))
-        sending.start()
-        while answer.count(b'{"status":"ok"}') < count:
+    with service.connection() as connection, ThreadPoolExecutor(1) as thread:
+        thread.submit(connection.sendall, requests)
+        while answer.count(b'{"status":"ok"}') < len(numbers):
             part = connection.recv(65_536)
             assert part, answer.count(b"HTTP/1.1 200")
             answer += part
-        sending.join()
-    ids = [int(line.split(b": ")[1]) for line in answer.split(b"\r\n") if line.startswith(b"x-request-id")]
-    assert ids == list(range(count))
+    assert [int(found) for found in re.findall(rb"x-request-id: (\d+)", answer)] == [*numbers]
 
 
 @pytest.mark.long
 def test_many_requests_at_once_take_little_memory(service: RunningService) -> None:
     """Each read held some ten thousand of them, each with all that belongs to one, and that on every connection."""
     requests = b"GET / HTTP/1.1\r\nHost:1\r\n\r\n" * 10_000
-    connections = [socket.create_connection(("127.0.0.1", service.port), timeout=20) for _ in range(40)]
-    with service.peak_mb() as peak:
-        before = service.memory_mb()
-        for connection in connections:
+    with ExitStack() as stack, service.grows_by_less_than(50.0):
+        for _ in range(40):
+            connection = stack.enter_context(service.connection())
             connection.setblocking(False)
             with suppress(BlockingIOError):
                 connection.send(requests)
         time.sleep(1.0)
-        assert peak() - before < 50.0
-    for connection in connections:
-        connection.close()
 
 
 REFUSED = {
@@ -192,7 +153,7 @@ REFUSED = {
 @pytest.mark.parametrize("kind", REFUSED)
 def test_what_is_not_http_is_refused_and_ends_the_connection(service: RunningService, kind: str) -> None:
     """And what two servers could read in two ways."""
-    answer = ask(service, REFUSED[kind], end=len(REFUSED[kind]) < 1000)
+    answer = service.talk(REFUSED[kind], end=len(REFUSED[kind]) < 1000)
     assert statuses(answer) == [400] or (answer == b"" and "without end" in kind), (
         answer
     )  # a reset overtakes the answer
@@ -201,64 +162,56 @@ def test_what_is_not_http_is_refused_and_ends_the_connection(service: RunningSer
     assert "Traceback" not in service.log()
 
 
+OF_H2 = b"Upgrade: h2c\r\nHTTP2-Settings: AAMAAABkAARA\r\n"
+OF_WEB_SOCKET = b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 ODD = {
-    "CONNECT to a path": (b"CONNECT /x HTTP/1.1\r\nHost: localhost\r\n\r\n", b"404"),
+    "CONNECT to a path": (b"CONNECT /x" + LOCAL + b"\r\n", b"404"),
     "CONNECT to a host": (b"CONNECT example.org:443 HTTP/1.1\r\nHost: example.org:443\r\n\r\n", b"40"),
-    "a method that is none": (b"BREW / HTTP/1.1\r\nHost: localhost\r\n\r\n", b"405"),
-    "a method of WebDAV": (b"PROPFIND /livez HTTP/1.1\r\nHost: localhost\r\n\r\n", b"405"),
-    "TRACE": (b"TRACE /livez HTTP/1.1\r\nHost: localhost\r\n\r\n", b"405"),
-    "OPTIONS of everything": (b"OPTIONS * HTTP/1.1\r\nHost: localhost\r\n\r\n", b"404"),
-    "an absolute target": (b"GET http://localhost/livez HTTP/1.1\r\nHost: localhost\r\n\r\n", b"404"),
-    "a target without a slash": (b"GET livez HTTP/1.1\r\nHost: localhost\r\n\r\n", b"404"),
-    "a web socket": (
-        b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
-        b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-        b"200",
-    ),
+    "a method that is none": (b"BREW /" + LOCAL + b"\r\n", b"405"),
+    "a method of WebDAV": (b"PROPFIND /livez" + LOCAL + b"\r\n", b"405"),
+    "TRACE": (b"TRACE /livez" + LOCAL + b"\r\n", b"405"),
+    "OPTIONS of everything": (b"OPTIONS *" + LOCAL + b"\r\n", b"404"),
+    "an absolute target": (b"GET http://localhost/livez" + LOCAL + b"\r\n", b"404"),
+    "a target without a slash": (b"GET livez" + LOCAL + b"\r\n", b"404"),
+    "a web socket": (b"GET /livez" + LOCAL + b"Connection: Upgrade\r\n" + OF_WEB_SOCKET + b"\r\n", b"200"),
     "an upgrade to HTTP/2": (
-        b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
-        b"HTTP2-Settings: AAMAAABkAARA\r\n\r\n",
-        b"200",
-    ),
-}
+        b"GET /livez" + LOCAL + b"Connection: Upgrade, HTTP2-Settings\r\n" + OF_H2 + b"\r\n", b"200"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ODD)
 def test_an_odd_request_gets_one_short_answer_and_one_line_in_the_log(service: RunningService, kind: str) -> None:
     """Forty bytes of CONNECT, without a key, were answered 492 times."""
-    sent, status = ODD[kind]
-    marked = sent[:-2] + b"X-Request-Id: odd-%d\r\nConnection: close\r\n\r\n" % list(ODD).index(kind)
-    answer = ask(service, marked)
+    (sent, status), name = ODD[kind], f"odd-{list(ODD).index(kind)}"
+    answer = service.talk(sent[:-2] + b"X-Request-Id: %b\r\nConnection: close\r\n\r\n" % name.encode())
     assert answer[9:].startswith(status), answer
-    assert len(statuses(answer)) == 1
-    assert len(answer) < 700
-    lines = [line for line in service.log().splitlines() if f'"odd-{list(ODD).index(kind)}"' in line]
-    assert len(lines) <= 1
+    assert (len(statuses(answer)), len(answer) < 700) == (1, True)
+    assert service.log().count(f'"{name}"') <= 1
 
 
 def test_http_1_0_needs_no_host(service: RunningService) -> None:
-    assert ask(service, b"GET /livez HTTP/1.0\r\n\r\n").startswith(b"HTTP/1.1 200")
+    assert service.talk(b"GET /livez HTTP/1.0\r\n\r\n").startswith(b"HTTP/1.1 200")
 
 
 def test_what_comes_before_rubbish_is_answered_first(service: RunningService) -> None:
-    answer = ask(service, HEAD + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY + LIVEZ + b"RUBBISH\r\n\r\n")
+    answer = service.talk(HEAD + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY + LIVEZ + b"RUBBISH\r\n\r\n")
     assert statuses(answer) == [200, 200, 400]
 
 
 def test_half_a_body_is_logged_and_ends(service: RunningService) -> None:
     for sent in (HEAD + b"Content-Length: 100\r\n\r\n{}", CHUNKED + b"2\r\n{}\r\n"):
-        assert ask(service, sent, end=True)[9:12] in (b"400", b"")
+        assert service.talk(sent, end=True)[9:12] in (b"400", b"")
     assert "Traceback" not in service.log()
 
 
 @pytest.mark.parametrize("split", [20, 80, 130])
 def test_an_upgrade_in_a_head_of_two_packets_keeps_its_body(service: RunningService, split: int) -> None:
-    head = HEAD + b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAMAAABkAARA\r\n"
+    head = HEAD + b"Connection: Upgrade, HTTP2-Settings\r\n" + OF_H2
     for framed in (
         head + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY,
         head + b"Transfer-Encoding: chunked\r\n\r\n%x\r\n%b\r\n0\r\n\r\n" % (len(BODY), BODY),
     ):
-        answer = ask(service, framed[:split], framed[split:] + LAST_LIVEZ)
+        answer = service.talk(framed[:split], framed[split:] + LAST_LIVEZ)
         assert answer.count(b"HTTP/1.1 200") == 2, answer
     request = head + b"Content-Length: %d\r\n\r\n" % len(LIVEZ) + LIVEZ  # a body that looks like a request
-    assert statuses(ask(service, request[:split], request[split:] + LAST_LIVEZ)) == [400, 200]
+    assert statuses(service.talk(request[:split], request[split:] + LAST_LIVEZ)) == [400, 200]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,15 +12,7 @@ from linefix.documents.errors import DeadlinePassedError
 from service.app import create_app
 from service.settings import Settings
 from service.work.results import index_import
-from tests.service.maps.test_lookup import Lookup, inline
-
-
-@pytest.fixture
-def lookup(tmp_path: Path) -> Iterator[Lookup]:
-    made = Lookup(tmp_path)
-    yield made
-    made.parser.close()
-    made.store.close()
+from tests.service.maps.stores import Lookup, inline
 
 
 def test_an_import_is_indexed_until_its_deadline_or_its_client_is_gone(lookup: Lookup) -> None:
