@@ -7,8 +7,10 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -159,6 +161,25 @@ def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
     while not condition():
         assert time.monotonic() < give_up, "did not come about"
         time.sleep(0.01)
+
+
+@contextmanager
+def asked_again(count: int, ask: Callable[[], object]) -> Iterator[None]:
+    """Have so many threads call a function again and again, for as long as the block takes."""
+    enough = threading.Event()
+
+    def repeat() -> None:
+        while not enough.is_set():
+            ask()
+
+    with ThreadPoolExecutor(count) as threads:
+        asked = [threads.submit(repeat) for _ in range(count)]
+        try:
+            yield
+        finally:
+            enough.set()
+    for one in asked:
+        one.result()
 
 
 def children_of(pid: int) -> set[int]:

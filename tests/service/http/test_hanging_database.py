@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import httpx
 import pytest
 
 from linefix.documents import examples
-from tests.running import JSON, RunningService, until
+from tests.running import RunningService, asked_again, client_of, until
 from tests.service.conftest import empty_database
 from tests.service.lines import Line
 
@@ -31,27 +29,18 @@ def test_inline_maps_do_not_wait_for_it(line: Line, start_service: Callable[...,
     assert running.client.post("/v1/associate", json=STORED).status_code == 200
     line.hold_up()
     statuses: list[int] = []
-    enough = threading.Event()
 
     def ask() -> None:
         body = {**STORED, "options": {"deadline_ms": 1500}}
-        while not enough.is_set():
-            answer = httpx.post(running.url + "/v1/associate", json=body, headers=JSON, timeout=60)
-            statuses.append(answer.status_code)
+        with client_of(running.url) as client:
+            statuses.append(client.post("/v1/associate", json=body).status_code)
 
-    threads = [threading.Thread(target=ask) for _ in range(6)]
-    for thread in threads:
-        thread.start()
-    try:
+    with asked_again(6, ask):
         until(lambda: len(statuses) > 0)  # so all of them have come, and wait again
-        for path in ("/v1/associate", "/v1/associate:batch"):
-            body = INLINE if path == "/v1/associate" else {"map": INLINE["map"], "scans": [INLINE["scan"]]}
+        batch = {"map": INLINE["map"], "scans": [INLINE["scan"]]}
+        for path, body in (("/v1/associate", INLINE), ("/v1/associate:batch", batch)):
             assert running.client.post(path, json=body).status_code == 200
             assert running.count("linefix_searches_running") == 0.0
-    finally:
-        enough.set()
-        for thread in threads:
-            thread.join()
     assert set(statuses) == {504}
     assert running.client.get("/v1/maps/m").json()["code"] == "not_ready"
     line.mend()

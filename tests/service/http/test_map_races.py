@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ import httpx
 import pytest
 
 from linefix.documents import examples
-from tests.running import RunningService, running
+from tests.running import RunningService, asked_again, running
 from tests.service.conftest import empty_database
 
 WRITERS = 8
@@ -112,21 +113,14 @@ def test_a_change_by_another_process_is_noticed_at_once(pair: Pair, url: str) ->
 def test_readers_see_whole_revisions_while_others_write(pair: Pair, url: str) -> None:
     one, two = pair.clients
     assert put(one, url, 1)().status_code == 201
-    stop = threading.Event()
+    numbers = itertools.count(2)
 
     def write() -> None:
-        number = 1
-        while not stop.is_set():
-            number += 1
-            assert put(one, url, number)().json()["revision"] == number
+        number = next(numbers)
+        assert put(one, url, number)().json()["revision"] == number
 
-    with ThreadPoolExecutor(1) as threads:
-        writing = threads.submit(write)
-        try:
-            for _ in range(100):
-                got = two.get(url)
-                assert got.status_code == 200, got.text
-                assert got.headers["etag"] == f'"{got.json()["meta"]}"'
-        finally:
-            stop.set()
-            writing.result(30)
+    with asked_again(1, write):
+        for _ in range(100):
+            got = two.get(url)
+            assert got.status_code == 200, got.text
+            assert got.headers["etag"] == f'"{got.json()["meta"]}"'

@@ -3,49 +3,44 @@
 from __future__ import annotations
 
 import signal
-import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.running import JSON, RunningService, until
+from tests.running import RunningService, client_of, family_of, is_running, until
 from tests.running import running as running_service
 from tests.service.searches import searched_for, store_hard_map
 
 
-def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(drain_s=1.0)
-    answers: list[int] = []
-    store_hard_map(running)
-    body = searched_for()
-
-    def ask() -> None:
-        answers.append(httpx.post(running.url + "/v1/associate", content=body, headers=JSON, timeout=60).status_code)
-
-    busy = threading.Thread(target=ask)
-    busy.start()
-    until(lambda: running.count("linefix_searches_running") == 1.0)
-    running.process.send_signal(signal.SIGTERM)
-    until(lambda: running.client.get("/readyz").status_code == 503)
-    drained = running.client.get("/readyz")
-    assert (drained.status_code, drained.json()["detail"]) == (
-        503,
-        "the service is shutting down; send the request to another instance, or again after its restart",
-    )
-    assert running.client.get("/livez").status_code == 200
-    running.process.send_signal(signal.SIGTERM)  # told again: it ends no sooner
-    assert running.ended() == 0
-    busy.join()
-    assert answers == [200]
+@pytest.mark.parametrize("workers", [1, 2])
+def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService], workers: int) -> None:
+    running = start_service(drain_s=1.0, workers=workers, searches=workers)
+    store_hard_map(running, workers)
+    family = family_of(running.process.pid)
+    with ThreadPoolExecutor(1) as thread, client_of(running.url) as client:
+        asked = thread.submit(client.post, "/v1/associate", content=searched_for())
+        until(lambda: running.count("linefix_searches_running") == 1.0)
+        running.process.send_signal(signal.SIGTERM)
+        until(lambda: running.client.get("/readyz").status_code == 503)
+        assert (
+            "the service is shutting down; send the request to another"
+            in running.client.get("/readyz").json()["detail"]
+        )
+        assert running.client.get("/livez").status_code == 200
+        running.process.send_signal(signal.SIGTERM)  # told again: it ends no sooner
+        assert running.ended() == 0
+        assert asked.result().status_code == 200
+    assert not any(is_running(pid) for pid in family)
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(running.url + "/livez")
     assert "Traceback" not in running.log()
 
 
-def test_a_terminal_that_goes_away_drains_it(
-    start_service: Callable[..., RunningService],
-) -> None:
+def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., RunningService]) -> None:
     """It ended at once, without its last answers."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup may ignore it
     try:

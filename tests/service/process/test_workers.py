@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,8 +14,8 @@ import orjson
 import pytest
 
 from linefix.documents import examples
-from tests.running import RunningService, children_of, client_of, is_running, running, until
-from tests.service.searches import searched_briefly, searched_for, store_hard_map
+from tests.running import RunningService, asked_again, children_of, client_of, is_running, running, until
+from tests.service.searches import searched_briefly
 
 POSTS = 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}'
 
@@ -82,23 +82,11 @@ def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: Ru
 
 
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
-    body, enough = searched_briefly(), threading.Event()
+    body = searched_briefly()
     statuses: list[int] = []
-
-    def ask() -> None:
-        while not enough.is_set():
-            statuses.append(anew(pair, "POST", "/v1/associate", body).status_code)
-
-    threads = [threading.Thread(target=ask) for _ in range(12)]
-    for thread in threads:
-        thread.start()
-    try:
+    with asked_again(12, lambda: statuses.append(anew(pair, "POST", "/v1/associate", body).status_code)):
         until(lambda: {200, 503} <= set(statuses))
         found = [pair.counts("linefix_searches_running", "linefix_searches_waiting") for _ in range(15)]
-    finally:
-        enough.set()
-        for thread in threads:
-            thread.join()
     # Of each worker one slot and two places; a search that takes long gives its slot back and has one of the places.
     assert max(running + waiting for running, waiting in found) <= 6.0
     assert set(statuses) == {200, 503}
@@ -121,20 +109,17 @@ def test_without_the_file_of_its_maps_it_is_not_ready(pair: RunningService) -> N
     until(lambda: anew(pair, "GET", "/readyz").status_code == 200)
 
 
-def test_all_drain_and_end_together(pair: RunningService) -> None:
-    """The last test of these: it ends them."""
-    until(lambda: pair.counts("linefix_searches_running", "linefix_searches_waiting") == (0.0, 0.0))
-    answers: list[int] = []
-    store_hard_map(pair, workers=2)
-    body = searched_for()
-    busy = threading.Thread(target=lambda: answers.append(anew(pair, "POST", "/v1/associate", body).status_code))
-    busy.start()
-    until(lambda: pair.count("linefix_searches_running") == 1.0)
-    pids = workers_of(pair)
-    pair.process.send_signal(signal.SIGTERM)
-    assert pair.ended() == 0
-    busy.join()
-    assert answers == [200]
-    assert not any(is_running(pid) for pid in pids)
-    with pytest.raises(httpx.ConnectError):
-        anew(pair, "GET", "/livez")
+@pytest.mark.long
+def test_what_a_first_start_compiles_is_not_kept_in_memory(
+    start_service: Callable[..., RunningService], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path / "kernels"))
+    running = start_service(probe="/livez", workers=2, searches=2)
+    begun = time.monotonic()
+    until(lambda: ready(running) == 2, patience=300.0)
+    assert time.monotonic() - begun > 5.0, "nothing was compiled"
+    assert running.log().count("compiling the kernels") == 2
+    for pid in workers_of(running):
+        status = Path(f"/proc/{pid}/status").read_text()
+        anonymous = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("RssAnon"))
+        assert anonymous < 200_000  # kB; with the compiler in it, 480,000

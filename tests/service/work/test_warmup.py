@@ -5,87 +5,63 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from linefix.documents import examples
 from linefix.warmup import warm_up
 from tests.running import until
+from tests.service.asking import answered, scanned
+from tests.service.http.test_answers import ANSWERS, BODIES, VIEW
 
-LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}
-WALLS = examples.WALLS
-SEGMENTS = examples.ASSOCIATE["scan"]["segments"]
-AT = {"x": 1, "y": 0.5, "theta": 1}
-
-
-def around(walls: list[list[float]]) -> list[list[float]]:
-    """Return points on walls, in the order in which they are listed: a corner is cut, a wall seen twice."""
-    return [[a + k / 40.0 * (c - a), b + k / 40.0 * (d - b)] for a, b, c, d in [*walls, walls[0]] for k in range(40)]
+SEGMENTS, AT = examples.SEEN, {"x": 1, "y": 0.5, "theta": 1}
+MOMENTS = {
+    "centroids": [[0.5 * (a + c), 0.5 * (b + d)] for a, b, c, d in SEGMENTS],
+    "spreads": [1] * len(SEGMENTS),
+    "point_counts": [20] * len(SEGMENTS),
+}
+FEW = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}
+STEP = {"pose": {"x": 0, "y": 0, "theta": 0}, "covariance": [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}
 
 
 def among_people() -> dict[str, Any]:
     """Return ranges in the middle of a square room, two of three cut short: most beams end on no wall."""
-    angles = [-math.pi + math.tau * k / 360 for k in range(360)]
-    walls = [3.0 / max(abs(math.cos(a)), abs(math.sin(a))) for a in angles]
-    ranges = [r if k // 10 % 3 == 0 else (0.3 + k % 7 * 0.1) * r for k, r in enumerate(walls)]
-    return {"angle_min": -math.pi, "angle_increment": math.tau / 360, "ranges": ranges}
+    laser = scanned()
+    laser["ranges"] = [r if k // 10 % 3 == 0 else (0.3 + k % 7 * 0.1) * r for k, r in enumerate(laser["ranges"])]
+    return laser
 
 
-def views() -> list[dict[str, Any]]:
-    """Scans of several views, exact and not, upside down, by segments and by ranges."""
-    at: dict[str, Any] = {"pose": {"x": 0, "y": 0, "theta": 0}}
-    unsure = {**at, "covariance": [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}
-    whole, part = {"segments": SEGMENTS}, {"segments": SEGMENTS[:3]}
-    pairs: list[list[dict[str, Any]]] = [
-        [{**whole, **at}, {**part, **at}],
-        [{**whole, **at}, {**whole, **unsure}, {**part, **unsure, "relative_to": 1}],
-        [{"laser": LASER, **at, "flipped": True}, {"laser": LASER, **unsure}],
-    ]
-    return [{"views": pair} for pair in pairs]
-
-
-def associations() -> list[dict[str, Any]]:
-    """Requests of every form that a scan, a prior and the options can take."""
-    moments = {
-        "centroids": [[0.5 * (a + c), 0.5 * (b + d)] for a, b, c, d in SEGMENTS],
-        "spreads": [1] * len(SEGMENTS),
-        "point_counts": [20] * len(SEGMENTS),
-    }
+def requests() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Requests of every form that scans, priors, weights and options can take: those of other tests, and more."""
+    for path, parts, _ in ANSWERS.values():
+        yield path, {**BODIES[path], **parts}
+    corner = [k / 40.0 for k in range(40)]  # points on walls as they are listed: a corner is cut, a wall seen twice
+    walls = [[a + k * (c - a), b + k * (d - b)] for a, b, c, d in [*examples.WALLS, examples.WALLS[0]] for k in corner]
+    whole, views = {"segments": SEGMENTS}, [{"laser": FEW, **STEP, "flipped": True}, {"laser": FEW, **STEP}]
     scans: list[dict[str, Any]] = [
-        {"segments": SEGMENTS, "sigma": 0.02, **moments, "viewpoint": [0, 0]},
-        {"segments": SEGMENTS, "sigma": 0.5, "viewpoint": None},
-        {"segments": SEGMENTS[:1]},
-        {"segments": []},
-        {"laser": LASER, "sigma": None},
-        {"laser": among_people()},
+        {**whole, **MOMENTS, "sigma": 0.02, "viewpoint": [0, 0]}, {**whole, "sigma": 0.5, "viewpoint": None},
+        {"laser": FEW, "sigma": None}, {"laser": among_people()}, {"points": walls},
         {"points": [[3.0 * math.cos(k / 9.0), 3.0] for k in range(40)], "viewpoint": None},
-        {"points": around(WALLS)},
-        {"laser": {**LASER, "time_increment": 0.01}, "twist": {"vx": 1, "vy": 0, "omega": 0.5}},
-        *views(),
-    ]
+        {"laser": {**FEW, "time_increment": 0.01}, "twist": {"vx": 1, "vy": 0, "omega": 0.5}},
+        {"views": [{**VIEW}, {**whole, **STEP}, {"segments": SEGMENTS[:3], **STEP, "relative_to": 1}]},
+        {"views": [{**views[0], "covariance": None}, views[1]]},
+    ]  # fmt: skip
     asked: list[dict[str, Any]] = [{"scan": scan} for scan in scans]
-    asked += [{"prior": {**AT, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}]
-    asked += [{"prior": {**AT, "radius": 2, "angle": 1}}]
-    options = ({"oriented": False, "min_overlap": 0}, {"estimator": "one_step"}, {"offset_tolerance": 0.2, "seed": 7})
-    asked += [{"options": o} for o in options]
-    return [{**examples.ASSOCIATE, "options": {}, **parts} for parts in asked]
-
-
-def registrations() -> list[dict[str, Any]]:
-    """Requests of every form that weights and options can take."""
-    scan = examples.REGISTER["scan"]
-    n = len(scan["segments"])
-    asked: list[dict[str, Any]] = [
-        {"weighting": "uniform", "scan": {**scan, "sigma": 0}},
-        {"weighting": "shorter_length"},
-        {"weights": [1] * n},
-        {"weights": [1] + [0] * (n - 1), "correspondences": [[0, i] for i in range(n)]},
-        {"correspondences": []},
-        {"map": {**examples.REGISTER["map"], "sigma": 1}},
-    ]
-    options: list[dict[str, Any]] = [{"evaluate_at": AT, "k_rotation": 2}, {"oriented": False}]
-    asked += [{"options": {**o, "estimator": e}} for o in options for e in ("joint", "one_step")]
-    return [{**examples.REGISTER, **parts} for parts in asked]
+    options = ({"oriented": False, "min_overlap": 0}, {"offset_tolerance": 0.2, "seed": 7})
+    for parts in (*asked, *({"options": one} for one in options)):
+        yield "/v1/associate", {**examples.ASSOCIATE, "options": {}, **parts}
+    asked = [{"weighting": "uniform"}, {"weighting": "shorter_length"}, {"weights": [1, 0]}]
+    asked += [{"weights": [1, 0], "correspondences": [[0, 0], [0, 1]]}]
+    asked += [{"map": {**examples.REGISTER["map"], "sigma": 1}}]
+    of_options: list[dict[str, Any]] = [{"evaluate_at": AT, "k_rotation": 2}, {"oriented": False}]
+    asked += [{"options": {**one, "estimator": name}} for one in of_options for name in ("joint", "one_step")]
+    for parts in asked:
+        yield "/v1/register", {**examples.REGISTER, **parts}
+    for body in ({"scans": [{**scan} for scan in scans[:6]]}, examples.CHECK):
+        yield "/v1/maps/m:check", body
+    for body in ({}, examples.ANALYZE):
+        yield "/v1/maps/m:analyze", body
 
 
 def compiled_by_requests() -> list[str]:
@@ -102,13 +78,8 @@ def compiled_by_requests() -> list[str]:
         until(lambda: client.get("/readyz").status_code == 200)
         client.put("/v1/maps/m", json=examples.MAP)
         assert client.get("/v1/maps/m:check").status_code == 200
-        samples = {"scans": [asked["scan"] for asked in associations()[:6]]}
-        checks = ("/v1/maps/m:check", [samples, examples.CHECK])
-        analyses = ("/v1/maps/m:analyze", [{}, examples.ANALYZE])
-        for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations()), checks, analyses):
-            for body in bodies:
-                answer = client.post(path, json=body)
-                assert answer.status_code == 200, answer.text
+        for path, body in requests():
+            answered(client, path, body)
     return [name for name, count in signatures().items() if count != before.get(name, 0)]
 
 
