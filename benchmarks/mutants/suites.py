@@ -60,7 +60,7 @@ SUITES = {
     "service/": Suite(
         (
             "tests/service/test_settings.py",
-            "tests/service/maps/test_database_file.py",
+            "tests/service/maps/test_database.py",
             "tests/service/process",
             "tests/service/http/test_operations.py",
         )

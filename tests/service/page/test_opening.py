@@ -12,7 +12,7 @@ from playwright.sync_api import Page, Response, Route, expect
 
 from examples.sample import OfficePlan, offices, way_through, with_furniture, write_drive, write_grid
 from tests.running import RunningService, running
-from tests.service.http.test_map_points import MAP, SCAN
+from tests.service.http.test_maps_searched import MAP, SCAN
 from tests.service.importing.forms import SQUARE, room_grid
 
 from .plan import shown, verdict
