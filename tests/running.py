@@ -124,14 +124,17 @@ def start(data_dir: Path, *, probe: str = "/readyz", port: int | None = None, **
     while time.monotonic() < give_up:
         if process.poll() is not None:
             raise RuntimeError(f"the service ended with {process.returncode}: {service.log()}")
-        try:
-            if service.client.get(probe).status_code == 200:
-                return service
-        except httpx.TransportError:
-            pass
+        if answers(service.client, probe):
+            return service
         time.sleep(0.02)
     stop(service)
     raise RuntimeError(f"the service did not become ready: {service.log()}")
+
+
+def answers(client: httpx.Client, probe: str = "/livez") -> bool:
+    with suppress(httpx.TransportError):
+        return client.get(probe).status_code == 200
+    return False
 
 
 def stop(service: RunningService) -> None:

@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from examples.running import free_port
-from tests.running import RunningService, client_of, start, stop, until
+from tests.running import RunningService, answers, client_of, start, stop, until
 from tests.service.conftest import empty_database
 from tests.service.lines import Line
 
@@ -110,15 +110,8 @@ def _proxy(folder: Path, services: list[RunningService]) -> Iterator[str]:
     try:
         url = f"http://127.0.0.1:{port}"
         with client_of(url) as client:
-            until(lambda: _answers(client))
+            until(lambda: answers(client))
         yield url
     finally:
         process.terminate()
         process.wait(20)
-
-
-def _answers(client: httpx.Client) -> bool:
-    try:
-        return client.get("/livez").status_code == 200
-    except httpx.TransportError:
-        return False

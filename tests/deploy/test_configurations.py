@@ -23,7 +23,7 @@ from linefix.documents import examples
 from service.database_location import database_url
 from service.settings import Settings
 from tests.issuing import key_lines
-from tests.running import JSON, RunningService, until
+from tests.running import JSON, RunningService, answers, until
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
@@ -152,7 +152,7 @@ def behind(proxy: Proxy, service: RunningService, folder: Path, *, elsewhere: bo
         process = subprocess.Popen(command, stdout=log, stderr=log)
     try:
         with httpx.Client(base_url=f"https://127.0.0.1:{port}", headers=JSON, verify=False, timeout=60) as client:
-            until(lambda: _answers(client))
+            until(lambda: answers(client))
             yield client
     finally:
         process.terminate()
@@ -228,10 +228,3 @@ def _changed(path: Path, folder: Path, changes: dict[str, str]) -> Path:
         text = text.replace(before, after)
     (folder / path.name).write_text(text)
     return folder / path.name
-
-
-def _answers(client: httpx.Client) -> bool:
-    try:
-        return client.get("/livez").status_code == 200
-    except httpx.TransportError:
-        return False

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import cycle
 
 import httpx
 import pytest
 
 from linefix.documents import examples
 from tests.deploy.replicas import Replicas, replicas
-from tests.running import client_of, until
+from tests.running import asked_again, client_of, until
 
 pytestmark = pytest.mark.long
 STORED = {"map": {"map_id": "m"}, "scan": {"segments": examples.SEEN}}
@@ -28,26 +29,21 @@ class Load:
     statuses: list[tuple[int, str]] = field(default_factory=list)
     written: dict[str, int] = field(default_factory=dict)
     stale: list[str] = field(default_factory=list)
-    enough: threading.Event = field(default_factory=threading.Event)
+    names: Iterator[str] = field(default_factory=lambda: cycle(f"w{number}" for number in range(5)))
 
-    def ask(self) -> None:
-        with client_of(self.url) as client:
-            while not self.enough.is_set():
-                self._note(lambda: client.post("/v1/associate", json=STORED))
+    def ask(self, client: httpx.Client) -> None:
+        self._note(lambda: client.post("/v1/associate", json=STORED))
 
-    def write(self) -> None:
+    def write(self, client: httpx.Client) -> None:
         """Put a map; the next answer of any replica must have this revision."""
-        number = 0
-        with client_of(self.url) as client:
-            while not self.enough.is_set():
-                name, number = f"w{number % 5}", number + 1
-                answer = self._note(lambda name=name: client.put(f"/v1/maps/{name}", json=examples.MAP))
-                if answer is None or answer.status_code not in (200, 201):
-                    continue
-                self.written[name] = int(answer.json()["revision"])
-                seen = self._note(lambda name=name: client.get(f"/v1/maps/{name}"))
-                if seen is not None and seen.status_code == 200 and _revision(seen) < self.written[name]:
-                    self.stale.append(name)
+        name = next(self.names)
+        answer = self._note(lambda: client.put(f"/v1/maps/{name}", json=examples.MAP))
+        if answer is None or answer.status_code not in (200, 201):
+            return
+        self.written[name] = int(answer.json()["revision"])
+        seen = self._note(lambda: client.get(f"/v1/maps/{name}"))
+        if seen is not None and seen.status_code == 200 and _revision(seen) < self.written[name]:
+            self.stale.append(name)
 
     def _note(self, send: object) -> httpx.Response | None:
         try:
@@ -71,16 +67,12 @@ def _revision(answer: httpx.Response) -> int:
 @contextmanager
 def loaded(url: str) -> Iterator[Load]:
     load = Load(url)
-    threads = [threading.Thread(target=load.ask) for _ in range(CLIENTS)] + [threading.Thread(target=load.write)]
-    for thread in threads:
-        thread.start()
-    try:
+    with ExitStack() as stack:
+        for call in [load.ask] * CLIENTS + [load.write]:
+            client = stack.enter_context(client_of(url))
+            stack.enter_context(asked_again(1, partial(call, client)))
         until(lambda: len(load.statuses) > 20)
         yield load
-    finally:
-        load.enough.set()
-        for thread in threads:
-            thread.join(60)
 
 
 @pytest.fixture(scope="module")

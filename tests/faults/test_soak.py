@@ -9,7 +9,6 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -21,7 +20,7 @@ from tests.running import JSON
 
 CALLERS = 3
 PAUSE = 0.1  # s between the requests of one caller, in the mean
-MOST = 512_000_000  # bytes
+MOST = 512.0  # MB
 
 
 def rooms(count: int, seed: int) -> list[list[float]]:
@@ -88,21 +87,6 @@ class Mix:
             time.sleep(self._draw.uniform(0.0, 0.02))
 
 
-def resident(pid: int) -> int:
-    """Return the resident bytes of a process and its children; what they share counts for each."""
-    pids, total = [pid], 0
-    while pids:
-        one = pids.pop()
-        try:
-            status = Path(f"/proc/{one}/status").read_text()
-            for task in Path(f"/proc/{one}/task").iterdir():
-                pids += [int(child) for child in (task / "children").read_text().split()]
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        total += next((1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS")), 0)
-    return total
-
-
 @pytest.mark.long
 def test_memory_is_flat_under_mixed_load(start_service: Callable[..., Any], request: pytest.FixtureRequest) -> None:
     seconds = 60.0 * request.config.getoption("--soak-minutes")
@@ -121,15 +105,15 @@ def test_memory_is_flat_under_mixed_load(start_service: Callable[..., Any], requ
     callers = [threading.Thread(target=call, args=(seed,)) for seed in range(CALLERS)]
     for caller in callers:
         caller.start()
-    samples: list[int] = []
+    samples: list[float] = []
     while any(caller.is_alive() for caller in callers):
         time.sleep(0.5)
-        samples.append(resident(running.process.pid))
+        samples.append(running.memory_mb())
     fifth = len(samples) // 5
-    medians = [statistics.median(samples[i * fifth : (i + 1) * fifth]) / 1e6 for i in range(5)]
+    medians = [statistics.median(samples[i * fifth : (i + 1) * fifth]) for i in range(5)]
     print(f"\n{seconds / 60:g} minutes, {sum(counts.values())} requests: {dict(sorted(counts.items()))}")
     print(f"resident memory in MB, medians of fifths: {', '.join(f'{m:.0f}' for m in medians)}; ", end="")
-    print(f"peak {max(samples) / 1e6:.0f}")
+    print(f"peak {max(samples):.0f}")
     assert not [status for status in counts if status.startswith("5") and status not in ("503", "504")]
     assert "a defect" not in running.log()
     assert counts["200"] > 0.5 * sum(counts.values())

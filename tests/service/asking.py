@@ -37,8 +37,7 @@ def pose_json(at: RigidTransform) -> dict[str, float]:
 
 def seen_from(at: RigidTransform) -> list[list[float]]:
     """Return the walls of the room in the frame of a sensor in the map."""
-    ends: list[list[float]] = at.inverse().apply(ROOM.endpoints.reshape(-1, 2, 2)).reshape(-1, 4).tolist()
-    return ends
+    return at.inverse().apply(ROOM.endpoints.reshape(-1, 2, 2)).reshape(-1, 4).tolist()
 
 
 def scanned(

@@ -17,8 +17,7 @@ from service.http.problems import KINDS
 
 @pytest.fixture(scope="module")
 def document(service: Any) -> dict[str, Any]:
-    found: dict[str, Any] = httpx.get(service.url + "/openapi.json").json()
-    return found
+    return httpx.get(service.url + "/openapi.json").json()
 
 
 def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:

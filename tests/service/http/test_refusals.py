@@ -17,24 +17,7 @@ from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestErr
 from service import errors
 from service.http.problems import INTERNAL, KINDS, RAISED, TABLE, problem_of
 
-from .wrong_requests import (
-    ANALYZE,
-    ASSOCIATE,
-    AT,
-    BATCH,
-    BODIES,
-    CHECK,
-    LASER,
-    PUT,
-    REGISTER,
-    ROOM,
-    SEVERALLY,
-    STILL,
-    TWO_MAPS,
-    VECTORIZE,
-    VIEW,
-    WRONG,
-)
+from .wrong_requests import ASSOCIATE, BATCH, BODIES, LASER, PUT, REGISTER, ROOM, STATUSES, TAKEN, VECTORIZE, WRONG
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -88,45 +71,6 @@ def test_what_is_not_json_is_400(client: httpx.Client, call: str) -> None:
         assert ("an unknown range is null" in problem["detail"]) == (b"NaN" in body or b"Infinity" in body)
 
 
-NO_TIME: dict[str, Any] = {"options": {"deadline_ms": 0}}
-NOWHERE = {"map_id": "nowhere"}
-BEAMS = {"laser": {"angle_min": 0.0, "angle_increment": 1e-4, "ranges": [1.0] * 17_000}, "pose": AT}
-# A request, what it has, its status and code, and headers of the answer or a word of the detail.
-STATUSES: list[tuple[str, Any, int, str, dict[str, str] | str]] = [
-    ("GET /nothing", b"", 404, "not_found", ""),
-    ("GET /v1/maps/", b"", 404, "not_found", ""),
-    ("GET /v1/associate", b"", 405, "method_not_allowed", {"allow": "POST"}),
-    ("PATCH /livez", b"", 405, "method_not_allowed", {"allow": "GET, HEAD"}),
-    ("POST /v1/maps/m", b"", 405, "method_not_allowed", {"allow": "DELETE, GET, HEAD, PUT"}),
-    ("BREW /livez", b"", 405, "method_not_allowed", {"allow": "GET, HEAD"}),
-    ("GET /v1/maps:import", b"", 405, "method_not_allowed", {"allow": "POST"}),
-    ("GET /v1/maps/nowhere", b"", 404, "unknown_map", ""),
-    ("DELETE /v1/maps/nowhere", b"", 404, "unknown_map", ""),
-    ("GET /v1/maps/nowhere:check", b"", 404, "unknown_map", ""),
-    ("POST /v1/maps/nowhere:check", {"scans": [STILL]}, 404, "unknown_map", ""),
-    ("POST /v1/maps/nowhere:analyze", {}, 404, "unknown_map", ""),
-    ("POST /v1/maps/nowhere:update", examples.UPDATE, 404, "unknown_map", ""),
-    (ASSOCIATE, {"map": NOWHERE}, 404, "unknown_map", ""),
-    (BATCH, {"map": NOWHERE}, 404, "unknown_map", ""),
-    (SEVERALLY, {"maps": [NOWHERE, TWO_MAPS[0]]}, 404, "unknown_map", ""),
-    (SEVERALLY, {"maps": {"prefix": "nowhere-"}}, 404, "unknown_map", ""),
-    *((f"PUT /v1/maps/{name}", examples.MAP, 422, "invalid_request", "/path/map_id: ")
-      for name in ("a b", "x" * 129, "\u00e4", "a:b", "m:check")),
-    ("GET /v1/maps/a b:check", b"", 422, "invalid_request", "/path/map_id: "),
-    ("GET /v1/maps/wrong:check?deadline_ms=soon", b"", 422, "invalid_request", "/query/deadline_ms: "),
-    ("GET /v1/maps?limit=0", b"", 422, "invalid_request", "/query/limit: "),
-    ("GET /v1/maps/wrong:check?deadline_ms=0", b"", 504, "deadline_exceeded", ""),
-    (CHECK, {"scans": [STILL], "deadline_ms": 0}, 504, "deadline_exceeded", ""),
-    (ANALYZE, {"deadline_ms": 0}, 504, "deadline_exceeded", ""),
-    (ASSOCIATE, NO_TIME, 504, "deadline_exceeded", ""),
-    (BATCH, NO_TIME, 504, "deadline_exceeded", ""),
-    (ASSOCIATE, b'{"a": [' + b"[]," * 1_000_001 + b"[]]}", 413, "too_large", "expected at most 2000000 values"),
-    (PUT, {"points": [[0, 0]] * 200_001}, 413, "too_large", "expected at most 200000 map points"),
-    (ASSOCIATE, {"scan": {"views": [VIEW] * 65}}, 413, "too_large", "expected at most 64 views"),
-    (ASSOCIATE, {"scan": {"views": [BEAMS] * 6}}, 413, "too_large", "100000 ranges or points"),
-]  # fmt: skip
-
-
 @pytest.mark.parametrize(("call", "parts", "status", "code", "more"), STATUSES, ids=range(len(STATUSES)))
 def test_each_status_has_its_code(
     client: httpx.Client, call: str, parts: Any, status: int, code: str, more: dict[str, str] | str
@@ -167,14 +111,6 @@ def test_ten_thousand_bad_rows_make_a_small_answer_without_an_echo(client: httpx
     assert len(refused(response, 422, "invalid_request")["errors"]) == 20
     # The name of an unknown field may be in its pointer; its value is nowhere.
     assert response.text.replace("/map/cuckoo", "").count("cuckoo") == 0
-
-
-TAKEN = [
-    *({"ranges": [5e-324] * 9}, {"ranges": [2.0, 5e-324, 2.0] * 3, "range_min": 0.0}),  # numbers next to nothing
-    {"angle_max": 0.4, "time_increment": 0.0, "scan_time": 0.1, "intensities": [1.0] * 9, "header": {"seq": 7}},
-    *({"angle_max": last} for last in (None, 0.4, 0.5, 0.3)),  # off by a beam
-    {"angle_min": -0.8, "angle_max": 0},
-]
 
 
 def test_what_only_looks_like_a_mistake_is_taken(client: httpx.Client) -> None:

@@ -1,4 +1,4 @@
-"""Tables of requests with one wrong part: the place that is named, and what its message says."""
+"""Tables of wrong requests: the place that is named and what its message says, or the status and its code."""
 
 from __future__ import annotations
 
@@ -155,7 +155,14 @@ PAIRS = {"map": {"segments": ROOM, "sigma": 0.0}, "scan": {"segments": ROOM, "si
 FLAT = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
 SEEN = examples.UPDATE["visits"][1]["scans"][0]
 BOX = {"code": "removed", "segments": [], "new": []}
+ONE, TWO = ({**BOX, "segments": [number]} for number in (1, 2))
 SHARP = {"segments": [1], "ends": [[0.0, 0.0, 1.0, 0.0]], "sigma": [0.01]}
+
+
+def visited(**more: Any) -> dict[str, Any]:
+    return {"visits": [{"visit": "a", "scans": [{**SEEN, **more}]}]}
+
+
 # Whole requests.
 OTHERS: list[tuple[str, dict[str, Any], str, str]] = [
     (REGISTER, {"correspondences": [[0, 0], [1, 4]]}, "/correspondences/1", ""),
@@ -198,28 +205,13 @@ OTHERS: list[tuple[str, dict[str, Any], str, str]] = [
     (UPDATE, {"visits": []}, "/visits", ""),
     (UPDATE, {"visits": [{"visit": "a", "scans": []}]}, "/visits/0/scans", ""),
     (UPDATE, {"visits": [{"visit": "a", "scans": [STILL]}]}, "/visits/0/scans/0/laser /visits/0/scans/0/segments", ""),
-    (UPDATE, {"visits": [{"visit": "a", "scans": [{**SEEN, "pose": AT}]}]}, "/visits/0/scans/0", "both pose and"),
-    (
-        UPDATE,
-        {"visits": [{"visit": "a", "scans": [{**SEEN, "pose": AT, "covariance": FLAT}]}]},
-        "/visits/0/scans/0/covariance",
-        "",
-    ),
-    (
-        UPDATE,
-        {"visits": [{"visit": "a", "scans": [{**SEEN, "odometry": {**AT, "theta": 90.0}}]}]},
-        "/visits/0/scans/0/odometry/theta",
-        "degrees",
-    ),
+    (UPDATE, visited(pose=AT), "/visits/0/scans/0", "both pose and"),
+    (UPDATE, visited(pose=AT, covariance=FLAT), "/visits/0/scans/0/covariance", ""),
+    (UPDATE, visited(odometry={**AT, "theta": 90.0}), "/visits/0/scans/0/odometry/theta", "degrees"),
     (UPDATE, {"accept": 2.0}, "/accept", ""),
     (UPDATE, {"refuse": [4]}, "/refuse", ""),
     (APPLY, {"changes": [{**BOX, "segments": [99]}]}, "/changes/0", "found segment 99"),
-    (
-        APPLY,
-        {"changes": [{**BOX, "segments": [1], "accepted": False}, *[{**BOX, "segments": [2]}] * 2]},
-        "/changes/2",
-        "named before",
-    ),
+    (APPLY, {"changes": [{**ONE, "accepted": False}, TWO, TWO]}, "/changes/2", "named before"),
     (APPLY, {"changes": [{**BOX, "segments": [*range(4)]}]}, "/changes", "no segment that is left"),
     (APPLY, {"changes": [{**BOX, "new": [{"segment": [1, 1, 1, 1], "sigma": 0.0}]}]}, "/changes/0/new/0", "shorter"),
     (APPLY, {"sharpened": {**SHARP, "segments": [99]}}, "/sharpened/segments", ""),
@@ -275,4 +267,49 @@ WRONG: list[tuple[str, dict[str, Any], str, str]] = [
     *below(VECTORIZE, "/points", [([ROOM[0][:2]] * 4 + [[bad[-1][-1], 1.0]], *told) for bad, *told in NUMBERS]),
     *SEVERAL,
     *OTHERS,
+]
+
+NO_TIME: dict[str, Any] = {"options": {"deadline_ms": 0}}
+NOWHERE = {"map_id": "nowhere"}
+BEAMS = {"laser": {"angle_min": 0.0, "angle_increment": 1e-4, "ranges": [1.0] * 17_000}, "pose": AT}
+# A request, what it has, its status and code, and headers of the answer or a word of the detail.
+STATUSES: list[tuple[str, Any, int, str, dict[str, str] | str]] = [
+    ("GET /nothing", b"", 404, "not_found", ""),
+    ("GET /v1/maps/", b"", 404, "not_found", ""),
+    ("GET /v1/associate", b"", 405, "method_not_allowed", {"allow": "POST"}),
+    ("PATCH /livez", b"", 405, "method_not_allowed", {"allow": "GET, HEAD"}),
+    ("POST /v1/maps/m", b"", 405, "method_not_allowed", {"allow": "DELETE, GET, HEAD, PUT"}),
+    ("BREW /livez", b"", 405, "method_not_allowed", {"allow": "GET, HEAD"}),
+    ("GET /v1/maps:import", b"", 405, "method_not_allowed", {"allow": "POST"}),
+    ("GET /v1/maps/nowhere", b"", 404, "unknown_map", ""),
+    ("DELETE /v1/maps/nowhere", b"", 404, "unknown_map", ""),
+    ("GET /v1/maps/nowhere:check", b"", 404, "unknown_map", ""),
+    ("POST /v1/maps/nowhere:check", {"scans": [STILL]}, 404, "unknown_map", ""),
+    ("POST /v1/maps/nowhere:analyze", {}, 404, "unknown_map", ""),
+    ("POST /v1/maps/nowhere:update", examples.UPDATE, 404, "unknown_map", ""),
+    (ASSOCIATE, {"map": NOWHERE}, 404, "unknown_map", ""),
+    (BATCH, {"map": NOWHERE}, 404, "unknown_map", ""),
+    (SEVERALLY, {"maps": [NOWHERE, TWO_MAPS[0]]}, 404, "unknown_map", ""),
+    (SEVERALLY, {"maps": {"prefix": "nowhere-"}}, 404, "unknown_map", ""),
+    *((f"PUT /v1/maps/{name}", examples.MAP, 422, "invalid_request", "/path/map_id: ")
+      for name in ("a b", "x" * 129, "\u00e4", "a:b", "m:check")),
+    ("GET /v1/maps/a b:check", b"", 422, "invalid_request", "/path/map_id: "),
+    ("GET /v1/maps/wrong:check?deadline_ms=soon", b"", 422, "invalid_request", "/query/deadline_ms: "),
+    ("GET /v1/maps?limit=0", b"", 422, "invalid_request", "/query/limit: "),
+    ("GET /v1/maps/wrong:check?deadline_ms=0", b"", 504, "deadline_exceeded", ""),
+    (CHECK, {"scans": [STILL], "deadline_ms": 0}, 504, "deadline_exceeded", ""),
+    (ANALYZE, {"deadline_ms": 0}, 504, "deadline_exceeded", ""),
+    (ASSOCIATE, NO_TIME, 504, "deadline_exceeded", ""),
+    (BATCH, NO_TIME, 504, "deadline_exceeded", ""),
+    (ASSOCIATE, b'{"a": [' + b"[]," * 1_000_001 + b"[]]}", 413, "too_large", "expected at most 2000000 values"),
+    (PUT, {"points": [[0, 0]] * 200_001}, 413, "too_large", "expected at most 200000 map points"),
+    (ASSOCIATE, {"scan": {"views": [VIEW] * 65}}, 413, "too_large", "expected at most 64 views"),
+    (ASSOCIATE, {"scan": {"views": [BEAMS] * 6}}, 413, "too_large", "100000 ranges or points"),
+]  # fmt: skip
+# Parts of a laser that only look like mistakes.
+TAKEN = [
+    *({"ranges": [5e-324] * 9}, {"ranges": [2.0, 5e-324, 2.0] * 3, "range_min": 0.0}),  # numbers next to nothing
+    {"angle_max": 0.4, "time_increment": 0.0, "scan_time": 0.1, "intensities": [1.0] * 9, "header": {"seq": 7}},
+    *({"angle_max": last} for last in (None, 0.4, 0.5, 0.3)),  # off by a beam
+    {"angle_min": -0.8, "angle_max": 0},
 ]

@@ -56,8 +56,7 @@ class Plan:
     def colour(self, x: float, y: float) -> list[int]:
         """Return red, green, blue and alpha of what is drawn at a place."""
         box, (px, py) = self.box(), self.at(x, y)
-        found: list[int] = self.page.evaluate(PIXEL, [px - box["x"], py - box["y"]])
-        return found
+        return self.page.evaluate(PIXEL, [px - box["x"], py - box["y"]])
 
 
 ROOMS = (-1.0, 0.0, 12.6, 5.15)  # bounds of the example

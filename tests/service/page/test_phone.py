@@ -44,8 +44,7 @@ def drag(page: Page, *ways: tuple[tuple[float, float], tuple[float, float]]) -> 
 
 
 def scrolled(page: Page) -> float:
-    found: float = page.evaluate("window.scrollY")
-    return found
+    return page.evaluate("window.scrollY")
 
 
 def test_nothing_is_wider_than_the_screen(phone: Page) -> None:

@@ -7,16 +7,14 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import suppress
 from pathlib import Path
 
-import httpx
 import orjson
 import pytest
 
 from examples.running import free_port
 from service.telemetry.logs import WAITING_LINES
-from tests.running import PATIENCE, START_SECONDS, client_of, until
+from tests.running import PATIENCE, START_SECONDS, answers, client_of, until
 
 LOGS = """
 import logging, logging.config, sys, time
@@ -57,12 +55,6 @@ def test_what_a_sleeping_reader_misses_is_counted() -> None:
     assert lines[-1]["message"] == "last"
 
 
-def is_ready(client: httpx.Client) -> bool:
-    with suppress(httpx.TransportError):
-        return client.get("/readyz").status_code == 200
-    return False
-
-
 def ask_for_livez(port: int, times: int) -> None:
     """Ask so many times over one connection, a hundred times at once."""
     request = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"
@@ -81,22 +73,12 @@ def test_the_service_does_not_wait_for_who_reads_its_log(tmp_path: Path) -> None
     """A pipe holds 64 kB; with the next line the event loop stood still."""
     port = free_port()
     reading, writing = os.pipe()
-    command = [
-        sys.executable,
-        "-m",
-        "service",
-        "--port",
-        str(port),
-        "--data-dir",
-        str(tmp_path),
-        "--drain-s",
-        "0",
-    ]
-    process = subprocess.Popen(command, stderr=writing)
+    arguments = ["--port", str(port), "--data-dir", str(tmp_path), "--drain-s", "0"]
+    process = subprocess.Popen([sys.executable, "-m", "service", *arguments], stderr=writing)
     os.close(writing)
     try:
         with client_of(f"http://127.0.0.1:{port}") as client:
-            until(lambda: is_ready(client), START_SECONDS)
+            until(lambda: answers(client, "/readyz"), START_SECONDS)
         ask_for_livez(port, WAITING_LINES + 1000)
         process.terminate()
         assert process.wait(15) == 0

@@ -39,8 +39,7 @@ def analysis(deadline: Deadline) -> Work:
 def places(found: dict[str, Any] | None) -> list[dict[str, Any]]:
     assert found is not None
     assert found["complete"]
-    listed: list[dict[str, Any]] = found["places"]
-    return listed
+    return found["places"]
 
 
 @pytest.mark.usefixtures("short_turns")
