@@ -44,8 +44,14 @@ def breaking(old: Any, new: Any) -> list[str]:
         asked |= reached(old, operation.get("requestBody", {}))
     lost = [f"{at} is {now[at]}, was {value}" for at, value in was.items() if at in now and now[at] != value]
     gone = [f"{at} is gone" for at in was.keys() - now.keys()]
-    of_requests = [at for at in now.keys() - was.keys() if {*at.split("/")[3:4]} <= asked and at.count("/") > 3]
-    return [*lost, *gone, *(f"{at} is new" for at in of_requests if {*at.split("/")[4:]} & {*DEMANDS})]
+    return [*lost, *gone, *(f"{at} is new" for at in now.keys() - was.keys() if _is_demanded(at, was, asked))]
+
+
+def _is_demanded(at: str, was: dict[str, Any], asked: set[str]) -> bool:
+    """Return whether a place that is new demands more of a request that there was before."""
+    parts = at.split("/")
+    first = next((number for number, part in enumerate(parts) if number > 3 and part in DEMANDS), 0)
+    return first > 0 and parts[3] in asked and "/".join(parts[:first]) in was
 
 
 def test_nothing_breaks_clients_of_the_last_release(client: httpx.Client) -> None:
