@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationResult, Scan
+from association import AssociationResult, Deadline, Scan
 from registration import InputError, RigidTransform, Segments, wrap_angle
 from simulation import Scanner, scan
 from vectorization import LaserScan, VectorizationOptions, vectorize
@@ -125,6 +126,11 @@ def is_same(found: RigidTransform, pose: RigidTransform) -> bool:
     """Return whether two poses are of the same place."""
     away = math.hypot(found.x - pose.x, found.y - pose.y)
     return away < SAME_PLACE and abs(wrap_angle(found.theta - pose.theta)) < SAME_HEADING
+
+
+def in_time(items: Iterable[T], deadline: Deadline) -> Iterator[T]:
+    """Yield items until the deadline passes."""
+    return itertools.takewhile(lambda _: not deadline.passed, items)
 
 
 def finished(steps: Steps[T]) -> T:

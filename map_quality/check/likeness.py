@@ -12,7 +12,7 @@ from association import AssociationOptions, Deadline, IndexingEndedError, MapInd
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
-from ..views import Robot, look, similar_pose
+from ..views import Robot, in_time, look, similar_pose
 from . import tuning
 from .pieces import longest_pieces
 from .result import Finding, Place
@@ -53,9 +53,7 @@ def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> 
     segments = index.segments.take(np.arange(index.directed))
     options = AssociationOptions(oriented=oriented, on_map=1.0)
     looked, found, hits = 0, [], set[int]()
-    for number, pose in enumerate(_places(index, segments)):
-        if deadline.passed:
-            break
+    for number, pose in in_time(enumerate(_places(index, segments)), deadline):
         seen = look(segments, pose, ROBOT, np.random.default_rng(number))
         if len(seen.scan.measured) < LEAST_SEEN:
             continue

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from association import Deadline, MapIndex
 from registration.layout import Floats, Records
 
+from ..views import in_time
 from . import tuning
 from .result import Finding
 
@@ -48,9 +49,7 @@ def find_near_walls(index: MapIndex, deadline: Deadline) -> NearWalls:
     """Compare the walls of a directed map that are near to each other, as many as the deadline allows."""
     walls = index.walls.rows
     near = NearWalls(*(np.zeros(len(walls), dtype=bool) for _ in range(3)))
-    for pairs in near_pairs(index):
-        if deadline.passed:
-            break
+    for pairs in in_time(near_pairs(index), deadline):
         _compare(walls, pairs, near)
     return near
 
@@ -158,9 +157,7 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     if not len(alone) or deadline.passed:
         return
     found = set()
-    for end, gap in _loose_ends(ends, alone, least, deadline):
-        if deadline.passed:
-            break
+    for end, gap in in_time(_loose_ends(ends, alone, least, deadline), deadline):
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
         if apart > least + tuning.SAME_LINE and min(apart, gap) <= tuning.GREATEST_GAP:
             found.add(end // 2)
@@ -210,9 +207,7 @@ def _lapping(index: MapIndex, deadline: Deadline) -> set[int]:
     starts, order = index.pieces.starts, index.pieces.items
     ends = index.segments.shifted(-index.origin).endpoints
     found: set[int] = set()
-    for wall in np.flatnonzero(np.diff(starts) > 1):
-        if deadline.passed:
-            break
+    for wall in in_time(np.flatnonzero(np.diff(starts) > 1), deadline):
         row, pieces = index.walls.rows[wall], order[starts[wall] : starts[wall + 1]]
         d = np.array([row["dx"], row["dy"]])
         begins, stops = ends[pieces, :2] @ d, ends[pieces, 2:] @ d

@@ -7,17 +7,23 @@ nothing, or the back of the wall's other face.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from association import Deadline, MapIndex
+from registration import RigidTransform, Segments
 from registration.layout import Floats
+from simulation import Scanner, scan
 
+from ..views import in_time
 from . import tuning
 from .pieces import Flags, Indices, longest_pieces, segments_of
 from .result import Finding
+
+FAN = Scanner(tuning.RAYS_FROM_A_PLACE, *tuning.FAN, range_max=tuning.FOLLOWED, sigma=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,41 +76,6 @@ class Sides:
         return bool(self.lengths[which].sum() >= tuning.MOST * self.lengths.sum() > 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class _Hits:
-    """The first segments that rays meet: distances (r,), inf where there is none, indices, and if on their left."""
-
-    reach: Floats
-    segments: Indices
-    fronts: Flags
-
-    @classmethod
-    def of(cls, ends: Floats, low: Floats, high: Floats, origins: Floats, rays: Floats) -> _Hits:
-        """Follow rays from origins, both (r, 2), through segments, (n, 4) with corners (n, 2), up to `FOLLOWED`.
-
-        If too many segments are near, rays meet none.
-        """
-        found = cls(np.full(len(rays), np.inf), np.zeros(len(rays), dtype=np.intp), np.zeros(len(rays), dtype=bool))
-        for limit in (*tuning.NEAR_FOLLOWED, tuning.FOLLOWED):
-            left = np.flatnonzero(np.isinf(found.reach))
-            near = (high >= origins.min(axis=0) - limit) & (low <= origins.max(axis=0) + limit)
-            around = np.flatnonzero(near.all(axis=1))
-            if not 0 < len(left) * len(around) <= tuning.RAYS_TIMES_SEGMENTS:
-                continue
-            bx, by = (ends[around, k] - origins[left, k, None] for k in (0, 1))
-            dx, dy = (ends[around, k + 2] - ends[around, k] for k in (0, 1))
-            rx, ry = rays[left, 0, None], rays[left, 1, None]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                slant = rx * dy - ry * dx
-                reach, along = (bx * dy - by * dx) / slant, (bx * ry - by * rx) / slant
-                reach = np.where((reach > 0.0) & (reach <= limit) & (along >= 0.0) & (along <= 1.0), reach, np.inf)
-            first = reach.argmin(axis=1)
-            row = np.arange(len(left))
-            found.reach[left], found.segments[left] = reach[row, first], around[first]
-            found.fronts[left] = slant[row, first] > 0.0
-        return found
-
-
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
     """Follow rays from both sides of the longest walls of a directed map, as many as the deadline allows.
 
@@ -115,27 +86,43 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     most = min(tuning.MOST_LOOKED_FROM, tuning.WALLS_TIMES_SEGMENTS // len(segments))
     longest = np.argsort(-lengths, kind="stable")[:most]
     chosen = longest[(lengths[longest] >= tuning.SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
-    ends, both = segments.endpoints, np.array([1.0, -1.0])[:, None, None, None]
-    low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
-    lowest, highest = low.min(axis=0), high.max(axis=0)
-    turns, places = np.array(tuning.TURNS)[:, None], np.array(tuning.PLACES_ON_A_WALL)[:, None]
+    corners = segments.endpoints.reshape(-1, 2)
+    lowest, highest = corners.min(axis=0), corners.max(axis=0)
     counts, room, lost = np.zeros((len(chosen), 2, 2)), np.full((len(chosen), 2), np.inf), np.zeros(len(chosen), bool)
     done = 0
-    for k, piece in enumerate(longest_pieces(index)[chosen].tolist()):
-        if deadline.passed:
-            break
-        normal, direction = segments.normals[piece], segments.directions[piece]
-        starts = ends[piece, :2] + places * segments.lengths[piece] * direction
-        rays = both * (np.cos(turns) * normal + np.sin(turns) * direction) + np.zeros((2, len(places), 1, 1))
-        origins = starts[:, None] + tuning.OFF_THE_WALL * both * normal + np.zeros_like(rays)
-        met = _Hits.of(ends, low, high, origins.reshape(-1, 2), rays.reshape(-1, 2))
-        told = (met.reach > tuning.TOO_NEAR) & np.isfinite(met.reach) & ~both_ways[index.wall_of_piece[met.segments]]
-        counts[k] = np.stack([told & met.fronts, told & ~met.fronts], axis=1).reshape(2, -1, 2).sum(axis=1)
-        room[k] = np.where(told, met.reach, np.inf).reshape(2, -1).min(axis=1)
-        stops = (origins + tuning.FOLLOWED * rays)[0][np.isinf(met.reach).reshape(rays.shape[:3])[0]]
-        lost[k] = ((stops >= lowest) & (stops <= highest)).all(axis=1).any()
-        done = k + 1
+    for piece in in_time(longest_pieces(index)[chosen].tolist(), deadline):
+        near = _around(segments, piece)
+        walls = segments.take(near)
+        for side, pose in _places(segments, piece):
+            met = scan(walls, pose, FAN)
+            told = met.hits >= 0
+            told[told] = ~both_ways[index.wall_of_piece[near[met.hits[told]]]]
+            told &= met.true_ranges > tuning.TOO_NEAR
+            counts[done, side] += (told & met.facing).sum(), (told & ~met.facing).sum()
+            room[done, side] = met.true_ranges.min(where=told, initial=room[done, side])
+            if side == 0:
+                angles = FAN.angles[met.hits < 0] + pose.theta
+                stops = tuning.FOLLOWED * np.column_stack([np.cos(angles), np.sin(angles)]) + [pose.x, pose.y]
+                lost[done] |= ((stops >= lowest) & (stops <= highest)).all(axis=1).any()
+        done += 1
     return Sides(chosen[:done], lengths[chosen[:done]], counts[:done], room[:done], lost[:done])
+
+
+def _around(segments: Segments, piece: int) -> Indices:
+    """Return the segments that rays from a segment may meet."""
+    ends = segments.endpoints
+    low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+    near = (high >= low[piece] - tuning.FOLLOWED) & (low <= high[piece] + tuning.FOLLOWED)
+    return np.flatnonzero(near.all(axis=1))
+
+
+def _places(segments: Segments, piece: int) -> Iterator[tuple[int, RigidTransform]]:
+    """Yield places a little to the left (0) and to the right (1) of a segment, that look away from it."""
+    begin, normal = segments.endpoints[piece, :2], segments.normals[piece]
+    for side, away in enumerate((normal, -normal)):
+        for share in tuning.PLACES_ON_A_WALL:
+            x, y = begin + share * segments.lengths[piece] * segments.directions[piece] + tuning.OFF_THE_WALL * away
+            yield side, RigidTransform(float(x), float(y), math.atan2(away[1], away[0]))
 
 
 def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:

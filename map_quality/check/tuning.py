@@ -29,13 +29,12 @@ STEPS = (0.5, 0.25, 0.2, 0.1, 0.05, 0.04, 0.025, 0.02)  # m; rasters that are lo
 # --- Sides ------------------------------------------------------------------------------------------------------------
 
 MOST_LOOKED_FROM, WALLS_TIMES_SEGMENTS = 2000, 40_000_000  # walls, the longest; time, some 0.2 to 2 ms each
-RAYS_TIMES_SEGMENTS = 200_000  # compared together; memory, 16 MB, and time
 SHORTEST_LOOKED_FROM = 0.3  # m, tables
 PLACES_ON_A_WALL = (0.25, 0.5, 0.75)  # of its length
-TURNS = tuple(math.radians(a) for a in (-60.0, -20.0, 20.0, 60.0))  # of the rays, from the wall's normal
+RAYS_FROM_A_PLACE = 4
+FAN = (math.radians(-60.0), math.radians(40.0))  # first angle and step of these, from the wall's normal
 OFF_THE_WALL = 1e-3  # m, geometry
 FOLLOWED = 40.0  # m, tables
-NEAR_FOLLOWED = (3.0, 10.0)  # m; time: rays that end within these are not followed through more of the map
 TOO_NEAR = 0.05  # m, geometry; a hit that is nearer is the same wall again
 CONTRADICTED = 0.5  # of a wall's rays on one side
 # Of hits of rays. Measured: up to 0.07 in drawings of plans, 0.30 in campus plans, 0.39 in maps that robots made; from

@@ -100,14 +100,14 @@ def follow(
     """
     origins, rays, ranges = beams_in_map(one)
     near = within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0))) if len(ranges) else NOTHING
-    near = near[~on_lines(chunks.walls.take(near), lines)]
     walls, first, counts = chunks.walls.take(near), chunks.first[near], chunks.counts[near]
+    is_evidence = ~on_lines(walls, lines)
     met, flags = [NOTHING], [np.zeros((0, 3), dtype=bool)]
     for rows in blocks(len(ranges), len(near), deadline):
         column, along, kinds = _met(walls, one, (origins[rows], rays[rows], ranges[rows]), sigma, oriented=oriented)
         part = (along / walls.lengths[column] * counts[column]).astype(np.intp)
         met.append(first[column] + np.minimum(part, counts[column] - 1))
-        flags.append(kinds)
+        flags.append(kinds & is_evidence[column, None])
     seen, where = np.unique(np.concatenate(met), return_inverse=True)
     kinds = np.concatenate(flags)
     total = np.stack([np.bincount(where[kinds[:, k]], minlength=len(seen)) for k in range(3)], axis=1)
@@ -118,7 +118,11 @@ def follow(
 def _met(
     walls: Segments, one: Localized, seen: tuple[Floats, Floats, Floats], sigma: float, *, oriented: bool
 ) -> tuple[Indices, Floats, Bools]:
-    """Return the walls that beams meet, where along them (m), and whether a beam passes, ends on, or ends before."""
+    """Return the walls that beams meet, where along them (m), and whether a beam passes, ends on, or ends before.
+
+    A beam ends on the wall that is nearest to its end. Flat beams that end on a wall next to a corner also end near the
+    other wall of the corner, or where it stood: of that they show nothing.
+    """
     origins, rays, ranges = seen
     beams, columns = _crossed(walls, origins, rays)
     normals = walls.normals[columns]
@@ -141,7 +145,10 @@ def _met(
     deep = along + tuning.THROUGH * tolerance / np.abs(slant) * across
     passed = (gap > tuning.THROUGH * tolerance) & (deep >= 0.0) & (deep <= lengths)
     ended = (np.abs(gap) <= tolerance) & facing
-    hidden = (gap >= -tuning.HIDDEN) & (gap <= tolerance) & ~ended
+    nearest = np.full(len(ranges), np.inf)
+    np.minimum.at(nearest, beams[ended], np.abs(gap[ended]))
+    ended &= np.abs(gap) <= nearest[beams]
+    hidden = (gap >= -tuning.HIDDEN) & (gap <= np.where(np.isinf(nearest[beams]), tolerance, 0.0)) & ~ended
     return columns, along, np.stack([passed, ended, hidden], axis=1)
 
 

@@ -72,27 +72,27 @@ def _new_walls(
 ) -> tuple[list[Draft], list[Draft]]:
     """Return extensions of walls of the map, one for each wall, and walls that continue none."""
     extended: dict[int, Draft] = {}
-    added = []
+    added, chunks = [], judged.chunks
     pieces: list[Floats] = []
-    for number, sigma in enumerate(sigmas):
-        wall = len(known) + number
-        gone, there, _, _ = judged.of_wall(wall)
-        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), judged.chunks, wall, deadline)
+    for wall, sigma in enumerate(sigmas, len(known)):
+        own = chunks.of_wall(wall)
+        gone, there = judged.gone[own], judged.there[own]
+        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), chunks, wall, deadline)
         for begin, end in runs(_filled(there, gone) & single):
-            piece = judged.chunks.part(wall, begin, end)
-            chunks = judged.chunks.first[wall] + begin + np.flatnonzero(there[begin:end])
+            piece, read = chunks.part(wall, begin, end), own.start + begin + np.flatnonzero(there[begin:end])
             if np.hypot(*(piece[2:] - piece[:2])) < tuning.LEAST_PIECE:
                 continue
             pieces.append(piece)
             off = tuning.DEVIATIONS * float(np.hypot(sigma, map_sigma))
             old, door = _continued(known, piece, max(tuning.LEAST_STEP, off)), _may_be_door(known, piece)
             if old is None or old in cut:
-                added.append(Draft("added", (), piece[None], np.array([sigma]), there=chunks, door=door))
+                added.append(Draft("added", (), piece[None], np.array([sigma]), there=read, door=door))
                 continue
             before = extended.get(old, Draft("extended", (old,), known.endpoints[old : old + 1]))
-            whole, read = _prolonged(known, old, before.new[0], piece), np.concatenate([before.there, chunks])
             extended[old] = replace(
-                before, new=whole[None], sigma=np.array([sigma]), there=read, door=door or before.door
+                before.with_also(Draft("extended", (), there=read, door=door)),
+                new=_prolonged(known, old, before.new[0], piece)[None],
+                sigma=np.array([sigma]),
             )
     return list(extended.values()), added
 
@@ -200,12 +200,16 @@ def _moves(
 
 
 def _fits(new: Floats, old: Floats) -> bool:
-    """Return whether each new side but stubs has an old one of its own that is as long; some may be hidden."""
-    free = sorted(old.tolist())
-    sides = new[new >= min(tuning.LONGEST_STUB, new.max())]
+    """Return whether each new side but stubs has an old one of its own; the longest is as long, others may be hidden.
+
+    What stands before a side hides all of it, or a part: it never seems longer.
+    """
+    free, longest = sorted(old.tolist()), float(new.max())
+    sides = new[new >= min(tuning.LONGEST_STUB, longest)]
     for length in sorted(sides.tolist(), reverse=True):
-        best = min(free, key=lambda one: abs(one - length), default=None)
-        if best is None or abs(best - length) > max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length):
+        same = max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length)
+        best = min(free, key=lambda one: abs(one - length), default=0.0)
+        if length - best > same or (length == longest and best - length > same):
             return False
         free.remove(best)
     return True

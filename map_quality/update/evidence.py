@@ -19,38 +19,26 @@ from .scans import Localized
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """The evidence about the chunks that beams met.
+    """What the evidence shows of each chunk: (c,) flags each.
 
     Attributes
     ----------
     chunks : Chunks
-    seen : (s,)
-        Those that beams met, ascending.
-    gone : (s,)
-        They are not there: several visits and poses pass through, and no visit reads them.
-    there : (s,)
-        They are there: several visits and poses read them, and no visit passes through.
-    open : (s,)
-        Some beams pass through, and nothing reads them: gone if the chunk next to them is.
-    read : (s,)
-        Some visit reads them.
+    gone
+        It is not there: several visits and poses pass through, and no visit reads it.
+    there
+        It is there: several visits and poses read it, and no visit passes through.
+    open
+        Some beams pass through, and nothing reads it: gone if the chunk next to it is.
+    read
+        Some visit reads it.
     """
 
     chunks: Chunks
-    seen: Indices
     gone: Bools
     there: Bools
     open: Bools
     read: Bools
-
-    def of_wall(self, wall: int) -> tuple[Bools, Bools, Bools, Bools]:
-        """Return which chunks of a wall are gone, there, open, and read; (c,) each."""
-        own = self.chunks.of_wall(wall)
-        low, high = np.searchsorted(self.seen, [own.start, own.stop])
-        out = np.zeros((4, own.stop - own.start), dtype=bool)
-        for row, flags in zip(out, (self.gone, self.there, self.open, self.read), strict=True):
-            row[self.seen[low:high] - own.start] = flags[low:high]
-        return out[0], out[1], out[2], out[3]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +77,9 @@ class WallEvidence:
         is_open = (passed >= tuning.LEAST_BEAMS) & (ended <= tuning.FEW * (passed + ended)) & ~hidden
         rows, near = self._spread(seen, at)
         gone, there = (self._decided(total, rows, near, on=is_on) for is_on in (False, True))
-        return Judged(self.chunks, seen, gone, there, is_open, read)
+        flags = np.zeros((4, len(self.chunks)), dtype=bool)
+        flags[:, seen] = gone, there, is_open, read
+        return Judged(self.chunks, *flags)
 
     def _spread(self, seen: Indices, at: Indices) -> tuple[Indices, Indices]:
         """Return each row for its chunk, and for the chunks of its wall next to it: rows, and positions in `seen`."""

@@ -15,7 +15,7 @@ from registration import RigidTransform
 
 from ..views import Steps
 from . import tuning
-from .scans import Localized, VisitScan, is_vouched, mahalanobis, search
+from .scans import Localized, mahalanobis
 
 
 def odometry_deviations(driven: float, turned: float) -> tuple[float, float]:
@@ -31,21 +31,18 @@ class Carrying:
     Attributes
     ----------
     index : MapIndex
-    scans : list of VisitScan
-        All scans; those that odometry localizes get the carried pose as their own.
     found : list of Localized
-        Their answers without odometry; replaced where odometry helps.
+        Answers without odometry; replaced where odometry helps, with the carried pose as the sender's.
     deadline : Deadline
     until : float
         `time.monotonic()` seconds from which on no scan is searched.
     """
 
     index: MapIndex
-    scans: list[VisitScan]
     found: list[Localized]
     deadline: Deadline
     until: float = math.inf
-    _trail: list[tuple[int, VisitScan, Localized]] = field(default_factory=list)  # since the last anchor, as before
+    _trail: dict[int, Localized] = field(default_factory=dict)  # since the last anchor: answers without odometry
 
     def carry(self) -> Steps[None]:
         """Carry poses forward and backward in each visit, one search at a step.
@@ -62,7 +59,7 @@ class Carrying:
             When the deadline was cancelled.
         """
         for visit in sorted({one.visit for one in self.found}):
-            rows = [k for k, one in enumerate(self.found) if one.visit == visit and self.scans[k].odometry is not None]
+            rows = [k for k, one in enumerate(self.found) if one.visit == visit and one.sent.odometry is not None]
             anchors = self._anchors([k for k in rows if self.found[k].usable])
             yield from self._along(rows, anchors)
             yield from self._along(rows[::-1], anchors)
@@ -89,8 +86,8 @@ class Carrying:
         for k in rows:
             if k in anchors:
                 if last is not None and self._distance(last, k) > tuning.AGREEING:
-                    for at, sent, found in self._trail:
-                        self.scans[at], self.found[at] = sent, found
+                    for at, found in self._trail.items():
+                        self.found[at] = found
                 last = k
                 self._trail.clear()
             elif last is not None and self._is_wanted(k):
@@ -101,7 +98,7 @@ class Carrying:
 
     def _is_wanted(self, k: int) -> bool:
         one = self.found[k]
-        return not (one.located or one.held_back) and self.scans[k].pose is None
+        return not (one.located or one.held_back) and one.sent.pose is None
 
     def _carried(self, last: int, k: int) -> Localized | None:
         """Search a scan with the prior from another; None where the prior is too wide, or there is no time."""
@@ -110,12 +107,10 @@ class Carrying:
         pose, covariance = self._predicted(last, k)
         if _sigma(covariance) > tuning.MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
             return None
-        sent = replace(self.scans[k], pose=pose, covariance=covariance)
-        result = search(self.index, sent, self.deadline)
-        found = replace(self.found[k], result=result, on=self.index.segments, vouched=is_vouched(sent, result))
+        one = self.found[k]
+        found = one.searched(self.index, self.deadline, replace(one.sent, pose=pose, covariance=covariance))
         if found.located:
-            self._trail.append((k, self.scans[k], self.found[k]))
-            self.scans[k], self.found[k] = sent, found
+            self._trail[k], self.found[k] = one, found
         return found
 
     def _agree(self, a: int, b: int) -> bool:
@@ -133,7 +128,7 @@ class Carrying:
 
     def _predicted(self, a: int, b: int) -> tuple[RigidTransform, np.ndarray]:
         """Return the pose of a scan by that of another and odometry, with its covariance."""
-        begin, end, known = self.scans[a].odometry, self.scans[b].odometry, self.found[a]
+        known, begin, end = self.found[a], self.found[a].sent.odometry, self.found[b].sent.odometry
         assert begin is not None
         assert end is not None
         assert known.result.covariance is not None

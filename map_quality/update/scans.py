@@ -115,7 +115,8 @@ class Localized:
         Of the scan, in the order in which they came.
     visit : int
         Number of its visit.
-    scan : Scan
+    sent : VisitScan
+        With the pose that odometry carries to it, if any.
     result : AssociationResult
     on : Segments
         The map that it was searched in; the result's correspondences name its segments.
@@ -129,12 +130,23 @@ class Localized:
 
     number: int
     visit: int
-    scan: Scan
+    sent: VisitScan
     result: AssociationResult
     on: Segments
     held_back: bool
     vouched: bool = False
     contradicted: bool = False
+
+    def searched(self, index: MapIndex, deadline: Deadline, sent: VisitScan | None = None) -> Localized:
+        """Return it with the answer of a search in another map, or with another pose of the sender."""
+        sent = sent or self.sent
+        result = search(index, sent, deadline)
+        return replace(self, sent=sent, result=result, on=index.segments, vouched=is_vouched(sent, result))
+
+    @property
+    def scan(self) -> Scan:
+        """The scan as it was sent."""
+        return self.sent.scan
 
     @property
     def usable(self) -> bool:

@@ -132,7 +132,7 @@ class _Update:
     """An update in the making; its steps raise TimeOverError when the deadline passes."""
 
     index: MapIndex
-    scans: list[VisitScan]  # with the poses that odometry carries to them
+    scans: list[VisitScan]
     names: list[str]  # of the visits, in the order in which they came
     deadline: Deadline
     gatherer: Gatherer
@@ -170,9 +170,9 @@ class _Update:
                 break
             visit, result = self.names.index(one.visit), search(self.index, one, self.deadline)
             vouched = is_vouched(one, result)
-            found.append(Localized(number, visit, one.scan, result, self.index.segments, held[number], vouched))
+            found.append(Localized(number, visit, one, result, self.index.segments, held[number], vouched))
             yield
-        yield from Carrying(self.index, self.scans, found, self.deadline, at).carry()
+        yield from Carrying(self.index, found, self.deadline, at).carry()
         return found
 
     def propose(self, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
@@ -200,18 +200,19 @@ class _Update:
 
     def verify(self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]) -> Steps[Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
-        found, changed = list(first), self._changed(drafts)
+        found, changed = list(first), drafts
         for _ in range(tuning.DROPS):
             new = self._index(drafts) if drafts else None
             if new is None:
                 break
-            found = yield from self._search_all(new, found, changed)
+            again = [saw or one.held_back for saw, one in zip(self._seeing(changed, found), found, strict=True)]
+            found = yield from self._search_again(new, found, again, found)
             dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
             dropped = dropped or self._blamed(drafts, first, found)
             if not dropped:
                 kept = drafts if keeps_usable(first, found) else []
                 return Proposed(tuple(change for _, change in kept), tuple(found) if kept else ())
-            changed = self._changed([drafts[k] for k in dropped])
+            changed = [drafts[k] for k in dropped]
             drafts = [one for k, one in enumerate(drafts) if k not in dropped]
         return Proposed()
 
@@ -220,9 +221,7 @@ class _Update:
         lost = lost_scans(first, found)
         if len(lost) <= most_lost(len(first)):
             return []
-        walls = [self._changed([one]) for one in drafts]
-        seen = np.array([[sees(one, scan, self.sigma, self.deadline) for scan in lost] for one in walls])
-        return blamed(seen, most_lost(len(first)))
+        return blamed(np.array([self._seeing([one], lost) for one in drafts]), most_lost(len(first)))
 
     def sharpen(self, proposed: Proposed, first: Sequence[Localized]) -> Steps[Proposed]:
         """Estimate the walls from all scans, and search all scans on the sharper map.
@@ -247,7 +246,7 @@ class _Update:
             return proposed
         sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
         new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes)[0])
-        again = yield from self._search_all(new, first, None)
+        again = yield from self._search_again(new, first, [True] * len(first), first)
         if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
             return proposed
         return replace(proposed, found=tuple(again), sharpened=sharpened)
@@ -270,50 +269,39 @@ class _Update:
         new = self._index(drafts)
         if new is None:
             return list(latest)
-        changed, found = self._changed(drafts), []
-        for one, now in zip(first, latest, strict=True):
-            again = not one.precise and sees(changed, one, self.sigma, self.deadline)
-            found.append((yield from self._search(new, one)) if again else now)
-        yield from Carrying(new, list(self.scans), found, self.deadline).carry()
+        seen = self._seeing(drafts, first)
+        again = [saw and not one.precise for saw, one in zip(seen, first, strict=True)]
+        found = yield from self._search_again(new, first, again, latest)
+        yield from Carrying(new, found, self.deadline).carry()
         return found
 
-    def _search_all(
-        self, index: MapIndex, before: Sequence[Localized], changed: Chunks | None
-    ) -> Steps[list[Localized]]:
-        """Search the scans again that see changed walls, and all that are held back; None: all walls have changed.
-
-        The others keep their answer: at their poses, nothing has changed.
-        """
-        found: list[Localized] = []
-        for one in before:
-            again = changed is None or one.held_back or sees(changed, one, self.sigma, self.deadline)
-            found.append((yield from self._search(index, one)) if again else one)
-        go_on(self.deadline)
-        return found
-
-    def _changed(self, drafts: Drafts) -> Chunks:
-        """Return the walls that changes take away, and those that they bring."""
+    def _seeing(self, drafts: Drafts, found: Sequence[Localized]) -> list[bool]:
+        """Return which scans see walls that changes take away, or that they bring."""
         old = sorted({k for _, change in drafts for k in change.segments})
         ends = [self.known.endpoints[old], *(change.new for _, change in drafts)]
-        return Chunks.of(Segments.derived(np.concatenate(ends)))
+        changed = Chunks.of(Segments.derived(np.concatenate(ends)))
+        return [sees(changed, one, self.sigma, self.deadline) for one in found]
+
+    def _search_again(
+        self, index: MapIndex, found: Sequence[Localized], again: Sequence[bool], others: Sequence[Localized]
+    ) -> Steps[list[Localized]]:
+        """Search some of the scans in another map, unless that is the map of their last search; return all."""
+        out = list(others)
+        for k in np.flatnonzero(again).tolist():
+            go_on(self.deadline)
+            one, before = found[k], self.latest.get(found[k].number)
+            if before is not None and np.array_equal(before.on.endpoints, index.segments.endpoints):
+                out[k] = replace(before, on=index.segments)
+                continue
+            out[k] = self.latest[one.number] = one.searched(index, self.deadline)
+            yield
+        go_on(self.deadline)
+        return out
 
     def _index(self, drafts: Drafts) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
         segments, _ = apply(self.known, [change for _, change in drafts])
         return self._indexed(segments) if len(segments) else None
-
-    def _search(self, index: MapIndex, one: Localized) -> Steps[Localized]:
-        """Search one scan in another map, unless that is the map of its last search."""
-        go_on(self.deadline)
-        before = self.latest.get(one.number)
-        if before is not None and np.array_equal(before.on.endpoints, index.segments.endpoints):
-            return replace(before, on=index.segments)
-        sent = self.scans[one.number]
-        result = search(index, sent, self.deadline)
-        yield
-        found = replace(one, result=result, on=index.segments, vouched=is_vouched(sent, result))
-        self.latest[one.number] = found
-        return found
 
     def proposal(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,7 @@ from association import Deadline
 from registration import Segments
 
 from . import tuning
-from .beams import NOTHING, Chunks
+from .beams import NOTHING
 from .evidence import Judged, WallEvidence, are_enough
 from .result import Bools, ChangeCode, Floats, Indices
 from .scans import go_on
@@ -83,36 +83,47 @@ def find_cuts(
     a draft for each that beams pass here and there, so that it is gone if a new one like it is near
     """
     chunks, passed = evidence.chunks, dict[int, Draft]()
-    cuts = {cut.segments[0]: cut for cut in _gone_things(evidence, len(known), deadline)}
-    for wall in np.unique(chunks.walls_of(judged.seen[judged.gone])).tolist():
+    cuts = {cut.segments[0]: cut for cut in _gone_things(evidence, known, deadline)}
+    for wall in np.unique(chunks.walls_of(np.flatnonzero(judged.gone))).tolist():
         if wall < len(known) and wall not in cuts:
             go_on(deadline)
-            gone, _, open_, read = judged.of_wall(wall)
             own = np.arange(chunks.first[wall], chunks.first[wall + 1])
             if _is_gone_whole(evidence, own, tuning.LEAST_GONE):
                 passed[wall] = Draft("removed", (wall,), gone=own)
-            cut = _cut(chunks, wall, gone, read, open_, sigma)
+            cut = _cut(judged, wall, sigma)
             if cut is not None:
                 cuts[wall] = cut
+    cuts |= {wall: Draft("removed", (wall,)) for wall in _between(judged, known, cuts)}
     return [cuts[wall] for wall in sorted(cuts)], [passed[wall] for wall in sorted(passed)]
 
 
-def _gone_things(evidence: WallEvidence, walls: int, deadline: Deadline) -> Iterator[Draft]:
+def _between(judged: Judged, known: Segments, cuts: Mapping[int, Draft]) -> list[int]:
+    """Return the walls no longer than a stub that nothing reads, and that have removed walls at both ends."""
+    corner, removed = _corners(known), [wall for wall, cut in cuts.items() if cut.code == "removed"]
+    between = np.isin(corner, corner[removed]).all(axis=1) & (known.lengths < tuning.LONGEST_STUB)
+    between[list(cuts)] = False
+    return [wall for wall in np.flatnonzero(between).tolist() if not judged.read[judged.chunks.of_wall(wall)].any()]
+
+
+def _corners(walls: Segments) -> Indices:
+    """Return the number of the corner at both ends of each wall, (n, 2)."""
+    rounded = np.round(walls.endpoints.reshape(-1, 2) / tuning.LOOP_GAP).astype(np.int64)
+    return np.unique(rounded, axis=0, return_inverse=True)[1].reshape(-1, 2)
+
+
+def _gone_things(evidence: WallEvidence, known: Segments, deadline: Deadline) -> Iterator[Draft]:
     """Yield the walls of things that are gone: closed loops of walls that beams pass through, and that none reads.
 
     A thing that beams pass through is not solid, so its other sides are gone, too, whether they were seen or not.
     """
     chunks = evidence.chunks
-    corners = np.round(chunks.walls.endpoints[:walls].reshape(-1, 2) / tuning.LOOP_GAP).astype(np.int64)
-    _, corner = np.unique(corners, axis=0, return_inverse=True)
-    corner = corner.reshape(-1, 2)
+    corner = _corners(known)
     at = np.bincount(corner.ravel())
-    joined = scipy.sparse.coo_array((np.ones(walls), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
-    _, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
-    loop_of = label[corner[:, 0]]
+    joined = scipy.sparse.coo_array((np.ones(len(known)), (corner[:, 0], corner[:, 1])), shape=(len(at), len(at)))
+    loop_of = scipy.sparse.csgraph.connected_components(joined, directed=False)[1][corner[:, 0]]
     order = np.argsort(loop_of, kind="stable")
     passed = chunks.walls_of(evidence.chunk[evidence.counts[:, 0] > 0])
-    for loop in np.unique(loop_of[passed[passed < walls]]):
+    for loop in np.unique(loop_of[passed[passed < len(known)]]):
         go_on(deadline)
         mine = order[np.searchsorted(loop_of, loop, sorter=order) : np.searchsorted(loop_of, loop, "right", order)]
         if len(mine) < 3 or chunks.walls.lengths[mine].sum() > tuning.THING or (at[np.unique(corner[mine])] != 2).any():
@@ -136,10 +147,11 @@ def _is_gone_whole(evidence: WallEvidence, chunks: Indices, least: float) -> boo
     return bool(are_enough(len(visits), poses) and passed >= least)
 
 
-def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools, sigma: float) -> Draft | None:
+def _cut(judged: Judged, wall: int, sigma: float) -> Draft | None:
     """Return what is gone of a wall; None where that is too little to be sure of."""
-    first, length = int(chunks.first[wall]), float(chunks.walls.lengths[wall])
-    step = length / len(gone)
+    own = judged.chunks.of_wall(wall)
+    first, gone, read, open_ = own.start, judged.gone[own], judged.read[own], judged.open[own]
+    step = float(judged.chunks.walls.lengths[wall]) / len(gone)
     if gone.mean() >= tuning.LEAST_GONE and not (read & ~gone).any():
         return Draft("removed", (wall,), gone=first + np.flatnonzero(gone))
     out = np.zeros(len(gone), dtype=bool)
@@ -156,7 +168,7 @@ def _cut(chunks: Chunks, wall: int, gone: Bools, read: Bools, open_: Bools, sigm
     for begin, end in runs(~out):  # too short to be a wall; at a corner, beams that end on the next wall read it
         if (end - begin) * step < tuning.LONGEST_STUB:
             out[begin:end] = True
-    left = np.array([chunks.part(wall, begin, end) for begin, end in runs(~out)]).reshape(-1, 4)
+    left = np.array([judged.chunks.part(wall, begin, end) for begin, end in runs(~out)]).reshape(-1, 4)
     code: ChangeCode = "shortened" if len(left) else "removed"
     sigmas, rest_read = np.full(len(left), sigma), bool((read & ~out).any())
     return Draft(code, (wall,), left, sigmas, first + np.flatnonzero(out & gone), rest_read=rest_read)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +15,7 @@ from map_quality.update.evidence import are_enough
 from map_quality.update.result import apply
 from registration import Segments
 
-from .hall import OUTLINE, PILLAR, RACK, box, segments, visit
+from .hall import OUTLINE, PILLAR, RACK, SCANNER, box, segments, visit
 
 CART = box(6.0, 5.0, 7.2, 5.8)
 
@@ -206,6 +209,33 @@ def test_a_wall_that_moved_by_a_pace_is_one_change_without_a_stub(count: int) ->
     (one,) = updated(hall, *visits(*[today] * count)).changes
     assert (one.code, one.segments) == ("moved", (20, 21, 22))
     assert off_walls(one.new, today).max() < 0.05
+
+
+@pytest.mark.parametrize("beams", [360, 720])
+def test_a_wall_that_is_removed_leaves_no_stub_at_the_wall_that_it_stood_against(beams: int) -> None:
+    """Flat beams that end on the outer wall, up to 0.4 m from the corner, also end near where the wall stood."""
+    scanner = replace(SCANNER, beams=beams, angle_increment=math.tau / beams)
+    hall, today = segments(RACK, PILLAR, partition(5.7)), segments(RACK, PILLAR)
+    days = [visit(today, f"day {k}", k, scanner) for k in range(4)]
+    scans = [one for some in days for one in some]
+    found = map_quality.update(MapIndex.build(hall, 0.02), scans).changes
+    assert [(one.code, one.segments) for one in found] == [("removed", (20, 21, 22))]
+
+
+def test_the_end_of_a_wall_goes_with_its_faces() -> None:
+    """No beam crosses it: it is as short as a stub, and stood between two faces that are gone."""
+    thin = [[4.7, 0.0, 4.7, 2.5], [4.7, 2.5, 4.8, 2.5], [4.8, 2.5, 4.8, 0.0]]
+    hall, today = segments(RACK, PILLAR, thin), segments(RACK, PILLAR)
+    found = updated(hall, *visits(*[today] * 3)).changes
+    assert [(one.code, one.segments) for one in found] == [("removed", (20, 21, 22))]
+
+
+@pytest.mark.parametrize("x", [3.9, 9.3])
+def test_a_wall_that_moved_may_be_hidden_in_part(x: float) -> None:
+    """The rack, or the pillar, hides a part of one of its faces where it stands now."""
+    hall, today = segments(RACK, PILLAR, partition(x)), segments(RACK, PILLAR, partition(x + 0.7))
+    (one,) = updated(hall, *visits(*[today] * 4)).changes
+    assert (one.code, one.segments) == ("moved", (20, 21, 22))
 
 
 @pytest.mark.xfail(strict=True, reason="too few scans that see where it was are usable: it is found as added")

@@ -20,9 +20,7 @@ def localized() -> list[Localized]:
     """Return scans of a hall in which the rack is gone."""
     index = MapIndex.build(segments(PILLAR, RACK), SIGMA)
     taken = visit(segments(PILLAR), "monday", 1)
-    return [
-        Localized(k, 0, one.scan, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(taken)
-    ]
+    return [Localized(k, 0, one, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(taken)]
 
 
 def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
@@ -32,6 +30,7 @@ def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
     position = np.linalg.eigvalsh(one.result.covariance[:2, :2]).max()
     noise = np.median(one.scan.measured.sigma)
     for origin, ray, reach in zip(*beams_in_map(one), strict=True):
+        met = []
         for k in range(len(walls)):
             slant, begin = ray @ walls.normals[k], walls.endpoints[k, :2]
             distance = (walls.offsets[k] - origin @ walls.normals[k]) / slant
@@ -42,11 +41,33 @@ def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
             tolerance, gap = max(LEAST_TOLERANCE, DEVIATIONS * deviation), (reach - distance) * abs(slant)
             deep = at + THROUGH * tolerance / abs(slant) * (ray @ walls.directions[k])
             chunk = chunks.first[k] + min(int(at / walls.lengths[k] * chunks.counts[k]), chunks.counts[k] - 1)
-            ended = abs(gap) <= tolerance and (slant < 0.0 or not oriented)
+            near = abs(gap) <= tolerance and (slant < 0.0 or not oriented)
             out[0, chunk] += gap > THROUGH * tolerance and 0.0 <= deep <= walls.lengths[k]
+            met.append((chunk, gap, tolerance, near))
+        nearest = min((abs(gap) for _, gap, _, near in met if near), default=math.inf)
+        for chunk, gap, tolerance, near in met:
+            ended = near and abs(gap) == nearest
             out[1, chunk] += ended
-            out[2, chunk] += -HIDDEN <= gap <= tolerance and not ended
+            out[2, chunk] += -HIDDEN <= gap <= (tolerance if nearest == math.inf else 0.0) and not ended
     return out
+
+
+def test_flat_beams_that_end_on_the_outer_wall_read_no_wall_that_stood_in_its_corner() -> None:
+    """They end within the tolerance of its line, up to 0.35 m from the corner."""
+    wall = [[5.7, 0.0, 5.7, 3.0], [5.7, 3.0, 5.85, 3.0], [5.85, 3.0, 5.85, 0.0]]
+    hall = segments(RACK, PILLAR, wall)
+    index, chunks = MapIndex.build(hall, SIGMA), Chunks.of(hall)
+    total = np.zeros((len(chunks), 3), dtype=int)
+    for k, one in enumerate(visit(segments(RACK, PILLAR), "monday", 1)):
+        result = search(index, one, Deadline())
+        if result.usable:
+            at = Localized(k, 0, one, result, index.segments, False)
+            seen = follow(chunks, at, NO_LINES, SIGMA, Deadline(), oriented=True)
+            total[seen.chunks] += seen.counts
+    for face in (20, 22):
+        through, ended, _ = total[chunks.of_wall(face)].sum(axis=0)
+        assert through > 100
+        assert ended <= 2
 
 
 def test_beams_are_counted_as_one_by_one() -> None:

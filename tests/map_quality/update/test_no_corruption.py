@@ -126,7 +126,7 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     result = search(known, one, Deadline())
     assert result.pose is not None
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
-    localized = Localized(0, 0, seen, result, corridor, False)
+    localized = Localized(0, 0, one, result, corridor, False)
     assert on_lines(corridor, hanging_lines(localized, 0.01)).tolist() == [False, True, False]
 
 

@@ -53,10 +53,8 @@ def finished(steps: Generator[None, None, list[Localized]]) -> list[Localized]:
 def carried(scans: list[VisitScan]) -> list[Localized]:
     """Return the scans of one visit after odometry has carried poses."""
     index = MapIndex.build(OLD, 0.005)
-    found = [
-        Localized(k, 0, one.scan, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(scans)
-    ]
-    for _ in Carrying(index, scans, found, Deadline()).carry():
+    found = [Localized(k, 0, one, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(scans)]
+    for _ in Carrying(index, found, Deadline()).carry():
         pass
     return found
 

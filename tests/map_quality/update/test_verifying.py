@@ -38,7 +38,7 @@ def done(steps: Generator[None, None, T]) -> T:
 def localized(on: Segments, today: Segments) -> list[Localized]:
     index, scans = MapIndex.build(on, 0.005), [one for k in range(2) for one in visit(today, f"day {k}", k)]
     found = [(one, search(index, one, Deadline())) for one in scans]
-    return [Localized(k, k // 8, one.scan, result, on, False) for k, (one, result) in enumerate(found)]
+    return [Localized(k, k // 8, one, result, on, False) for k, (one, result) in enumerate(found)]
 
 
 @pytest.mark.parametrize(("today", "better"), [(EMPTY, True), (HALL, False)])
