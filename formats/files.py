@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from .errors import IncompleteFileError, MalformedFileError, TooLargeError
-from .limits import MAX_JSON_VALUES, MAX_YAML_VALUES
+from .limits import MAX_DEPTH, MAX_JSON_VALUES, MAX_YAML_VALUES
 from .report import shown
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
@@ -133,6 +134,9 @@ def load_yaml(text: str) -> object:
         When it stands for too many values.
     """
     text = text.expandtabs()  # that people put behind a colon, which YAML does not allow
+    depth = max(accumulate((sign in "[{") - (sign in "]}") for sign in text), default=0)
+    if depth > MAX_DEPTH:  # the parser takes seconds to fail
+        raise MalformedFileError(f"is not YAML of a map: expected at most {MAX_DEPTH} nested lists, found {depth}")
     try:
         root = YAML(typ="safe", pure=True).compose(text)
         if root is not None and _values(root, {}) > MAX_YAML_VALUES:

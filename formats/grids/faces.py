@@ -197,13 +197,25 @@ def wall_contours(cells: Cells) -> Iterator[Floats]:
     ------
     (n, 2)
         In order along the border, cells from the grid's lower left corner.
+
+    Raises
+    ------
+    TooLargeError
+        When there are as many as in noise.
     """
     # contourpy keeps the higher side on the left. Around the grid nothing is known.
     padded = np.pad(cells, 1, constant_values=UNKNOWN)
     generator = contourpy.contour_generator(
         z=(padded == FREE).astype(np.float64), line_type=contourpy.LineType.Separate
     )
-    for line in generator.lines(0.5):
+    lines = generator.lines(0.5)
+    most = max(tuning.MANY_CONTOURS, int(cells.size * tuning.MOST_CONTOURS))
+    if len(lines) > most:
+        raise TooLargeError(
+            f"expected at most {most} borders of free cells, one in {1 / tuning.MOST_CONTOURS:g} cells, found "
+            f"{len(lines)}; remove noise from the picture"
+        )
+    for line in lines:
         contour = np.asarray(line, dtype=np.float64)
         # Each point is halfway between two cells.
         sides = (np.floor(contour).astype(np.intp), np.ceil(contour).astype(np.intp))

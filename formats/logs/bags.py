@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import apsw
 import zstandard
@@ -29,8 +29,7 @@ from ..limits import MAX_MESSAGE_BYTES
 from ..report import Notes, shown
 from .folders import recorded_files
 from .mcap_files import McapFile
-from .recording import CDR, ROS1, Connection, RawMessage
-from .rosbag_files import RosbagFile
+from .recording import CDR, ROS1, Connection, Received, RosbagFile
 
 SCAN = "sensor_msgs/msg/LaserScan"
 GRID = "nav_msgs/msg/OccupancyGrid"
@@ -39,6 +38,7 @@ TRANSFORMS = "tf2_msgs/msg/TFMessage"
 OLD_TRANSFORMS = "tf/msg/tfMessage"  # of ROS 1, laid out alike
 
 FORMATS = {".bag": "rosbag1", ".mcap": "mcap"}  # of files alone
+REPAIRS = {".bag": "rosbag reindex", ".mcap": "mcap recover"}  # of files that end early, as when the power went
 NAMED = 20  # topics that an error lists at most
 ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a message that rosbag2 has compressed; no encoding begins so
 
@@ -48,14 +48,6 @@ BROKEN = (
     TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, RecursionError, RuntimeError, MemoryError,
     zstandard.ZstdError,
 )  # fmt: skip
-
-
-class Received(NamedTuple):
-    """A message, and when the recorder received it."""
-
-    connection: Connection
-    received: int  # ns since the epoch
-    message: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,22 +87,22 @@ class Bag:
             wanted = [one for one in connections if any(one is held for held in file.connections)]
             if not wanted:
                 continue
-            with refusing(file.name, _mended_by(file.name), self._folder):
+            with refusing(file.name, self._folder / file.name):
                 for raw in file.messages(wanted):
                     message = self._decoded(raw)
                     if message is not None:
-                        yield Received(raw.connection, raw.received, message)
+                        yield raw._replace(message=message)
 
-    def _decoded(self, raw: RawMessage) -> Any:
+    def _decoded(self, raw: Received) -> Any:
         """Return a message; None for one that is left out."""
         topic = shown(raw.connection.topic)
         kind = TRANSFORMS if raw.connection.msgtype == OLD_TRANSFORMS else raw.connection.msgtype
         short = kind.rpartition("/")[2].lower()
-        if len(raw.data) > MAX_MESSAGE_BYTES:
+        if len(raw.message) > MAX_MESSAGE_BYTES:
             self._notes.add_dropped(f"long_{short}", f"messages of {topic} above {MAX_MESSAGE_BYTES} bytes", 1)
             return None
         try:
-            data = _unpacked(raw.data)
+            data = _unpacked(raw.message)
             if raw.connection.encoding == ROS1:
                 return _definitions(first=True).deserialize_ros1(data, kind)
             return _definitions(first=False).deserialize_cdr(data, kind)
@@ -154,7 +146,7 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
         files: list[McapFile | RosbagFile] = []
         for one in paths:
             try:
-                with refusing(name if len(paths) == 1 else one.name, _mended_by(one.name), one.parent):
+                with refusing(name if len(paths) == 1 else one.name, one):
                     files.append(McapFile(one) if one.suffix.lower() == ".mcap" else RosbagFile(one))
             except FormatError as error:
                 if one is paths[-1] and not files:  # nothing else is left
@@ -203,29 +195,20 @@ def _definitions(*, first: bool) -> Any:
     return types
 
 
-def _mended_by(name: str) -> str:
-    """Return how a file is mended that ends early, as of a robot whose power went; empty where no tool is known."""
-    suffix = Path(name).suffix.lower()
-    if suffix == ".bag":
-        return "; if it was cut off, `rosbag reindex` repairs it"
-    if suffix == ".mcap":
-        return "; if it was cut off, `mcap recover` repairs it"
-    return ""
-
-
 @contextmanager
-def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iterator[None]:
-    """Turn what a broken bag brings about into an error of this package; the `folder` that it is in is left out."""
+def refusing(name: str, file: Path) -> Iterator[None]:
+    """Turn what a broken bag brings about into an error of this package, without the folder of the file."""
     try:
         with naming(name):
             yield
     except FormatError:
         raise
     except BROKEN as error:
-        text = str(error)
-        for place in () if folder is None else (str(folder.resolve()), str(folder)):
+        text, repair = str(error), REPAIRS.get(file.suffix.lower())
+        for place in (str(file.parent.resolve()), str(file.parent)):
             text = text.replace(place.rstrip(os.sep) + os.sep, "")
         lines = text.splitlines() or [type(error).__name__]
+        mended_by = f"; if it was cut off, `{repair}` repairs it" if repair else ""
         if isinstance(error, ReaderError1) and "magic" in text:  # of ROS before Diamondback, or no bag
             lines, mended_by = ["it does not begin as a bag of version 2.0"], "; of V1.2, `rosbag fix` makes one"
         raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error

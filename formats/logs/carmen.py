@@ -16,8 +16,7 @@ from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
 from ..files import BYTE_ORDER_MARK, WIDE, name_of
 from ..limits import MAX_LINE_BYTES
 from ..report import Notes
-from .scan import Log, LoggedScan, LogOptions, none_usable
-from .stamps import Stamps
+from .scan import Log, LoggedScan, LogOptions, Stamps, none_usable
 
 SIMPLE = ("FLASER", "RLASER")
 KINDS = (*SIMPLE, "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")

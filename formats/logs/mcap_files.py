@@ -22,7 +22,7 @@ from mcap.summary import Summary
 from ..errors import MalformedFileError, UnsupportedFormatError
 from ..files import name_of
 from ..limits import MAX_CHUNK_BYTES
-from .recording import Connection, RawMessage, ros_type
+from .recording import Connection, Received, ros_type
 
 # Errors of the library for bytes that are no record. Decompressors raise RuntimeError (lz4) and ZstdError.
 BROKEN = (
@@ -101,7 +101,7 @@ class McapFile:
         """Close the file."""
         self._file.close()
 
-    def messages(self, connections: Collection[Connection]) -> Iterator[RawMessage]:
+    def messages(self, connections: Collection[Connection]) -> Iterator[Received]:
         """Yield the messages of some connections, by the time of their reception where the file has an index."""
         wanted = {connection.key: connection for connection in connections}
         found = (
@@ -111,7 +111,7 @@ class McapFile:
         )
         for message in found:
             if message.channel_id in wanted:
-                yield RawMessage(wanted[message.channel_id], message.log_time, message.data)
+                yield Received(wanted[message.channel_id], message.log_time, message.data)
 
     def _begin(self) -> None:
         try:
@@ -166,7 +166,7 @@ class McapFile:
         found = []
         for one in channels:
             kind = ros_type(schemas[one.schema_id].name) if one.schema_id in schemas else ""
-            found.append(Connection(one.topic, kind, one.message_encoding, counts.get(one.id, 0), one.id, self.name))
+            found.append(Connection(one.topic, kind, one.message_encoding, counts.get(one.id, 0), one.id))
         return found
 
     def _records(self) -> Iterator[McapRecord]:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from registration import RigidTransform, wrap_angle
+from vectorization import Motion
 
 from ..report import Notes, shown
 from .tracks import NS, Floats, Known, Track
@@ -18,15 +19,6 @@ from .trees import ODOM, OdometryTopic
 from .tuning import COMPARED_NS, DIFFERENT, JITTER, MOVED, SAMPLES
 
 BASES = ("base_link", "base_footprint")
-
-
-@dataclass(frozen=True, slots=True)
-class Speed:
-    """The speed of a frame: m/s and rad/s, in the frame itself."""
-
-    vx: float
-    vy: float
-    omega: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,11 +99,13 @@ class Odometry:
         )
         return replace(self, _contradicted=_joined(found))
 
-    def speed(self, begin: int, end: int, mount: Floats, received: int) -> Speed | None:
-        """Return how fast a sensor moved during a scan; None where its poses do not give it.
+    def motion(self, increment: float, begin: int, end: int, mount: Floats, received: int) -> Motion | None:
+        """Return how a sensor moved during a scan; None where its poses do not give it.
 
         Parameters
         ----------
+        increment : float
+            From beam to beam, seconds.
         begin, end : int
             Of the scan, nanoseconds.
         mount : (4, 4)
@@ -131,7 +125,7 @@ class Odometry:
         if a is None or b is None or a.part != b.part:
             return None
         step, _ = planar(np.linalg.inv(a.matrix @ mount) @ b.matrix @ mount)
-        return _speed(step, (last - first) / NS)
+        return _motion(increment, step, (last - first) / NS)
 
     def note_doubts(self, notes: Notes) -> None:
         """Note where odometry contradicts itself, or begins again."""
@@ -179,12 +173,12 @@ def _joined(times: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
     return tuple(joined)
 
 
-def _speed(step: RigidTransform, seconds: float) -> Speed:
+def _motion(increment: float, step: RigidTransform, seconds: float) -> Motion:
     """Return the constant twist that makes a step: x, y = V(theta) v t, with V of the exponential map of SE(2)."""
     half = 0.5 * step.theta
     a = 1.0 if abs(half) < 1e-9 else half / math.tan(half)
     vx, vy = a * step.x + half * step.y, a * step.y - half * step.x
-    return Speed(vx / seconds, vy / seconds, step.theta / seconds)
+    return Motion(increment, vx / seconds, vy / seconds, step.theta / seconds)
 
 
 def base_of(path: Sequence[str], bases: Sequence[str] = BASES) -> str | None:

@@ -15,9 +15,8 @@ from ..files import name_of
 from ..report import Notes, shown
 from .bags import opened
 from .lasers import laser_of
-from .scan import Log, LoggedScan, LogOptions, none_usable
+from .scan import Log, LoggedScan, LogOptions, Stamps, none_usable
 from .sensors import Place, Sensor, Sensors, note_tilt, time_increment_of
-from .stamps import Stamps
 from .topics import scan_connections
 from .tracks import NS
 from .transforms import stamp_of

@@ -155,11 +155,11 @@ class Sensor:
             return None
         mount = np.eye(4) if self.given is None else self.given
         end = begin + round(increment * beams * NS)
-        speed = None if self.odometry is None else self.odometry.speed(begin, end, mount, received)
-        if speed is None or not max(math.hypot(speed.vx, speed.vy), abs(speed.omega)) <= FASTEST:
+        motion = None if self.odometry is None else self.odometry.motion(increment, begin, end, mount, received)
+        if motion is None or not max(math.hypot(motion.vx, motion.vy), abs(motion.omega)) <= FASTEST:
             notes.add_assumed("motion", "scans with a time_increment, but without the motion of the sensor", 1)
             return None
-        return Motion(increment, speed.vx, speed.vy, speed.omega)
+        return motion
 
 
 def time_increment_of(message: Any, notes: Notes) -> float:

@@ -158,7 +158,7 @@ def test_the_surface_of_thick_walls(
         (YAML.replace("[{origin}]", "[0, .inf, 0]"), MalformedFileError, "expected origin"),
         (YAML.replace("{image}", "nothing.pgm"), IncompleteFileError, "nothing.pgm, but there is no such file"),
         (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is not a picture"),
-        ("[" * 3_000, MalformedFileError, "is not YAML"),
+        ("[" * 3_000, MalformedFileError, "is not YAML of a map: expected at most 64 nested lists, found 3000"),
         ("#" * 17_000, TooLargeError, "at most 16384 bytes"),
     ],
 )
@@ -207,6 +207,14 @@ def test_pictures_that_are_too_large_cut_off_or_of_floats_are_refused(
     (tmp_path / "map.pgm").write_bytes(content)
     with pytest.raises(kind, match=message):
         read_map(path)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_a_picture_of_noise_is_refused(tmp_path: Path, share: float) -> None:
+    """Each of its borders would take a third of a millisecond; rooms have far fewer."""
+    occupied = np.random.default_rng(1).random((400, 400)) < share
+    with pytest.raises(TooLargeError, match=r"at most 5000 borders of free cells, one in 60 cells.* remove noise"):
+        read_map(write(tmp_path, np.where(occupied, WALL, FREE).astype(np.uint8)))
 
 
 def with_posts(up: Pixels) -> Pixels:

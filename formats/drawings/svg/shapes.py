@@ -44,6 +44,14 @@ class Viewport:
             return self.width
         return self.height if axis == "y" else math.hypot(self.width, self.height) / math.sqrt(2.0)
 
+    def length(self, text: str, axis: str) -> float:
+        """Return a length in user units, nan of an unknown percentage; raises ValueError or LookupError for others."""
+        found = _LENGTH.fullmatch(text)
+        if found is None:
+            raise ValueError(text)
+        unit = found[2].lower()
+        return float(found[1]) * (self.of_axis(axis) / 100.0 if unit == "%" else UNITS[unit])
+
 
 @dataclass(frozen=True, slots=True)
 class Measure:
@@ -69,16 +77,15 @@ class Measure:
         text = self.element.get(key, default).strip()
         if text.lower() in ("", "auto"):
             text = default
-        found = _LENGTH.fullmatch(text)
-        unit = found[2].lower() if found else None
-        scale = self.viewport.of_axis(axis) / 100.0 if unit == "%" else UNITS.get(unit or "")
-        if found is None or scale is None or (unit and unit not in UNITS and unit != "%"):
-            raise self.refused(key, text, "a number, alone or with px, pt, pc, mm, cm, in or %")
-        if math.isnan(scale):
+        try:
+            length = self.viewport.length(text, axis)
+        except (ValueError, LookupError) as error:
+            raise self.refused(key, text, "a number, alone or with px, pt, pc, mm, cm, in or %") from error
+        if math.isnan(length):
             raise self.refused(
                 key, text, "no percentage where the svg element has neither viewBox nor width and height"
             )
-        return float(found[1]) * scale
+        return length
 
     def numbers(self, key: str) -> list[float]:
         """Return an attribute that is a list of numbers.

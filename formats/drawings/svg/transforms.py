@@ -11,10 +11,9 @@ import svgelements
 from ...errors import MalformedFileError
 from ...report import shown
 from ..drawing import Drawing
-from .shapes import UNITS, Viewport
+from .shapes import Viewport
 
 FUNCTION = re.compile(r"([a-zA-Z]\w*)\s*\(([^)]*)\)")
-LENGTH = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)([a-zA-Z%]*)")
 WORDS = {"left": ("x", 0.0), "right": ("x", 100.0), "top": ("y", 0.0), "bottom": ("y", 100.0), "center": ("", 50.0)}
 
 WHERE = ("transform", "transform-origin", "scale", "rotate", "translate")
@@ -91,19 +90,11 @@ def _transform(text: str, viewport: Viewport, drawing: Drawing) -> Matrix | None
             drawing.notes.add_assumed("transform", f"transforms that are not applied, such as {shown(name)}", 1)
         elif lower.startswith("translate"):
             axes = "y" if lower == "translatey" else "xy"
-            told = (str(_length(word, axis, viewport)) for word, axis in zip(arguments, axes, strict=False))
+            told = (str(viewport.length(word, axis)) for word, axis in zip(arguments, axes, strict=False))
             flat.append(f"{name}({', '.join(told)})")
         else:
             flat.append(f"{name}({', '.join(arguments)})")
     return svgelements.Matrix(" ".join(flat))
-
-
-def _length(word: str, axis: str, viewport: Viewport) -> float:
-    found = LENGTH.fullmatch(word)
-    if found is None:
-        raise ValueError(word)
-    unit = found[2].lower()
-    return float(found[1]) * (viewport.of_axis(axis) / 100.0 if unit == "%" else UNITS[unit])
 
 
 def _origin(style: Mapping[str, str], viewport: Viewport) -> tuple[float, float]:
@@ -122,5 +113,5 @@ def _origin(style: Mapping[str, str], viewport: Viewport) -> tuple[float, float]
             percent = WORDS[word][1] if word in WORDS else float(word[:-1])
             places.append(starts[axis] + percent / 100.0 * viewport.of_axis(axis))
         else:
-            places.append(_length(word, axis, viewport))
+            places.append(viewport.length(word, axis))
     return places[0], places[1]

@@ -13,11 +13,10 @@ from ...errors import IncompleteFileError, MalformedFileError
 from ...line_map import LineMap
 from ...options import UNITS
 from ..drawing import Drawing
-from .centre_lines import are_centres, walls_of
+from .centre_lines import are_centres, outline, walls_of
 from .far_lines import near_lines
 from .free_sides import Sides, sides_seen
 from .levels import on_level, undirected
-from .outline import outline
 
 LEAST_LENGTH = 0.01  # m; shorter lines are left out
 SAME = 1e-3  # m; lines whose ends are nearer to one another are one
