@@ -123,7 +123,7 @@ def _lay_out(layouts: list[Layout], engine: Engine, watch: Watch) -> None:
 def _search(blocks: list[Block], search: BlockSearch, engine: Engine, parts: Parts) -> Iterator[int]:
     """Search all blocks; yield the number of scans of each that is done.
 
-    What ends its workers is halved until the one scan is found that does.
+    A block that ends its workers is halved until the one scan is found that does.
     """
     while blocks:
         halves: list[Block] = []

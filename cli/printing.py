@@ -1,4 +1,4 @@
-"""What a command prints: answers for people and for programs, and the progress of what takes a while."""
+"""The output of a command: answers for people and for programs, and the progress of long work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the localizer of the robot agrees, when ``initialpose`` is published, and the transform from the map."""
+"""Decisions: whether the localizer agrees, when ``initialpose`` is published, and the transform from the map."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether odometry fits scans by the stamps, or by the times of reception, where these differ. No DDS in here."""
+"""The choice between stamps and times of reception for odometry, where these differ. No DDS in here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the node has of its robot: topics, reports, the clock, and the frames and odometry that were received."""
+"""The robot of a node: topics, reports, the clock, and the frames and odometry that were received."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class SaidOfFile:
     level: str | None = option(None, "Floor of a drawing that has several levels.", "NAME")
     surface: float | None = option(None, "Depth of walls' surfaces behind the front of a grid's cells.", "CELLS")
     point: tuple[float, float] | None = option(None, "A free place, to find the walls' directions.", "X Y")
-    drawn: str | None = option(None, "What a drawing's lines are: faces or centres of walls.", "WHAT")
+    drawn: str | None = option(None, "Which lines a drawing has: faces or centres of walls.", "WHAT")
     thickness: float | None = option(None, "Thickness of walls drawn by centre lines.", "METRES")
     oriented: bool | None = flag(*ORIENTED, default=None)
     local_metres: bool = flag("The coordinates of a GeoJSON are metres.", "--local-metres")

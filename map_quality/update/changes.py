@@ -202,7 +202,7 @@ def _moves(
 def _fits(new: Floats, old: Floats) -> bool:
     """Return whether each new side but stubs has an old one of its own; the longest is as long, others may be hidden.
 
-    What stands before a side hides all of it, or a part: it never seems longer.
+    An obstacle before a side hides all of it, or a part: it never seems longer.
     """
     free, longest = sorted(old.tolist()), float(new.max())
     sides = new[new >= min(tuning.LONGEST_STUB, longest)]

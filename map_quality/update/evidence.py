@@ -19,7 +19,7 @@ from .scans import Localized
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """What the evidence shows of each chunk: (c,) flags each.
+    """The judgement of each chunk by the evidence: (c,) flags each.
 
     Attributes
     ----------

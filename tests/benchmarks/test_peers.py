@@ -72,7 +72,7 @@ EASY = Level("easy", (24, 24), 0.0, 1e-4, None)
 
 @pytest.fixture(scope="module")
 def easy() -> Cell:
-    """Scans of free-standing polygons without clutter and noise worth the name."""
+    """Scans of free-standing polygons without clutter, and almost without noise."""
     rng = np.random.default_rng(11)
     segments = polygons(60, rng)
     return Cell("polygons", 60, "easy", tuple(draw_query(segments, EASY, rng) for _ in range(2)))

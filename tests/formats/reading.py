@@ -1,4 +1,4 @@
-"""What was read of a file: rows of a map, notes of a report."""
+"""The content of a file: rows of a map, notes of a report."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ ROOM = ((0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (0.0, 4.0))
 INVISIBLE = {"invisible": 1}
 COPIES = {"row_count": 2, "column_count": 3, "row_spacing": 0.5, "column_spacing": 2}
 
-# What stands in a block or in the model: a line of so many metres or a block, its layer, and other attributes.
+# An entity of a block or of the model: a line of so many metres or a block, its layer, and other attributes.
 Part = tuple[float | str, str] | tuple[float | str, str, dict[str, Any]]
 
 

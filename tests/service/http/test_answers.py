@@ -68,7 +68,7 @@ REGISTERED = {
     "diagnostics.reliability": pytest.approx(2 * (160 * 80) ** 0.5 / 240), "diagnostics.ambiguity_at": None,
 }  # fmt: skip
 FIELDS_OF_CUT = ("point_counts", "centroids", "spreads", "sigmas", "rms")
-# What is asked, parts in place of those of an example, and what the answer has: values, or conditions on them.
+# The request, with parts in place of those of an example, and the expected values of the answer, or conditions on them.
 ANSWERS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "pairs": (REGISTER, {}, REGISTERED),
     "pairs, i with i by default": (REGISTER, {"correspondences": None}, REGISTERED),

@@ -35,8 +35,8 @@ def breaking(old: Any, new: Any) -> list[str]:
     """Return the places of a contract that break clients of an older one.
 
     A client sends what requests describe and reads what answers do: nothing that was there may be missing or of
-    another value, and a request may not demand more. What a request takes in addition is listed, too, where a bound or
-    a type becomes wider: that is to be seen by a reader, who corrects the file.
+    another value, and a request may not demand more. A field that a request takes in addition is listed, too, and a
+    bound or a type that becomes wider: that is to be seen by a reader, who corrects the file.
     """
     was, now = dict(places(old)), dict(places(new))
     asked: set[str] = set()

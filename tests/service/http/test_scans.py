@@ -170,7 +170,7 @@ def test_a_contour_runs_as_it_was_drawn_and_what_was_seen_from_a_place_faces_it(
 
 
 def test_null_is_unknown_and_beyond_the_range_is_free(client: httpx.Client) -> None:
-    """What is known of a beam without return speaks against a wall there; what is not known says nothing."""
+    """A beam known to be without return is evidence against a wall there; an unknown one is none."""
     full = noisy(3)
     angles = SCANNER.angle_min + SCANNER.angle_increment * np.arange(240)
 

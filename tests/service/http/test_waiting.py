@@ -34,7 +34,7 @@ def test_an_index_that_is_not_done_in_time_is_504_and_goes_on(start_service: Cal
         return running.client.post("/v1/associate", json=body).status_code
 
     def both_are_told_while_it_is_indexed() -> bool:
-        """Where the map is not even read by then, or is indexed already, try again with another, and more time."""
+        """If the map is not yet read by then, or is indexed already, try again with another map, and more time."""
         number = next(tries)
         brief = 300.0 * 2.0 ** (number % 5 - 1)
         map_id = f"slow-{number}"

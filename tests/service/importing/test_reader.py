@@ -1,4 +1,4 @@
-"""What the bounded process makes of a form: its parts, the options in its fields, and what is wrong with it."""
+"""A form as the bounded process reads it: its parts, the options in its fields, and its faults."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from .stores import BOX, alter, engine_of, on_every, opened
 
 
 def test_workers_that_start_together(database: str) -> None:
-    """Whoever comes first makes the tables, by whatever call; they stay next to those of other programs."""
+    """The first caller makes the tables, by whatever call; they stay next to those of other programs."""
     with ExitStack() as stack, ThreadPoolExecutor(4) as threads:
         stores = [stack.enter_context(closing(MapStore(database_url(database)))) for _ in range(4)]
         together = threading.Barrier(len(stores))

@@ -35,7 +35,7 @@ def named(database: str) -> Iterator[MapStore]:
 
 
 def asked(database: str, what: str) -> list[tuple[object, ...]]:
-    """Return what PostgreSQL knows of the connections that maps are looked up on."""
+    """Return the rows of PostgreSQL about the connections that maps are looked up on."""
     with psycopg.connect(database, autocommit=True) as connection:
         return connection.execute(f"SELECT {what} FROM pg_stat_activity WHERE {READS}").fetchall()  # type: ignore[call-overload,no-any-return]
 

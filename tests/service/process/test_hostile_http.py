@@ -41,7 +41,7 @@ def pour(service: RunningService, head: bytes, piece: bytes, most: int, status: 
 
 CHUNKED_LIVEZ = LIVEZ[:-2] + b"Transfer-Encoding: chunked\r\n\r\n" + LAST_CHUNK
 WHOLE = CHUNKED + b"%x\r\n%b\r\n" % (len(BODY), BODY)
-# What ends after some MB, though it is sent on and on: a head, and what follows it again and again.
+# A request that ends after some MB, though it is sent on and on: a head, and the bytes that follow it again and again.
 ENDLESS = {
     "many short trailers": (CHUNKED_LIVEZ, b"a: b\r\n" * 10_000),
     "one long trailer": (CHUNKED_LIVEZ + b"x: ", b"c" * 60_000),
