@@ -17,7 +17,6 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MIRROR = np.array([1.0, -1.0])
-NOTHING_MEASURED = MeasuredSegments.from_segments(Segments.from_array(()))
 _MIRRORED_ERROR = np.array([1.0, -1.0, -1.0])  # of (x, y, theta)
 
 
@@ -139,7 +138,7 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     beams = None if scan.beams is None else scan.beams.mirrored()
     seen = scan.measured
     measured = replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
-    measured = measured if segments else NOTHING_MEASURED
+    measured = measured if segments else MeasuredSegments.from_segments(Segments.from_array(()))
     return Scan(
         measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings, scan.sweep_s
     )
