@@ -27,9 +27,9 @@ second = cluster.add_node(num_cpus=1)
 ray.init(address=cluster.address, logging_level=logging.ERROR)
 lost = []
 
-def lose_one(progress):
-    if progress.stage == "searching" and progress.done > 0 and not lost:
-        lost.append(progress)
+def lose_one(stage, done, total):
+    if stage == "searching" and done > 0 and not lost:
+        lost.append(done)
         cluster.remove_node(second, allow_graceful=False)
 
 summary = associate_many([log], room, out, FleetOptions(block=20), OnRay(), lose_one)
