@@ -56,6 +56,10 @@ SUITES = {
     "cli/": Suite(("tests/cli",)),
     "service/http/": Suite(("tests/service/http",)),
     "linefix/documents/": Suite(("tests/linefix/documents", "tests/service/http")),
+    "linefix/": Suite(("tests/linefix",)),
+    "formats/": Suite(("tests/formats",)),
+    "batch/": Suite(("tests/batch",)),
+    "ros2/": Suite(("tests/ros2",)),
     "service/work/": Suite(("tests/service/work", "tests/service/http")),
     "service/": Suite(
         (
