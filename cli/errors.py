@@ -113,9 +113,9 @@ def needing(what: str, *extras: str) -> Iterator[None]:
 
     try:
         yield
-    except ModuleNotFoundError:
+    except ModuleNotFoundError as error:
         extras = extras or ("formats",)
-        needed = f"extra{'s' * (len(extras) > 1)} {' and '.join(extras)}"
+        needed = f"package {error.name}, of the extra{'s' * (len(extras) > 1)} {' and '.join(extras)}"
         raise RefusedError(f'{what} needs the {needed}: in a checkout, pip install ".[{",".join(extras)}]"') from None
     except InputError as error:
         raise RefusedError(f"--point: {error.message}" if error.argument == "point" else str(error)) from None

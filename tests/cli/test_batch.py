@@ -29,6 +29,14 @@ def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, l
     ]
 
 
+def test_a_missing_extra_is_named_with_its_package() -> None:
+    script = "import sys; sys.modules['pyarrow'] = None; from cli.entry import main; main()"
+    command = [sys.executable, "-c", script, "batch", "a.parquet", "--maps", "room.json", "--out", "poses.parquet"]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], check=False)
+    assert (ended.returncode, ended.stdout) == (3, "")
+    assert 'needs the package pyarrow, of the extra batch: in a checkout, pip install ".[batch]"' in ended.stderr
+
+
 @pytest.mark.long
 def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 400)
