@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
@@ -11,8 +11,8 @@ from association import ReasonCode
 
 from .limits import require_within
 from .parts import AnyMap
-from .reply_parts import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer, Verdict
-from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Point, Strict, in_radians
+from .reply_parts import Index, MapReference, PoseAnswer, ReferencedAnswer, Row2, Share, Verdict
+from .strict import Answer, Coordinate, DeadlineMs, Point, Referenced, Strict, in_radians
 
 Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 MOST_LANDMARK = 100
@@ -44,7 +44,7 @@ class ScannerFields(Strict):
     sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.02
 
 
-class AnalyzeRequest(Strict):
+class AnalyzeRequest(Referenced):
     """Options of an analysis of a map.
 
     Attributes
@@ -62,8 +62,6 @@ class AnalyzeRequest(Strict):
         seed of the scanner's noise
     deadline_ms
         milliseconds; places that it leaves no time for are omitted
-    client_ref
-        returned as it was sent
     """
 
     laser: ScannerFields = ScannerFields()
@@ -73,7 +71,6 @@ class AnalyzeRequest(Strict):
     landmark: Annotated[list[Row], Field(max_length=MOST_LANDMARK)] = Field(default=[])
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     deadline_ms: DeadlineMs | None = None
-    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> AnalyzeRequest:
@@ -173,7 +170,7 @@ class AnalysisSummaryAnswer(Answer):
     left_out: Index
 
 
-class AnalyzeAnswer(Answer):
+class AnalyzeAnswer(ReferencedAnswer):
     """Analysis of a map.
 
     Attributes
@@ -186,8 +183,6 @@ class AnalyzeAnswer(Answer):
         false if the deadline ended the analysis early
     map
         null where the map came with the request
-    client_ref
-        returned as it was sent
     """
 
     places: list[AnalyzedPlaceAnswer]
@@ -195,6 +190,3 @@ class AnalyzeAnswer(Answer):
     spacing: float
     complete: bool
     map: MapReference | None
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer

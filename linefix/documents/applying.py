@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -11,8 +11,8 @@ from map_quality import ChangeCode
 
 from .arrays import MapSegmentRows
 from .parts import MapDocument, MapSigma
-from .reply_parts import TimingAnswer
-from .strict import Answer, Coordinate, FreeJson, Strict
+from .reply_parts import ReferencedAnswer
+from .strict import Coordinate, FreeJson, Referenced, Strict
 from .updates import NewMapAnswer
 
 MOST_NEW = 10_000  # segments of one change
@@ -87,7 +87,7 @@ class SharpenedWalls(Strict):
         return self
 
 
-class ApplyRequest(Strict):
+class ApplyRequest(Referenced):
     """A map, and changes of it that an update proposed.
 
     Attributes
@@ -98,28 +98,20 @@ class ApplyRequest(Strict):
         as the update returned them; `accepted` of each says whether it is in the new map
     sharpened
         as the update returned it
-    client_ref
-        returned as it was sent
     """
 
     map: MapDocument
     changes: Annotated[list[ProposedChange], Field(max_length=10_000)]
     sharpened: SharpenedWalls | None = None
-    client_ref: FreeJson = None
 
 
-class ApplyAnswer(Answer):
+class ApplyAnswer(ReferencedAnswer):
     """A map with the accepted changes; nothing is stored.
 
     Attributes
     ----------
     map
         the new map, with the accepted changes
-    client_ref
-        returned as it was sent
     """
 
     map: NewMapAnswer
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from map_quality import FindingCode
 
-from .reply_parts import Index, MapReference, PoseAnswer, TimingAnswer, Verdict
+from .reply_parts import Index, MapReference, PoseAnswer, ReferencedAnswer, Verdict
 from .strict import Answer
 
 
@@ -135,19 +133,14 @@ class MapCheckAnswer(Answer):
     complete: bool
 
 
-class CheckAnswer(MapCheckAnswer):
+class CheckAnswer(MapCheckAnswer, ReferencedAnswer):
     """Check of a map, with or without sample scans.
 
     Attributes
     ----------
     samples
         null without scans
-    client_ref
-        returned as it was sent
     """
 
     samples: SamplesAnswer | None
     map: MapReference
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer

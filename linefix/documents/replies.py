@@ -18,13 +18,14 @@ from .reply_parts import (
     Matrix,
     PoseAnswer,
     ReasonAnswer,
+    ReferencedAnswer,
     Residual,
     Row2,
     Row4,
+    SealedAnswer,
     SearchAnswer,
     SegmentOfView,
     Share,
-    TimingAnswer,
     Verdict,
     WarningAnswer,
 )
@@ -73,7 +74,7 @@ class RegistrationDiagnosticsAnswer(Answer):
     pairs: Index
 
 
-class RegisterAnswer(Answer):
+class RegisterAnswer(SealedAnswer):
     """The pose from known correspondences.
 
     Attributes
@@ -93,8 +94,6 @@ class RegisterAnswer(Answer):
     unobservable: Row2 | None
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
-    request_id: str
-    timing_ms: TimingAnswer
 
 
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
@@ -192,7 +191,7 @@ class FoundAnswer(Answer):
     maps: list[MapVerdictAnswer] = Field([])
 
 
-class AssociateAnswer(FoundAnswer):
+class AssociateAnswer(FoundAnswer, ReferencedAnswer):
     """The answer of a search.
 
     Attributes
@@ -200,17 +199,12 @@ class AssociateAnswer(FoundAnswer):
     map
         the stored map; of several maps that of the pose; null for `no_match` there, and where a single map came with
         the request
-    client_ref
-        returned as it was sent
     """
 
     map: MapReference | None
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer
 
 
-class VectorizeAnswer(Answer):
+class VectorizeAnswer(SealedAnswer):
     """Segments, with the fields that a scan of segments takes.
 
     Attributes
@@ -241,5 +235,3 @@ class VectorizeAnswer(Answer):
     sigmas: list[float]
     rms: list[float]
     warnings: list[WarningAnswer]
-    request_id: str
-    timing_ms: TimingAnswer

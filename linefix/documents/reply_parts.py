@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -36,6 +36,25 @@ class TimingAnswer(Answer):
     decode: Milliseconds
     search: Milliseconds
     total: Milliseconds
+
+
+class SealedAnswer(Answer):
+    """Fields that each answer ends with."""
+
+    request_id: str
+    timing_ms: TimingAnswer
+
+
+class ReferencedAnswer(SealedAnswer):
+    """The same, with the reference of the request.
+
+    Attributes
+    ----------
+    client_ref
+        returned as it was sent
+    """
+
+    client_ref: Any
 
 
 class PoseAnswer(Answer):

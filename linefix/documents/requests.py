@@ -8,12 +8,11 @@ from pydantic import Field, SkipValidation, ValidationInfo, field_validator, mod
 from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
-from .errors import Fault, InvalidRequestError
 from .limits import require_within
 from .parts import AnyMap, AnyPrior, InlineMap, SearchOptions
 from .sensors import Laser, MeasuredFields, RaySigma, Twist, require_at_the_sensor, require_times
 from .several import MapWeights, SeveralMaps, require_one_kind
-from .strict import DeadlineMs, FreeJson, Point, Pose, Sigma, Strict
+from .strict import DeadlineMs, Point, Pose, Referenced, Sigma, Strict
 from .views import AnyScan
 
 
@@ -100,7 +99,7 @@ class OnMaps(Strict):
         return self
 
 
-class AssociateRequest(OnMaps):
+class AssociateRequest(OnMaps, Referenced):
     """Unknown correspondences.
 
     Attributes
@@ -109,24 +108,14 @@ class AssociateRequest(OnMaps):
         the scan: segments, ranges, points or views
     prior
         prior knowledge of the pose; null: none
-    client_ref
-        returned as it was sent
     """
 
     scan: AnyScan
     prior: AnyPrior | None = None
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = None
-
-    @model_validator(mode="after")
-    def _map_of_prior(self) -> Self:
-        if self.maps is None and self.prior is not None and self.prior.map_id is not None:
-            message = "found it with a single map, expected it with maps; omit it"
-            raise InvalidRequestError([Fault("/prior/map_id", message)])
-        return self
 
 
-class BatchRequest(OnMaps):
+class BatchRequest(OnMaps, Referenced):
     """Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other.
 
     Attributes
@@ -135,15 +124,12 @@ class BatchRequest(OnMaps):
         scans, each as `scan` of /v1/associate
     priors
         one prior per scan, as `prior` of /v1/associate, or null
-    client_ref
-        returned as it was sent
     """
 
     # Each is validated separately, as `BatchItem`.
     scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1)
     priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = None
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
@@ -165,7 +151,7 @@ class BatchItem(Strict):
 MOST_SAMPLES = 64
 
 
-class CheckRequest(Strict):
+class CheckRequest(Referenced):
     """Sample scans to check a map by, and where they were taken, as far as that is known.
 
     Attributes
@@ -176,14 +162,11 @@ class CheckRequest(Strict):
         one per scan, or null: the known or assumed pose of the scan's frame in the map frame
     deadline_ms
         milliseconds; parts that it leaves no time for are omitted
-    client_ref
-        returned as it was sent
     """
 
     scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)]
     poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = None
     deadline_ms: DeadlineMs | None = None
-    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _as_many(self) -> CheckRequest:

@@ -21,8 +21,14 @@ from vectorization import Vectorization
 from ..checking import CheckedMap
 from . import analysis, checks, replies, updates
 from .parts import MapDocument
-from .reply_parts import AlternativeAnswer, CorrespondenceAnswer, CriticalWallAnswer, MapVerdictAnswer, WarningAnswer
-from .strict import Answer
+from .reply_parts import (
+    AlternativeAnswer,
+    CorrespondenceAnswer,
+    CriticalWallAnswer,
+    MapVerdictAnswer,
+    WarningAnswer,
+)
+from .strict import SEAL, Answer
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
@@ -33,7 +39,6 @@ Json = dict[str, Any]
 Indices = NDArray[np.intp]
 Listed = Callable[[Iterable[Json]], Any]
 MOST_INDICES = 1000  # of one finding
-SEAL = frozenset(("client_ref", "request_id", "timing_ms"))  # of the request, not of its result
 
 
 def _model_in(annotation: Any) -> type[Answer] | None:

@@ -33,6 +33,7 @@ MAX_FREE_DEPTH = 32
 LIKE = 0.7  # of two names, 0 to 1; from there on one is taken for the other misspelt
 _ATTRIBUTES = "Attributes\n----------\n"
 _ATTRIBUTE = re.compile(r"^(\w.*)\n((?: {4}.*\n?)+)", re.MULTILINE)
+SEAL = ("client_ref", "request_id", "timing_ms")  # of each request or answer, the last of its fields
 _names: set[str] = set()
 
 
@@ -55,6 +56,8 @@ class Described(BaseModel):
             for names, text in _ATTRIBUTE.findall(attributes):
                 for name in names.split(", "):
                     model["properties"][cls.model_fields[name].alias or name]["description"] = " ".join(text.split())
+        last = [name for name in SEAL if name in cls.model_fields]
+        model.get("properties", {}).update({name: model["properties"].pop(name) for name in last})
         return schema
 
 
@@ -161,6 +164,18 @@ def in_radians(low: float, high: float, said: str) -> Callable[[float], float]:
         return value
 
     return check
+
+
+class Referenced(Strict):
+    """A request with a reference.
+
+    Attributes
+    ----------
+    client_ref
+        returned as it was sent
+    """
+
+    client_ref: FreeJson = None
 
 
 Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]

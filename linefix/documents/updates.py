@@ -11,9 +11,9 @@ from map_quality import ChangeCode, KeptCode
 
 from .arrays import Covariance
 from .limits import require_within
-from .reply_parts import Index, MapReference, Row2, Row4, Share, TimingAnswer
+from .reply_parts import Index, MapReference, ReferencedAnswer, Row2, Row4, Share
 from .sensors import LaserScan
-from .strict import Answer, DeadlineMs, FreeJson, Pose, Strict
+from .strict import Answer, DeadlineMs, Pose, Referenced, Strict
 
 MOST_VISITS = 100
 
@@ -61,7 +61,7 @@ class Visit(Strict):
     scans: Annotated[list[UpdateScan], Field(min_length=1)]
 
 
-class UpdateRequest(Strict):
+class UpdateRequest(Referenced):
     """Scans of several visits, from which changes of the map are learned.
 
     Attributes
@@ -74,15 +74,12 @@ class UpdateRequest(Strict):
         indices of changes that are not in the new map
     deadline_ms
         milliseconds; if it passes before the changes are verified, none is proposed
-    client_ref
-        returned as it was sent
     """
 
     visits: Annotated[list[Visit], Field(min_length=1, max_length=MOST_VISITS)]
     accept: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
     refuse: Annotated[list[Annotated[int, Field(ge=0)]], Field(max_length=10_000)] = Field(default=[])
     deadline_ms: DeadlineMs | None = None
-    client_ref: FreeJson = None
 
     @model_validator(mode="after")
     def _checked(self, info: ValidationInfo) -> UpdateRequest:
@@ -249,7 +246,7 @@ class KeptWallsAnswer(Answer):
     segments: list[Index]
 
 
-class UpdateAnswer(Answer):
+class UpdateAnswer(ReferencedAnswer):
     """Proposed changes of a map; nothing is stored.
 
     Attributes
@@ -270,8 +267,6 @@ class UpdateAnswer(Answer):
         one in ten of these scans
     complete
         false if the deadline ended the update; changes are then left out
-    client_ref
-        returned as it was sent
     """
 
     map: NewMapAnswer
@@ -285,6 +280,3 @@ class UpdateAnswer(Answer):
     refused_visits: list[RefusedVisitAnswer]
     kept: list[KeptWallsAnswer]
     complete: bool
-    client_ref: Any
-    request_id: str
-    timing_ms: TimingAnswer

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from linefix.documents.checks import MapCheckAnswer
 from linefix.documents.replies import FoundAnswer
-from linefix.documents.reply_parts import Index, MapReference, Milliseconds, PoseAnswer, Row4, TimingAnswer
+from linefix.documents.reply_parts import Index, MapReference, Milliseconds, PoseAnswer, ReferencedAnswer, Row4
 from linefix.documents.strict import Answer
 from linefix.documents.updates import NewMapAnswer
 
@@ -45,14 +45,11 @@ class BatchResult(Answer):
     problem: Problem | None = Field(None, description="otherwise")
 
 
-class BatchAnswer(Answer):
+class BatchAnswer(ReferencedAnswer):
     """The answers in the order of the scans."""
 
     results: list[BatchResult]
     map: MapReference | None
-    client_ref: Any = Field(description="returned as it was sent")
-    request_id: str
-    timing_ms: TimingAnswer
 
 
 class MapSummaryAnswer(Answer):
