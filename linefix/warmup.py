@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+import map_quality
+import simulation
 from association import (
     AssociationOptions,
     Deadline,
@@ -23,64 +25,36 @@ from association import (
     associate,
     associate_on_maps,
 )
-from map_quality import Analysis, Robot, check_map, standing_places, try_sample
-from registration import (
-    IDENTITY,
-    Beams,
-    Correspondences,
-    MeasuredSegments,
-    OneStepSums,
-    RegistrationOptions,
-    Segments,
-    register,
-)
-from simulation import scan
-from simulation.worlds import outline
+from registration import IDENTITY, Beams, MeasuredSegments, RegistrationOptions, Segments, register
 from vectorization import LaserScan, vectorize
 
-# A room with a niche, seen from inside: free space on the left of every wall. And another, symmetric about an axis.
-ROOM = outline([(-4.0, -3.0), (4.0, -3.0), (4.0, 1.0), (2.5, 1.0), (2.5, 3.0), (-4.0, 3.0)])
-_HALF = [(4.0, -3.0), (4.0, 3.0), (1.0, 3.0), (1.0, 1.5)]
-SYMMETRIC_ROOM = outline([(-4.0, -3.0), *_HALF, *((-x, y) for x, y in _HALF[:0:-1])])
+# A convex room, and the ranges of a scanner at the origin: free space on the left of every wall. And a symmetric room.
+ROOM = simulation.outline([(-4.0, -3.0), (4.0, -3.0), (4.0, 1.0), (2.5, 3.0), (-4.0, 3.0)])
+SYMMETRIC_ROOM = simulation.outline([(-4.0, -3.0), (4.0, -3.0), (4.0, 1.0), (0.0, 3.0), (-4.0, 1.0)])
+TURN = np.linspace(-math.pi, math.pi, 360, endpoint=False)
+_X, _Y, _DX, _DY = *ROOM[:, :2].T, *(ROOM[:, 2:] - ROOM[:, :2]).T
+_TOWARDS = np.outer(_DY, np.cos(TURN)) - np.outer(_DX, np.sin(TURN))
+RANGES = np.where(_TOWARDS > 0.0, (_DY * _X - _DX * _Y)[:, None] / np.maximum(_TOWARDS, 1e-9), math.inf).min(axis=0)
 THINGS = np.array([[1.0, 2.0], [-2.0, 1.0]])  # too small for walls
-TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 
 def warm_up() -> None:
     """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
     warm_up_second_half()
     warm_up_searching()
-    warm_up_analyzing()
-
-
-def warm_up_second_half() -> None:
-    """Compile other kernels than those of the search, so that two processes seldom meet at the same kernel."""
-    warm_up_registering()
-    warm_up_vectorizing()
-    warm_up_simulating()
-
-
-def warm_up_analyzing() -> None:
-    """Check a map, alone and by samples, and look from its places, once."""
     room = Segments.from_array(ROOM)
-    index, robot = MapIndex.build(room, 0.0), Robot(beams=360)
-    check_map(index)
+    index, robot = MapIndex.build(room, 0.0), map_quality.Robot(beams=360)
+    map_quality.check_map(index)
     for sample in (_with_beams(), Scan(MeasuredSegments.from_segments(room.take([0])))):
-        try_sample(index, sample, Deadline(), oriented=True)
-    analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
+        map_quality.try_sample(index, sample, Deadline(), oriented=True)
+    analysis = map_quality.Analysis.over(index, robot, 3.0)
     for number in range(len(analysis.standing.poses)):
         analysis.look(number)
 
 
-def warm_up_simulating() -> None:
-    """Take a scan of a map."""
-    scan(Segments.from_array(ROOM), IDENTITY, Robot(beams=360).scanner, np.random.default_rng(0))
-
-
-def warm_up_registering() -> None:
-    """Register once in each way that has kernels of its own."""
-    room = Segments.from_array(ROOM)
-    pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
+def warm_up_second_half() -> None:
+    """Compile other kernels than those of the search, so that two processes seldom meet at the same kernel."""
+    room, pairs = Segments.from_array(ROOM), np.repeat(np.arange(len(ROOM))[:, None], 2, axis=1)
     for options in (
         RegistrationOptions(),
         RegistrationOptions(weighting="uniform"),
@@ -88,66 +62,40 @@ def warm_up_registering() -> None:
         RegistrationOptions(estimator="one_step", evaluate_at=IDENTITY),
     ):
         register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
-    # No request needs it, but kernels count as compiled once something of each module is cached.
-    one_by_one = Correspondences.of(room, MeasuredSegments.from_segments(room), pairs)
-    assert OneStepSums.of_set(one_by_one, np.ones(len(pairs))).reliability > 0.0
-
-
-def warm_up_vectorizing() -> None:
-    """Vectorize once in each way that has kernels of its own."""
-    ranges = room_ranges(TURN)
-    vectorize(LaserScan(-np.pi, TURN[1] - TURN[0], ranges, 0.1, 30.0))
-    points = np.stack([ranges * np.cos(TURN), ranges * np.sin(TURN)], axis=1)
+    points = np.stack([RANGES * np.cos(TURN), RANGES * np.sin(TURN)], axis=1)
+    vectorize(LaserScan(-math.pi, TURN[1] - TURN[0], RANGES, 0.1, 30.0))
     vectorize(points)
     vectorize(points, viewpoint=None)
+    simulation.scan(room, IDENTITY, simulation.Scanner(), np.random.default_rng(0))
 
 
 def warm_up_searching() -> None:
     """Associate once in each way that has kernels of its own."""
     room, symmetric = Segments.from_array(ROOM), Segments.from_array(SYMMETRIC_ROOM)
     index, with_things = (MapIndex.build(room, 0.0, points=MapPoints.of(some)) for some in (THINGS[:0], THINGS))
-    for seen in _scans():
+    whole, beams, step = Scan(MeasuredSegments.from_segments(room)), _with_beams(), 1e-4 * np.eye(3)
+    for seen in (
+        whole,
+        beams,
+        replace(whole, viewpoint=None),
+        assemble([View(whole), View(whole, IDENTITY, step)]),
+        assemble([View(beams), View(beams, IDENTITY, step)]),
+        Scan(MeasuredSegments.from_segments(room.take([0]))),
+        Scan(MeasuredSegments.from_segments(room.take([]))),
+    ):
         associate(index, seen)
         associate(with_things, seen, SoftPrior(IDENTITY, np.eye(3)))
     window = HardPrior(IDENTITY, 1.0, 1.0)
-    associate(index.undirected, _scans()[0], window, AssociationOptions(oriented=False))
-    associate(index, _scans()[0], None, AssociationOptions(estimator="one_step"))
+    associate(index.undirected, whole, window, AssociationOptions(oriented=False))
+    associate(index, whole, None, AssociationOptions(estimator="one_step"))
     # The mirrored scan is found as well; a map that is not to scale states no sigma.
     for other in (MapIndex.build(symmetric, 0.0), MapIndex.build(Segments.from_array(1.02 * SYMMETRIC_ROOM))):
         associate(other, Scan(MeasuredSegments.from_segments(symmetric)))
     maps = MapSet({"room": MapPart(room, 0.0), "symmetric": MapPart(symmetric, 0.0)})
     for known in (KnownOfMaps(), KnownOfMaps(window, "room", {"room": 0.5})):
-        associate_on_maps(maps, _with_beams(), known)
-
-
-def _scans() -> list[Scan]:
-    """Return scans in each form that has kernels of its own."""
-    room = Segments.from_array(ROOM)
-    whole = Scan(MeasuredSegments.from_segments(room))
-    drive = [View(_with_beams()), View(_with_beams(), IDENTITY, 1e-4 * np.eye(3))]
-    return [
-        whole,
-        _with_beams(),
-        replace(whole, viewpoint=None),
-        assemble([View(whole), View(whole, IDENTITY, 1e-4 * np.eye(3))]),
-        assemble(drive),
-        Scan(MeasuredSegments.from_segments(room.take([0]))),
-        Scan(MeasuredSegments.from_segments(room.take([]))),
-    ]
+        associate_on_maps(maps, beams, known)
 
 
 def _with_beams() -> Scan:
     """Return the room as a laser in its middle sees it."""
-    beams = Beams(TURN, room_ranges(TURN), 30.0)
-    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
-
-
-def room_ranges(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance from the origin to the room's walls along each angle, metres."""
-    x, y, ex, ey = (*ROOM[:, :2].T[:, :, None], *(ROOM[:, 2:] - ROOM[:, :2]).T[:, :, None])
-    cross = np.cos(angles) * ey - np.sin(angles) * ex
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along, fraction = (x * ey - y * ex) / cross, (x * np.sin(angles) - y * np.cos(angles)) / cross
-    hit = (np.abs(cross) > 1e-12) & (along > 0.0) & (fraction >= 0.0) & (fraction <= 1.0)
-    nearest: NDArray[np.float64] = np.where(hit, along, np.inf).min(axis=0)
-    return nearest
+    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), Beams(TURN, RANGES, 30.0))

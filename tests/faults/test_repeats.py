@@ -13,11 +13,11 @@ import orjson
 import pytest
 
 from linefix.documents import examples
-from linefix.warmup import room_ranges
+from simulation import Scanner
 from tests.running import RunningService, client_of, until
+from tests.service.asking import scanned
 
-TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
-LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.0, "ranges": room_ranges(TURN).tolist()}
+LASER = scanned(scanner=Scanner(beams=360, angle_increment=np.pi / 180.0, range_max=30.0))
 BODIES = {
     "/v1/associate": [
         examples.ASSOCIATE,

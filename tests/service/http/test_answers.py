@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from linefix.documents import examples
-from linefix.warmup import ROOM
 from registration import RigidTransform
 from simulation import Scanner
 from tests.service.asking import HERE, ORIGIN, answered, pose_json, scanned, seen_from
@@ -95,7 +94,7 @@ ANSWERS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
          "timing_ms": lambda told: told.keys() == {"decode", "search", "total"}}),
     "ranges, one of them null": (
         ASSOCIATE, {"scan": {"laser": ranges([None, *SEEN[1:]], range_min=0.1), "sigma": None}},
-        {**found(0.02), "segments": lambda told: len(told) >= len(ROOM), "warnings": []}),
+        {**found(0.02), "segments": lambda told: len(told) >= len(examples.WALLS), "warnings": []}),
     "ranges that are stuck": (
         ASSOCIATE, {"scan": {"laser": ranges([2.0] * 400 + SEEN[400:])}},
         {"warnings.code": ["stuck_ranges"], "warnings.message": lambda told: told[0].endswith((".", "?"))}),

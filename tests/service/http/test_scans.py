@@ -11,7 +11,6 @@ import pytest
 
 from linefix.documents import examples
 from linefix.documents.requests import VectorizeOptions
-from linefix.warmup import ROOM
 from registration import RigidTransform
 from simulation import Scanner
 from tests.service.asking import ORIGIN, answered, scanned
@@ -119,7 +118,7 @@ def noisy(seed: int, **more: Any) -> dict[str, Any]:
 
 def contour() -> np.ndarray:
     """Return points along the room's walls, as a tracer of pictures gives them."""
-    corners = ROOM[:, :2]
+    corners = np.array(examples.WALLS)[:, :2]
     edges = np.roll(corners, -1, axis=0) - corners
     return (corners[:, None] + np.arange(0.0, 1.0, 0.02)[:, None] * edges[:, None]).reshape(-1, 2)
 
@@ -165,7 +164,7 @@ def test_a_contour_runs_as_it_was_drawn_and_what_was_seen_from_a_place_faces_it(
     """Seen from the origin every wall was turned to face it; of a contour that is no place where a sensor stood."""
     shifted = contour()[:: -1 if clockwise else 1] + np.array([20.0, 0.0])  # the origin is outside of the room
     found = answered(client, "/v1/vectorize", points=shifted.tolist(), viewpoint=viewpoint)["segments"]
-    assert len(found) >= len(ROOM)
+    assert len(found) >= len(examples.WALLS)
     assert set(lefts_of(found, (20.0, 0.0))) == {viewpoint is not None or not clockwise}
 
 
