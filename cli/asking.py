@@ -18,7 +18,7 @@ from .options import option
 from .printing import Json, compile_first
 
 if TYPE_CHECKING:
-    from linefix.answering import Within
+    from linefix.answering import LocalService
 
 N = TypeVar("N", int, float)
 Locate = Callable[[Json], Json]
@@ -26,8 +26,9 @@ Locate = Callable[[Json], Json]
 
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
+DEADLINE_MS = 30_000.0  # as a service has it by default
 MOST_SCANS = 10**9  # of an update: each is read from a file of this machine
-OF_STORED = {"check_map": "check", "update_map": "update"}  # a server has them for stored maps; the name in `answering`
+OF_STORED = ("check_map", "update_map")  # a server has them for stored maps
 OF_STORE = ("put_map", "get_map", "list_maps", "delete_map")
 LIMITS = ("values", "map_segments", "scan_segments", "beams")  # by settings of these names, after MAX_
 BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
@@ -69,7 +70,7 @@ class Here:
         Parameters
         ----------
         method : str
-            Of the client, or a function of `linefix.answering`.
+            Of the client, of `linefix.answering.LocalService`, or of the store.
         arguments
             Of the method; the map of a request in place of an id for a check or an update.
         names : mapping
@@ -77,38 +78,33 @@ class Here:
         more
             Arguments by name.
         """
-        answer: Json
         if method in OF_STORE:
             from .stored import stored_maps
 
-            with stored_maps("".join(arguments[:1]), names) as maps:
-                answer = getattr(maps, method)(*arguments, **more)
-                return answer
-        with answering(names) as within:
-            from linefix import answering as library
-
-            answer = getattr(library, OF_STORED.get(method, method))(*arguments, within, **more)
+            service: Any = stored_maps("".join(arguments[:1]), names)
+        else:
+            service = answering(names)
+        with service as opened:
+            answer: Json = getattr(opened, method)(*arguments, **more)
             return answer
 
     def locating(self, target: Json, options: Json, names: Names) -> Locate:
         """Index the map, or the maps, of a request once; return the function that searches scans there."""
-        with answering(names) as within:
-            from linefix.answering import locating
-
-            return refusing(names)(locating(target, options, within))
+        with answering(names) as service:
+            return refusing(names)(service.locating(target, options))
 
 
 @contextmanager
-def answering(names: Names) -> Iterator[Within]:
-    """Give the bounds of requests in this process, once it can search; raises as `refusing`."""
-    from linefix.answering import Within
+def answering(names: Names) -> Iterator[LocalService]:
+    """Give what answers requests in this process, once it can search; raises as `refusing`."""
+    from linefix.answering import LocalService
     from linefix.documents.limits import Limits
 
     compile_first()
     limits = {name: setting(f"MAX_{name.upper()}", getattr(Limits(), name)) for name in LIMITS}
     limits |= {"pairs": setting("MAX_CORRESPONDENCES", Limits().pairs), "batch": MOST_SCANS}
     with refusing(names):
-        yield Within(Limits(**limits), setting("MAX_DEADLINE_MS", Within().deadline_ms), _stored)
+        yield LocalService(Limits(**limits), setting("MAX_DEADLINE_MS", DEADLINE_MS), _stored)
 
 
 def _stored(map_id: str) -> tuple[Any, Json]:

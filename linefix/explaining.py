@@ -12,6 +12,7 @@ from association import (
     AssociationOptions,
     AssociationResult,
     Deadline,
+    KnownOfMaps,
     MapIndex,
     Prior,
     Scan,
@@ -91,17 +92,17 @@ def explain(
     (1, 0.5)
     """
     index, how = prepared(map, options)
-    return explain_search(index, scan_of(scan, angles), prior, how, deadline)
+    return explain_search(index, scan_of(scan, angles), KnownOfMaps(prior), how, deadline)
 
 
 def explain_search(
-    index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline | None
+    index: MapIndex, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline | None
 ) -> Explanation:
-    """Search a scan as `linefix.associate`, and return how the verdict came about."""
+    """Search a scan on one map as `linefix.associate`, and return how the verdict came about."""
     found: list[AnswerExplanation] = []
 
     def search(seen: Scan) -> AssociationResult:
-        found.append(explain_verdict(index, seen, prior, options, deadline))
+        found.append(explain_verdict(index, seen, known.prior, options, deadline))
         return found[-1].result
 
     result = search_drive(search, scan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
@@ -63,10 +64,10 @@ class Stopwatch:
         """Return a part."""
         return self._parts[name]
 
-    def deadline(self, asked_ms: float | None, most_ms: float) -> Deadline:
+    def deadline(self, asked_ms: float | None, most_ms: float = math.inf) -> Deadline:
         """Return when to end: so many milliseconds after the body had arrived, waiting for a slot included."""
         allowed = most_ms if asked_ms is None else min(asked_ms, most_ms)
-        return Deadline(at=self._begun + allowed / 1e3)
+        return Deadline() if allowed == math.inf else Deadline(at=self._begun + allowed / 1e3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,14 +182,12 @@ def analysis_steps(index: MapIndex, asked: AnalyzeRequest, deadline: Deadline) -
     return results.analysis_json(analysis, found)
 
 
-def check_steps(index: MapIndex, asked: CheckRequest | None, deadline: Deadline, *, oriented: bool) -> Steps:
-    """Check a map, and with sample scans whether these fit better otherwise; raises `InvalidRequestError` for one."""
-    scans = [] if asked is None else _in_time(inputs.scans_of(asked), deadline)
-    poses = None
-    if asked is not None and asked.poses is not None:
-        poses = [None if one is None else transform_of(one) for one in asked.poses]
+def check_steps(index: MapIndex, oriented: bool | None, asked: CheckRequest, deadline: Deadline) -> Steps:
+    """Check a map, `oriented` as it states, and with sample scans; raises `InvalidRequestError` for one of these."""
+    scans = _in_time(inputs.scans_of(asked), deadline)
+    poses = [None if one is None else transform_of(one) for one in asked.poses or []]
     yield
-    checked = yield from checking(index, scans, poses, deadline, oriented=oriented)
+    checked = yield from checking(index, scans, poses, deadline, oriented=oriented is not False)
     return results.checked_json(checked)
 
 

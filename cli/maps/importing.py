@@ -88,14 +88,13 @@ def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
     if where.server is not None:
         sent = [(one.name, one.read_bytes()) for one in files]
         return where.ask("import_map", sent, said.fields, names=names)
-    with answering(names) as within, needing(f"reading {file.name}"):
+    with answering(names) as service, needing(f"reading {file.name}"):
         from formats import read_map
-        from linefix.answering import check_import
         from linefix.operations import Stopwatch
         from service.importing.fields import options_of
 
         watch = Stopwatch()
-        return check_import(read_map(file, options_of(said.fields)), watch, within)
+        return service.check_import(read_map(file, options_of(said.fields)), watch)
 
 
 def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:

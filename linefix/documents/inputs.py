@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 
@@ -127,11 +127,14 @@ def analysis_of(index: MapIndex, asked: AnalyzeRequest) -> Analysis:
     )
 
 
-def part_of(document: MapDocument, *, oriented: bool, path: str = "map.") -> MapPart:
-    """Return a map as the search takes it; `path` goes before the fields that errors name."""
+def part_of(document: MapDocument, *, oriented: bool | None = None, path: str = "map.") -> MapPart:
+    """Return a map as the search takes it; `path` goes before the fields that errors name.
+
+    `oriented` None: as the map states.
+    """
     segments = Segments.from_array(document.segments, argument=f"{path}segments")
     points = MapPoints.of(document.points, document.points_sigma, path=path)
-    return MapPart(segments, document.sigma, oriented, points)
+    return MapPart(segments, document.sigma, is_oriented(oriented, document.oriented), points)
 
 
 def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -142,14 +145,39 @@ def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float
     InvalidSegmentsError, InvalidMapError
         When it could not be searched.
     """
-    part = part_of(document, oriented=True, path=path)
+    part = part_of(document, path=path)
     return MapIndex.require(part.segments, part.sigma, path)
 
 
-def index_of(document: MapDocument, *, oriented: bool, deadline: Deadline | None = None) -> MapIndex:
+def parts_of(
+    documents: Iterable[tuple[str | None, MapDocument]], oriented: bool | None
+) -> tuple[dict[str, MapPart], dict[str | None, str]]:
+    """Return maps by name as the search takes them, and their frames, that of the first also by None.
+
+    A single map has the name None, for which that of its part is empty. `oriented` None: as each map states.
+    """
+    parts, frames = dict[str, MapPart](), dict[str | None, str]()
+    for number, (name, document) in enumerate(documents):
+        path = "map." if name is None else f"maps.{number}."
+        parts[name or ""] = part_of(document, oriented=oriented, path=path)
+        frames[name] = document.frame_id
+        frames.setdefault(None, document.frame_id)
+    return parts, frames
+
+
+def reference_of(name: str | None, revision: int | None = None) -> dict[str, object] | None:
+    """Return the id and the revision of a map as they are answered; None for a single map of the request."""
+    return None if name is None else {"map_id": name, "revision": revision}
+
+
+def indexed(part: MapPart, deadline: Deadline | None = None) -> MapIndex:
     """Return the index of a map; raises `IndexingEndedError` when the deadline passes."""
-    part = part_of(document, oriented=oriented)
-    return MapIndex.build(part.segments, part.sigma, oriented=oriented, points=part.points, deadline=deadline)
+    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented, points=part.points, deadline=deadline)
+
+
+def index_of(document: MapDocument, *, oriented: bool | None = None, deadline: Deadline | None = None) -> MapIndex:
+    """Return the index of a map, `oriented` as of `part_of`; raises `IndexingEndedError` when the deadline passes."""
+    return indexed(part_of(document, oriented=oriented), deadline)
 
 
 def replacements_of(asked: ApplyRequest) -> dict[int, Replacement]:

@@ -177,6 +177,10 @@ class CheckRequest(Referenced):
         return self
 
 
+NO_SAMPLES = CheckRequest.model_construct(scans=[])
+"""A check of a map alone, which needs no body."""
+
+
 class VectorizeOptions(Strict):
     """How to cut points into segments.
 

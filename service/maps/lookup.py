@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from association import Deadline, IndexingEndedError, MapIndex, MapPart, MapSet
+from association import Deadline, IndexingEndedError, MapIndex, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
-from linefix.documents.inputs import index_of, part_of, require_map
+from linefix.documents.inputs import index_of, indexed, parts_of, reference_of, require_map
 from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
 from linefix.documents.reading import read_stored
 from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
@@ -51,7 +51,10 @@ class FoundMaps:
     @property
     def references(self) -> dict[str | None, dict[str, object] | None]:
         """Id and revision of each map; the revision, or all of a single map, is None where it came with the request."""
-        return {name: _reference(name, one) for name, one in self.maps.items()}
+        return {
+            name: reference_of(one.map_id, one.revision) if isinstance(one, MapRecord) else reference_of(name)
+            for name, one in self.maps.items()
+        }
 
 
 class MapLookup:
@@ -177,17 +180,15 @@ class MapLookup:
             raise UnknownMapError
         return page.maps
 
-    def _index(self, found: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMap:
-        parts: dict[str, MapPart] = {}
-        frames: dict[str | None, str] = {}
+    def _documents(self, found: FoundMaps, deadline: Deadline) -> Iterator[tuple[str | None, MapDocument]]:
+        """Yield the documents of maps by name, one after another; raises also `IndexNotReadyError`."""
         for number, (name, one) in enumerate(found.maps.items()):
             if number and deadline.passed:
                 raise IndexNotReadyError
-            document = self.document(one, found.document)
-            path = "map." if name is None else f"maps.{number}."
-            parts[name or ""] = part_of(document, oriented=is_oriented(oriented, document.oriented), path=path)
-            frames[name] = document.frame_id
-            frames.setdefault(None, document.frame_id)
+            yield name, self.document(one, found.document)
+
+    def _index(self, found: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMap:
+        parts, frames = parts_of(self._documents(found, deadline), oriented)
         # The old goes before the new comes: two of the largest at once would take too much.
         each = 1 if all(part.oriented for part in parts.values()) else 2
         count = sum(each * len(part.segments) + len(part.points) for part in parts.values())
@@ -195,7 +196,7 @@ class MapLookup:
         self._cache.make_room(INDEXED_BYTES * count * (1 if single is not None else 2))
         maps: MapIndex | MapSet
         if single is not None:
-            maps = MapIndex.build(single.segments, single.sigma, oriented=single.oriented, points=single.points)
+            maps = indexed(single)
         else:
             try:
                 maps = MapSet(parts, deadline)
@@ -207,12 +208,6 @@ class MapLookup:
 def _count(one: InlineMap | MapRecord, kind: str) -> int:
     """Return the number of segments, or points, of a map."""
     return int(getattr(one.outline, kind)) if isinstance(one, MapRecord) else len(getattr(one, kind))
-
-
-def _reference(name: str | None, one: InlineMap | MapRecord) -> dict[str, object] | None:
-    if isinstance(one, MapRecord):
-        return {"map_id": one.map_id, "revision": one.revision}
-    return None if name is None else {"map_id": name, "revision": None}
 
 
 def _key(found: FoundMaps, oriented: bool | None) -> Hashable:

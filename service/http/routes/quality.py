@@ -15,8 +15,8 @@ from linefix.documents import examples
 from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
 from linefix.documents.applying import ApplyAnswer, ApplyRequest
 from linefix.documents.checks import CheckAnswer
-from linefix.documents.parts import InlineMap, StoredMap, is_oriented
-from linefix.documents.requests import CheckRequest
+from linefix.documents.parts import InlineMap, StoredMap
+from linefix.documents.requests import NO_SAMPLES, CheckRequest
 from linefix.documents.updates import UpdateAnswer, UpdateRequest
 from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps
 
@@ -86,7 +86,7 @@ async def check_map(
 ) -> Response:
     """Check a map: its directions, its drawing, its size, and its similar places."""
     exchange.services.gate.enter(exchange.ticket)
-    return await _check(exchange, map_id, None, exchange.job(deadline_ms))
+    return await _check(exchange, map_id, NO_SAMPLES, exchange.job(deadline_ms))
 
 
 @router.post(
@@ -102,16 +102,16 @@ async def check_map_with_scans(exchange: Searching, map_id: MapIdPath) -> Respon
     return await _check(exchange, map_id, asked, exchange.job(asked.deadline_ms))
 
 
-async def _check(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Response:
+async def _check(exchange: Exchange, map_id: str, asked: CheckRequest, job: Job) -> Response:
     noted = {"findings": lambda found: [one["code"] for one in found["findings"]]}
-    on, client_ref = StoredMap(map_id=map_id), None if asked is None else asked.client_ref
+    on = StoredMap(map_id=map_id)
 
     def steps(index: MapIndex, source: FoundMaps) -> Steps:
         # An index of its own: one without directions, which a check may add to it, goes with the check, for the cache
         # does not count it.
-        return check_steps(replace(index), asked, job.deadline, oriented=is_oriented(None, source.maps[None].oriented))
+        return check_steps(replace(index), source.maps[None].oriented, asked, job.deadline)
 
-    return await _in_turns(exchange, on, steps, job, noted, oriented=True, client_ref=client_ref)
+    return await _in_turns(exchange, on, steps, job, noted, oriented=True, client_ref=asked.client_ref)
 
 
 @router.post(
