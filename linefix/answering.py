@@ -27,8 +27,7 @@ from .documents.requests import (
     VectorizeRequest,
 )
 from .documents.updates import UpdateRequest
-from .driving import search
-from .explaining import Explanation, explain_search
+from .driving import Explanation, explain_search, search
 from .operations import Json, Search, Steps, Stopwatch, Target, require_time
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import association
 from association import (
+    AnswerExplanation,
     AssociationOptions,
     AssociationResult,
     AssociationWarning,
@@ -24,9 +25,10 @@ from association import (
     MapSet,
     Prior,
     Scan,
+    VerdictExplanation,
     Views,
 )
-from registration import Beams, MeasuredSegments, Segments, wrap_angle
+from registration import Beams, MeasuredSegments, wrap_angle
 
 Indices = NDArray[np.intp]
 Search = Callable[[Scan], AssociationResult]
@@ -46,6 +48,25 @@ LAST_VIEW_ONLY = AssociationWarning(
 OF_ANSWER = frozenset(
     ("prior_contradicted", "search_incomplete", "map_scale", "common_offset", "map_distorted", "turned")
 )  # codes of warnings that are about a search and its pose, not about the scan
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """An answer, and how its verdict came about.
+
+    Attributes
+    ----------
+    result : AssociationResult
+        As `locate` returns it.
+    verdict : VerdictExplanation
+        On the scan as a whole.
+    last_view : VerdictExplanation or None
+        On the last view of a drive alone, if it was searched.
+    """
+
+    result: AssociationResult
+    verdict: VerdictExplanation
+    last_view: VerdictExplanation | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +107,20 @@ def search(
         return association.associate(maps, seen, known.prior, how, deadline)
 
     return search_drive(once, scan)
+
+
+def explain_search(
+    index: MapIndex, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline | None
+) -> Explanation:
+    """Search a scan on one map as `linefix.associate`, and return how the verdict came about."""
+    found: list[AnswerExplanation] = []
+
+    def search(seen: Scan) -> AssociationResult:
+        found.append(association.explain_verdict(index, seen, known.prior, options, deadline))
+        return found[-1].result
+
+    result = search_drive(search, scan)
+    return Explanation(result, found[0].verdict, found[1].verdict if len(found) > 1 else None)
 
 
 def search_drive(search: Search, scan: Scan) -> AssociationResult:
@@ -153,20 +188,14 @@ def last_view(scan: Scan) -> LastView | None:
 
 
 def _measured(measured: MeasuredSegments, own: Indices) -> MeasuredSegments:
-    return MeasuredSegments(
-        Segments.derived(measured.segments.endpoints[own]),
-        measured.sigma[own],
-        measured.point_counts[own],
-        measured.centroids[own],
-        measured.spreads[own],
-        measured.counted,
-    )
+    parts = {name: getattr(measured, name)[own] for name in ("sigma", "point_counts", "centroids", "spreads")}
+    return replace(measured, segments=measured.segments.take(own), **parts)
 
 
 def _beams(beams: Beams | None, own: NDArray[np.bool_]) -> Beams | None:
     if beams is None or beams.origins is None:
         return None
-    return Beams(beams.angles[own], beams.ranges[own], beams.range_max, beams.origins[own])
+    return replace(beams, **{name: getattr(beams, name)[own] for name in ("angles", "ranges", "origins")})
 
 
 def _supports(drive: AssociationResult) -> bool:

@@ -32,9 +32,8 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .checking import CheckedMap, check
-from .driving import associate
-from .explaining import Explanation, explain
-from .locating import index_map, index_maps, locate, scan_of
+from .driving import Explanation, associate
+from .locating import explain, index_map, index_maps, locate, scan_of
 from .ranges import MountedScan, view_of
 from .updating import update_map
 

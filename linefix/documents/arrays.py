@@ -154,57 +154,47 @@ SigmaOrSigmas = Annotated[
 """One standard deviation for all segments of a scan, or one each."""
 
 
-def _symmetric(value: Any) -> Floats:
-    if type(value) is not list:
-        raise _not_an_array(value)
-    if len(value) in (6, 36):
-        raise PydanticCustomError(
-            "covariance",
-            f"expected 3 rows of 3 numbers, of x, y and yaw, found {len(value)} items; of the 36 in ROS send rows and "
-            "columns 0, 1, 5",
-        )
-    if len(value) != 3:
-        raise PydanticCustomError("covariance", f"expected 3 rows of 3 numbers, found {len(value)} items")
-    matrix = _Array(_SCAN, 3).numbers(value)
-    unequal = np.argwhere(~np.isclose(matrix, matrix.T, rtol=1e-9, atol=0.0))
-    if len(unequal):
-        row, column = unequal[0]
-        raise PydanticCustomError(
-            "covariance",
-            f"expected a symmetric matrix, found different numbers at rows {row} and {column} of columns {column} and "
-            f"{row}; symmetrize it",
-        )
-    return matrix
+@dataclass(frozen=True, slots=True)
+class _Covariance(_Array):
+    """The rows of a covariance of x, y and theta.
+
+    Attributes
+    ----------
+    definite : bool
+        False: a direction may be exact.
+    """
+
+    definite: bool = True
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema of the rows."""
+        return {**_Array.__get_pydantic_json_schema__(self, schema, handler), "minItems": 3, "maxItems": 3}
+
+    def validate(self, value: Any, info: ValidationInfo) -> Floats:
+        """Return the matrix."""
+        if type(value) is not list:
+            raise _not_an_array(value)
+        if len(value) != 3:
+            raise _wrong_covariance(
+                f"expected 3 rows of 3 numbers, of x, y and yaw, found {len(value)} items; of the 36 in ROS send rows "
+                "and columns 0, 1, 5"
+            )
+        matrix = self.numbers(value)
+        if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
+            raise _wrong_covariance("expected a symmetric matrix, found different numbers in it; symmetrize it")
+        least = np.linalg.eigvalsh(matrix).min()
+        if least <= 0.0 if self.definite else least < -1e-9 * np.abs(matrix).max():
+            expected = "a positive definite matrix" if self.definite else "a covariance"
+            raise _wrong_covariance(
+                f"expected {expected}, found the eigenvalue {least:.3g}; for an unknown direction send a large variance"
+            )
+        return matrix
 
 
-def _covariance(value: Any) -> Floats:
-    matrix = _symmetric(value)
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError as error:
-        raise PydanticCustomError(
-            "covariance",
-            "expected a positive definite matrix, found an eigenvalue of 0 or below; for an unknown direction send a "
-            "large variance",
-        ) from error
-    return matrix
+def _wrong_covariance(message: str) -> PydanticCustomError:
+    return PydanticCustomError("covariance", message)
 
 
-def _semidefinite(value: Any) -> Floats:
-    matrix = _symmetric(value)
-    if np.linalg.eigvalsh(matrix).min() < -1e-9 * np.abs(matrix).max():
-        raise PydanticCustomError("covariance", "expected a covariance, found a negative eigenvalue; check its signs")
-    return matrix
-
-
-_MATRIX = WithJsonSchema(
-    {
-        "type": "array",
-        "items": {"type": "array", "items": _number(), "minItems": 3, "maxItems": 3},
-        "minItems": 3,
-        "maxItems": 3,
-    }
-)
-Covariance = Annotated[Floats, PlainValidator(_covariance), _MATRIX]
-StepCovariance = Annotated[Floats, PlainValidator(_semidefinite), _MATRIX]
+Covariance = Annotated[Floats, _Covariance(_SCAN, 3)]
+StepCovariance = Annotated[Floats, _Covariance(_SCAN, 3, definite=False)]
 """Of a step; a direction may be exact."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from map_quality import FindingCode
 
-from .reply_parts import Index, MapReference, PoseAnswer, ReferencedAnswer, Verdict
-from .strict import Answer
+from .reply_parts import MapReference, PoseAnswer, ReferencedAnswer
+from .strict import Answer, Index, Verdict
 
 
 class FindingAnswer(Answer):

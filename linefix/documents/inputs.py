@@ -20,9 +20,8 @@ from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields,
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
 from .scans import Scanned, scanned_of, transform_of
-from .sensors import LaserScan
+from .sensors import LaserScan, OneScan, ViewsScan
 from .updates import UpdateRequest
-from .views import OneScan, ViewsScan
 
 # Options of a search that have the same names and values in a request.
 _AS_SENT = [one.name for one in fields(AssociationOptions) if one.name not in ("oriented", "include")]

@@ -9,11 +9,9 @@ from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
 from .limits import require_within
-from .parts import AnyMap, AnyPrior, InlineMap, SearchOptions
-from .sensors import Laser, MeasuredFields, RaySigma, Twist, require_at_the_sensor, require_times
-from .several import MapWeights, SeveralMaps, require_one_kind
+from .parts import AnyMap, AnyPrior, InlineMap, MapWeights, SearchOptions, SeveralMaps, require_one_kind
+from .sensors import AnyScan, Laser, MeasuredFields, RaySigma, Twist, require_at_the_sensor, require_times
 from .strict import DeadlineMs, Point, Pose, Referenced, Sigma, Strict
-from .views import AnyScan
 
 
 class KnownMap(InlineMap):

@@ -19,21 +19,15 @@ from registration import RegistrationResult
 from vectorization import Vectorization
 
 from ..checking import CheckedMap
-from . import analysis, checks, replies, updates
+from . import analysis, checks, found, replies, updates
 from .parts import MapDocument
-from .reply_parts import (
-    AlternativeAnswer,
-    CorrespondenceAnswer,
-    CriticalWallAnswer,
-    MapVerdictAnswer,
-    WarningAnswer,
-)
+from .reply_parts import WarningAnswer
 from .strict import SEAL, Answer
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
 
-    from ..explaining import Explanation
+    from ..driving import Explanation
 
 Json = dict[str, Any]
 Indices = NDArray[np.intp]
@@ -150,17 +144,17 @@ def association_json(
     given["unmatched_scan"] = included.listed(result.unmatched_scan)
     given["diagnostics"] = _diagnostics_json(result.diagnostics, included)
     given["correspondences"] = [
-        answer_of(CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences
+        answer_of(found.CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences
     ]
     given["segments"] = included.segments
-    given["alternatives"] = answers_of(AlternativeAnswer, result.alternatives)
+    given["alternatives"] = answers_of(found.AlternativeAnswer, result.alternatives)
     given["missing_map"] = result.missing_map
     if result.maps:
         given["maps"] = [
-            answer_of(MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
+            answer_of(found.MapVerdictAnswer, one, revision=references[one.map_id]["revision"]) for one in result.maps
         ]
         given["map"] = None if result.map_id is None else references[result.map_id]
-    answer = answer_of(replies.FoundAnswer, result, **given)
+    answer = answer_of(found.FoundAnswer, result, **given)
     for name in {"correspondences", "alternatives", "missing_map", "segments"} - included.include:
         del answer[name]
     return answer
@@ -170,8 +164,8 @@ def _diagnostics_json(diagnostics: AssociationDiagnostics | None, included: Incl
     if diagnostics is None:
         return None
     wall = diagnostics.critical_wall
-    critical = None if wall is None else answer_of(CriticalWallAnswer, wall, scan=included.listed(wall.scan))
-    return answer_of(replies.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical)
+    critical = None if wall is None else answer_of(found.CriticalWallAnswer, wall, scan=included.listed(wall.scan))
+    return answer_of(found.AssociationDiagnosticsAnswer, diagnostics, critical_wall=critical)
 
 
 def explanation_json(found: Explanation) -> Json:

@@ -26,9 +26,8 @@ from vectorization import (
 from ..ranges import RangeScan, motion_warning, view_of
 from .errors import Fault, InvalidRequestError
 from .requests import VectorizeRequest
-from .sensors import Laser, MeasuredFields, PointFields, RangeFields, Twist
+from .sensors import Laser, MeasuredFields, OneScan, OneView, PointFields, RangeFields, Twist, ViewsScan
 from .strict import Pose
-from .views import OneScan, OneView, ViewsScan
 
 MOST_NULLS = 1.0 / 3.0  # fraction of a scan's ranges
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from inspect import cleandoc
 from itertools import chain, islice
-from typing import Annotated, Any, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 import orjson
 from pydantic import (
@@ -191,6 +191,14 @@ FrameId = Annotated[str, Field(max_length=256)]
 DeadlineMs = Annotated[float, Field(ge=0.0, le=600_000.0)]
 MapId = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Row4 = Annotated[list[float], Field(min_length=4, max_length=4)]
+Row3 = Annotated[list[float], Field(min_length=3, max_length=3)]
+Row2 = Annotated[list[float], Field(min_length=2, max_length=2)]
+Matrix = Annotated[list[Row3], Field(min_length=3, max_length=3)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Index = Annotated[int, Field(ge=0)]
+Milliseconds = Annotated[float, Field(ge=0.0)]
+Verdict = Literal["ok", "ambiguous", "degenerate", "no_match"]
 
 
 class Pose(Strict):

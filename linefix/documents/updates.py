@@ -11,9 +11,9 @@ from map_quality import ChangeCode, KeptCode
 
 from .arrays import Covariance
 from .limits import require_within
-from .reply_parts import Index, MapReference, ReferencedAnswer, Row2, Row4, Share
+from .reply_parts import MapReference, ReferencedAnswer
 from .sensors import LaserScan
-from .strict import Answer, DeadlineMs, Pose, Referenced, Strict
+from .strict import Answer, DeadlineMs, Index, Pose, Referenced, Row2, Row4, Share, Strict
 
 MOST_VISITS = 100
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from linefix.documents.checks import MapCheckAnswer
-from linefix.documents.replies import FoundAnswer
-from linefix.documents.reply_parts import Index, MapReference, Milliseconds, PoseAnswer, ReferencedAnswer, Row4
-from linefix.documents.strict import Answer
+from linefix.documents.found import FoundAnswer
+from linefix.documents.reply_parts import MapReference, PoseAnswer, ReferencedAnswer
+from linefix.documents.strict import Answer, Index, Milliseconds, Row4
 from linefix.documents.updates import NewMapAnswer
 
 from .problems import KINDS

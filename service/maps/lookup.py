@@ -10,9 +10,8 @@ from functools import partial
 from association import Deadline, IndexingEndedError, MapIndex, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
 from linefix.documents.inputs import index_of, indexed, parts_of, reference_of, require_map
-from linefix.documents.parts import InlineMap, MapDocument, StoredMap, is_oriented
+from linefix.documents.parts import MOST_MAPS, InlineMap, MapDocument, MapPrefix, NamedMap, StoredMap, is_oriented
 from linefix.documents.reading import read_stored
-from linefix.documents.several import MOST_MAPS, MapPrefix, NamedMap
 
 from ..errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from ..parsing.child import LARGE, Child

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import linefix
 from association import AssociationDiagnostics, Corrections
-from linefix.documents.replies import AssociationDiagnosticsAnswer
+from linefix.documents.found import AssociationDiagnosticsAnswer
 from linefix.documents.results import Included, association_json
 
 ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]

@@ -24,7 +24,6 @@ from association import (
     View,
     assemble,
 )
-from linefix import explaining
 from linefix.driving import (
     AGREED_ANGLE,
     AGREED_DISTANCE,
@@ -94,7 +93,7 @@ def _judged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         association, "associate_on_maps", lambda on, scan, *others: judged(scan, on_maps(on, scan, *others))
     )
-    monkeypatch.setattr(explaining, "explain_verdict", explained)
+    monkeypatch.setattr(association, "explain_verdict", explained)
 
 
 def codes(result: AssociationResult) -> list[str]:

@@ -18,7 +18,7 @@ import linefix
 import map_quality
 import registration
 import vectorization
-from linefix import checking, explaining, locating, ranges, updating
+from linefix import checking, locating, ranges, updating
 
 ROOT = Path(linefix.__file__).parent.parent
 
@@ -68,9 +68,7 @@ def test_assigning_to_a_correspondence_of_an_answer_fails() -> None:
         answer.correspondences[0].map = 99  # type: ignore[misc]
 
 
-@pytest.mark.parametrize(
-    "module", [linefix, checking, explaining, locating, ranges, updating], ids=lambda module: module.__name__
-)
+@pytest.mark.parametrize("module", [linefix, checking, locating, ranges, updating], ids=lambda module: module.__name__)
 def test_examples_give_what_they_show(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]
     assert (failed, tried > 0) == (0, True)

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Response
 
 from linefix.documents import examples
 from linefix.documents.encoding import encode_list
-from linefix.documents.replies import AssociateAnswer, RegisterAnswer, VectorizeAnswer
+from linefix.documents.found import AssociateAnswer
+from linefix.documents.replies import RegisterAnswer, VectorizeAnswer
 from linefix.documents.requests import AssociateRequest, RegisterRequest, VectorizeRequest
 from linefix.operations import registered, vectorized
 

@@ -11,8 +11,7 @@ import pytest
 from association import Deadline, InvalidMapError, MapIndex
 from linefix.documents import examples
 from linefix.documents.errors import TooManyError
-from linefix.documents.parts import MapDocument, StoredMap
-from linefix.documents.several import MapPrefix, NamedMap
+from linefix.documents.parts import MapDocument, MapPrefix, NamedMap, StoredMap
 from service.errors import BusyStoreError, IndexNotReadyError
 from service.maps import MapOutline
 from service.maps.lookup import OVERHEAD, outline_of
