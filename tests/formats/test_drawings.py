@@ -127,6 +127,7 @@ def test_centre_lines_become_two_faces_apart_by_the_thickness(tmp_path: Path) ->
     # Free space on the left of each: the upper face runs along +x, the lower one back, and both ends are closed.
     assert rows(imported) == [[0, 0.1, 4, 0.1], [4, -0.1, 0, -0.1], [0, -0.1, 0, 0.1], [4, 0.1, 4, -0.1]]
     assert imported.map.oriented
+    assert assumed(imported) == ["thickness_given"]
 
 
 def test_directions_are_found_from_a_place_inside(tmp_path: Path) -> None:
@@ -257,12 +258,6 @@ def test_a_map_of_our_own_stays_as_it_is(tmp_path: Path) -> None:
     assert (len(imported.map.segments), imported.map.oriented) == (len(HOUSE), False)
 
 
-def test_a_thickness_that_is_given(tmp_path: Path) -> None:
-    imported = read_map(csv(tmp_path, HOUSE), ImportOptions(thickness=0.3))
-    assert thickness(imported) == [0.3] * len(HOUSE)
-    assert assumed(imported) == ["centres", "thickness_given"]
-
-
 def test_widths_of_polylines_old_and_new(tmp_path: Path) -> None:
     document = new(units=units.CM)
     space = document.modelspace()
@@ -287,12 +282,6 @@ def test_lines_of_an_svg_as_wide_as_walls(tmp_path: Path) -> None:
     upright = [[x1, -y1, x2, -y2] for x1, y1, x2, y2 in HOUSE]
     assert thickness(imported, upright) == [0.4] * 4 + [0.3, 0.4, 0.4]  # those without a number get the median
     assert "2 lines without a width" in notes(imported)["thickness_drawn"].message
-
-
-@pytest.mark.parametrize("pen", [0.001, 3.0])
-def test_a_pen_is_no_wall(tmp_path: Path, pen: float) -> None:
-    path = svg(tmp_path, drawn_in_svg(HOUSE), f'stroke-width="{pen}"')
-    assert assumed(read_map(path, ImportOptions(units="m"))) == ["centres", "thickness_usual"]
 
 
 def test_the_thickness_that_a_geojson_has(tmp_path: Path) -> None:

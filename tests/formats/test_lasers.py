@@ -16,6 +16,7 @@ from .bags import BEGUN, SECOND, USUAL, Laser, Recording, scan_bytes
 from .reading import counts, notes
 
 FLT_MAX = float(np.finfo(np.float32).max)
+LEAST = 0.0, math.nan, -1.0, math.inf, -math.inf
 MIXED = (2.0,) * 89 + (math.inf, 0.0)  # two beams without a return, as one driver and another write them
 
 
@@ -41,18 +42,13 @@ def test_a_greatest_range_that_says_nothing_leaves_readings_and_no_free_space(tm
     assert f"range_max is {np.float32(most):g} m" in notes(log)["range_max"].message
 
 
-@pytest.mark.parametrize("least", [math.nan, -1.0, math.inf, -math.inf])
-def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, least: float) -> None:
-    (laser,), log = read(tmp_path, USUAL.but(ranges=MIXED, range_min=least))
-    np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
-    assert assumed(log) == {"range_min": 1}
-
-
-@pytest.mark.parametrize("fields", [{}, {"range_min": 0.0}, {"range_max": 1000.0}])
-def test_limits_that_are_usual_are_believed_without_a_word(tmp_path: Path, fields: dict[str, float]) -> None:
+@pytest.mark.parametrize("fields", [{}, {"range_max": 1000.0}, *({"range_min": least} for least in LEAST)])
+def test_a_least_range_that_is_none_is_taken_as_0_and_usual_limits_as_they_are(
+    tmp_path: Path, fields: dict[str, float]
+) -> None:
     (laser,), log = read(tmp_path, USUAL.but(ranges=MIXED, **fields))
     np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
-    assert assumed(log) == {}
+    assert assumed(log) == ({"range_min": 1} if fields.get("range_min") else {})
 
 
 @pytest.mark.parametrize("fields", [{"range_max": 1.0}, {"range_min": 3.0}])

@@ -91,6 +91,8 @@ def test_odometry_messages_are_odometry_though_frames_beside_them_stand(bag: Rob
     assert near(scan.pose, speed + 0.2, 0.0, 0.0)
     assert scan.pose_frame == "odom"
     assert ("odometry_stands" in notes(log)) is (speed == 0.0)
+    assert scan.laser.motion is not None
+    assert (scan.laser.motion.vx, scan.laser.motion.vy, scan.laser.motion.omega) == pytest.approx((speed, 0.0, 0.0))
 
 
 def test_a_frame_may_have_several_parents(bag: Robots) -> None:

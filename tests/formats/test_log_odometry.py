@@ -173,17 +173,6 @@ def test_a_motion_that_odometry_does_not_say_is_not_known(bag: Robots, rate: flo
     assert counts(log)["motion"] == 1
 
 
-def test_a_robot_that_stands_has_a_motion_of_zero(bag: Robots) -> None:
-    bag.fixed("base_link", "laser")
-    for k in range(4):
-        bag.says(k * SECOND, 0.0)
-    bag.scan(SECOND)
-    (scan,), _ = read(bag)
-    motion = scan.laser.motion
-    assert motion is not None
-    assert (motion.vx, motion.vy, motion.omega) == (0.0, 0.0, 0.0)
-
-
 @pytest.mark.parametrize(("scan_time", "expected"), [(0.1, 0.025), (0.0, 0.05), (math.nan, 0.05), (30.0, 0.05)])
 def test_a_time_increment_in_another_unit_is_replaced(bag: Robots, scan_time: float, expected: float) -> None:
     bag.scan(1, laser=FOUR_BEAMS.but(ranges=(1.0,) * 4, time_increment=100.0, scan_time=scan_time))

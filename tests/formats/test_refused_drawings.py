@@ -102,7 +102,7 @@ def test_a_byte_order_mark(tmp_path: Path, name: str, content: bytes) -> None:
     assert rows(read_map(written(tmp_path, name, b"\xef\xbb\xbf" + content), OPTIONS)) == [[0, 0, 4, 0]]
 
 
-@pytest.mark.parametrize("width", [True, -1, 1e300, "wide", {}])
+@pytest.mark.parametrize("width", [True, -1, 0.001, 3.0, 1e300, "wide", {}])
 def test_widths_that_are_no_lengths_are_none(tmp_path: Path, width: object) -> None:
     path = geojson(tmp_path, feature([[0, 0], [4, 0]], width=width))
     assert "thickness_usual" in notes(read_map(path, ImportOptions(local_metres=True, drawn="centres")))
