@@ -193,15 +193,6 @@ def test_order_does_not_matter(estimator: Estimator, seed: int) -> None:
     np.testing.assert_allclose(a.offsets[order], b.offsets, atol=1e-12)
 
 
-def test_a_pair_of_weight_0_has_a_residual_and_no_say() -> None:
-    map_segments, scan = room()
-    pairs = [*diagonal(6).tolist(), [0, 2]]
-    result = register(map_segments, scan, pairs, 0.0, RegistrationOptions(weights=[1e4] * 6 + [0.0]))
-    np.testing.assert_allclose(difference(pose_of(result), POSE), 0.0, atol=1e-12)
-    assert abs(result.offsets[6]) == pytest.approx(6.0)
-    assert (result.diagnostics.pairs, result.diagnostics.dof) == (6, 9)
-
-
 def test_weights_replace_the_information() -> None:
     map_segments, scan = noisy_pairs(np.random.default_rng(5), 6)
     plain = register(map_segments, scan, diagonal(6))

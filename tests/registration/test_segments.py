@@ -28,20 +28,7 @@ from .scenes import assert_close, correspondences, diagonal, noisy_pairs
 POSES = st.builds(RigidTransform, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
 
 
-def test_a_segment_in_closed_form() -> None:
-    s = Segments.from_array([[1, 2, 1, 5]])
-    np.testing.assert_array_equal(s.directions, [[0, 1]])
-    np.testing.assert_array_equal(s.normals, [[-1, 0]])
-    np.testing.assert_array_equal(s.offsets, [-1])
-    np.testing.assert_array_equal(s.lengths, [3])
-    np.testing.assert_array_equal(s.midpoints, [[1, 3.5]])
-    np.testing.assert_array_equal(s.reversed().offsets, [1])
-    np.testing.assert_array_equal(s.shifted([2, 0]).offsets, [-3])
-    assert len(s) == 1
-    assert len(Segments.from_array([])) == 0
-
-
-def test_segments_in_any_direction() -> None:
+def test_segments_in_closed_form() -> None:
     ends = np.random.default_rng(0).uniform(-9.0, 9.0, (40, 4))
     s, begins, along = Segments.from_array(ends), ends[:, :2], ends[:, 2:] - ends[:, :2]
     np.testing.assert_allclose(s.directions * s.lengths[:, None], along, atol=1e-14)
@@ -49,6 +36,10 @@ def test_segments_in_any_direction() -> None:
     np.testing.assert_array_equal(s.normals, s.directions @ [[0.0, 1.0], [-1.0, 0.0]])
     np.testing.assert_allclose(s.offsets, np.sum(s.normals * begins, axis=1), atol=1e-13)
     np.testing.assert_allclose(s.midpoints, begins + 0.5 * along, atol=1e-15)
+    np.testing.assert_allclose(s.reversed().offsets, -s.offsets, atol=1e-14)
+    np.testing.assert_allclose(s.shifted([2.0, 0.0]).offsets, s.offsets + 2.0 * s.normals[:, 0], atol=1e-14)
+    assert len(s) == 40
+    assert len(Segments.from_array([])) == 0
 
 
 def test_mirrored_segments_are_those_of_the_mirrored_ends() -> None:
@@ -82,7 +73,8 @@ def test_what_a_caller_does_not_know_is_filled_in() -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(np.array([[0, 0, 6, 0], [0, 0, 0, 0.03]])))
     np.testing.assert_allclose(measured.sigma, [0.02, 0.02])
     np.testing.assert_allclose(measured.point_counts, [120, 0.6])
-    assert not measured.counted
+    counted = MeasuredSegments.from_segments(measured.segments, point_counts=[9.0, 1.0])
+    assert (measured.counted, counted.counted, counted.point_counts.tolist()) == (False, True, [9.0, 1.0])
     np.testing.assert_allclose(measured.spreads, [3.0, 0.03**2 / 12])
     np.testing.assert_allclose(measured.centroids, np.array([[3, 0], [0, 0.015]]))
 
@@ -91,13 +83,6 @@ def test_of_nothing_lists_of_any_form_are_taken() -> None:
     """NumPy gives an empty list one dimension."""
     measured = MeasuredSegments.from_segments(Segments.from_array([]), moments=([], []))
     assert (measured.centroids.shape, measured.spreads.shape) == ((0, 2), (0,))
-
-
-def test_points_that_were_counted_are_told_from_those_that_were_not() -> None:
-    segments = Segments.from_array([[0, 0, 0, 0.03]])
-    counted = MeasuredSegments.from_segments(segments, point_counts=[1.0])
-    assert counted.counted
-    assert counted.point_counts.tolist() == [1.0]
 
 
 @pytest.mark.parametrize(

@@ -16,15 +16,11 @@ from registration.options import Rotation
 
 from . import reference
 from .scenes import (
-    POSE,
     assert_close,
     correspondences,
     directed,
     drawn,
-    fitted,
     noisy_pairs,
-    random_segments,
-    scanned_points,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -135,22 +131,6 @@ def test_parallel_lines_have_the_shortest_translation() -> None:
     np.testing.assert_allclose([theta, *at], [0.0, *(2.0 * wall.normals[0])], atol=1e-12)
 
 
-def test_the_cost_is_that_of_all_points_behind_the_segments() -> None:
-    rng = np.random.default_rng(4)
-    map_segments = random_segments(rng, 8)
-    points = scanned_points(rng, map_segments, POSE, 0.01, 30)
-    pairs = correspondences(map_segments, fitted(points, 0.01))
-    sums = JointSums.of_set(pairs, np.full(8, 30 / 0.01**2))
-
-    moved = POSE.apply(points)
-    distances = np.einsum("nj,npj->np", map_segments.normals, moved) - map_segments.offsets[:, None]
-    # The scatter of the points about their own segments does not depend on the pose.
-    own = np.einsum("nj,npj->np", np.stack([-pairs.directions[:, 1], pairs.directions[:, 0]], axis=1), points)
-    scatter = np.sum((own - own.mean(axis=1, keepdims=True)) ** 2)
-    expected = (np.sum(distances**2) - scatter) / 0.01**2
-    assert sums.cost(POSE.theta, (POSE.x, POSE.y)) == pytest.approx(expected, rel=1e-3)
-
-
 # --- The paper's estimator --------------------------------------------------------------------------------------------
 
 
@@ -227,31 +207,6 @@ def test_mean_angles_in_closed_form(
     for off in np.radians([0.0, -40.0, 30.0, 50.0]):
         sums = OneStepSums.of_set(pairs, weights, RigidTransform(0.0, 0.0, about + off))
         assert math.degrees(sums.solve(rotation)[0].theta) == pytest.approx(expected, abs=1e-9)
-
-
-@given(SEEDS)
-@settings(max_examples=20, deadline=None)
-def test_ambiguity_at_any_transform_is_that_of_the_definition(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    map_segments, scan = noisy_pairs(rng, 6, 0.1)
-    weights = rng.uniform(0.2, 3.0, 6)
-    pairs = correspondences(map_segments, scan)
-    sums = OneStepSums.of_set(pairs, weights, RigidTransform(1.0, -2.0, 0.5))
-    rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
-    lines = [reference.transformation_line(*row) for row in rows]
-    optimum: dict[Rotation, RigidTransform] = {rotation: sums.solve(rotation)[0] for rotation in ("wahba", "mitsuta")}
-    for at in (RigidTransform(0.0, 0.0, 0.0), POSE, RigidTransform(-7.0, 3.0, 0.9), *optimum.values()):
-        expected = reference.translation_ambiguity(np.array([at.x, at.y]), lines, weights)
-        assert sums.translation_cost(at) == pytest.approx(expected, rel=1e-9)
-        squares = sum(w * (alpha - at.theta) ** 2 for (*_, alpha), w in zip(lines, weights, strict=True))
-        assert sums.rotation_cost(at, "mitsuta") == pytest.approx(squares, rel=1e-9)
-        error = reference.wahba_error(at.theta, pairs.map_directions, pairs.directions, weights)
-        assert sums.rotation_cost(at, "wahba") == pytest.approx(error, rel=1e-9)
-    for rotation, pose in optimum.items():
-        for step in (-1e-3, 1e-3):
-            aside = RigidTransform(pose.x + step, pose.y - step, pose.theta + step)
-            assert sums.translation_cost(aside) > sums.translation_cost(pose)
-            assert sums.rotation_cost(aside, rotation) > sums.rotation_cost(pose, rotation)
 
 
 @pytest.mark.parametrize(

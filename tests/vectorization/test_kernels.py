@@ -160,15 +160,6 @@ def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed
     assert line["chi2"] == pytest.approx(residuals @ residuals, rel=1e-4)
 
 
-def test_a_point_off_the_line_does_not_pull_it() -> None:
-    ranges, rays = noisy_wall(1, sigma=0.0)
-    whole = fitted(records(ranges[:, None] * rays, rays), scanner_of())
-    ranges[20] += 0.5
-    line = fitted(records(ranges[:, None] * rays, rays), scanner_of())
-    assert line["count"] == len(ranges) - 1
-    np.testing.assert_allclose([line[k] for k in ("nx", "ny", "p")], [whole[k] for k in ("nx", "ny", "p")], atol=1e-9)
-
-
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
 def test_the_noise_estimates_are_the_twins(seed: int) -> None:
