@@ -54,9 +54,7 @@ def test_binary_files_that_are_cut_off(tmp_path: Path, kept: int) -> None:
 
 @pytest.mark.parametrize("size", [1e10, 1e15, 1e300])
 @pytest.mark.parametrize("kind", ["CIRCLE", "SPLINE", "block"])
-def test_a_curve_that_cannot_be_drawn_is_refused_before_it_is_cut_into_pieces(
-    tmp_path: Path, kind: str, size: float
-) -> None:
+def test_a_curve_too_large_to_be_drawn_is_refused(tmp_path: Path, kind: str, size: float) -> None:
     document = drawn()
     block = document.blocks.new("WING")
     block.add_circle((0, 0), 1.0)

@@ -43,9 +43,7 @@ def test_a_greatest_range_that_says_nothing_leaves_readings_and_no_free_space(tm
 
 
 @pytest.mark.parametrize("fields", [{}, {"range_max": 1000.0}, *({"range_min": least} for least in LEAST)])
-def test_a_least_range_that_is_none_is_taken_as_0_and_usual_limits_as_they_are(
-    tmp_path: Path, fields: dict[str, float]
-) -> None:
+def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, fields: dict[str, float]) -> None:
     (laser,), log = read(tmp_path, USUAL.but(ranges=MIXED, **fields))
     np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
     assert assumed(log) == ({"range_min": 1} if fields.get("range_min") else {})
@@ -150,9 +148,7 @@ def test_stamps_that_nobody_set_are_those_of_the_recorder(tmp_path: Path) -> Non
         ((5, 5, 4), {"stamp_repeated": 1, "stamp_back": 1}),
     ],
 )
-def test_stamps_that_repeat_or_jump_back_are_kept_and_noted(
-    tmp_path: Path, stamps: Sequence[int], told: dict[str, int]
-) -> None:
+def test_stamps_that_repeat_or_jump_back_are_noted(tmp_path: Path, stamps: Sequence[int], told: dict[str, int]) -> None:
     wanted = [second * SECOND for second in stamps]
     assert stamped(tmp_path, wanted) == (wanted, told)
 

@@ -99,9 +99,7 @@ def grey(up: Pixels) -> Pixels:
 
 
 @pytest.mark.parametrize(("drawn", "more"), [(percent, "mode: raw\n"), (grey, "")])
-def test_other_ways_to_draw_it_give_the_same_walls(
-    tmp_path: Path, drawn: Callable[[Pixels], Pixels], more: str
-) -> None:
+def test_other_ways_to_draw_it_give_these_walls(tmp_path: Path, drawn: Callable[[Pixels], Pixels], more: str) -> None:
     imported = read_map(write(tmp_path, drawn(l_room()), YAML + more, name="map.png"))
     assert walls(imported) == L_ROOM
     assert ("thresholds" in notes(imported)) == (drawn is grey)

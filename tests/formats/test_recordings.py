@@ -91,7 +91,7 @@ def test_a_scan_in_another_encoding_is_named(recording: Recording) -> None:
     [{"use_statistics": False}, {"use_summary_offsets": False}, {"repeat_channels": False}, {"repeat_schemas": False}],
 )
 @pytest.mark.parametrize("compression", list(CompressionType))
-def test_an_mcap_without_a_part_of_its_summary(
+def test_an_mcap_without_a_part_of_summary(
     tmp_path: Path, options: dict[str, Any], compression: CompressionType
 ) -> None:
     recording = Recording(tmp_path / "a.mcap", compression=compression, **options)
@@ -110,7 +110,7 @@ def test_chunks_that_overlap_are_read_by_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize("chunk", [0, 1000])
 @pytest.mark.parametrize("compression", list(CompressionType))
 @pytest.mark.parametrize("fraction", [0.3, 0.55, 0.8])
-def test_a_cut_mcap_is_read_up_to_the_cut(
+def test_a_cut_mcap_is_read_to_the_cut(
     tmp_path: Path, chunk: int, compression: CompressionType, fraction: float
 ) -> None:
     recording = Recording(tmp_path / "a.mcap", chunk=chunk, compression=compression)
@@ -198,9 +198,7 @@ def codes(log: Log) -> set[str]:
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
 @pytest.mark.parametrize("content", [None, b"", b"rosbag2_bagfile", b"\xff\xfe", b"rosbag2_bagfile_information: {}\n"])
-def test_a_folder_without_a_description_or_with_a_broken_one(
-    tmp_path: Path, plugin: StoragePlugin, content: bytes | None
-) -> None:
+def test_a_folder_without_a_whole_description(tmp_path: Path, plugin: StoragePlugin, content: bytes | None) -> None:
     path = folder(tmp_path, 12, plugin)
     metadata = path / "metadata.yaml"
     metadata.unlink()

@@ -245,9 +245,7 @@ def test_lines_of_a_block_are_dashed_as_its_reference(tmp_path: Path) -> None:
     ("kind", "key", "told"),
     [("dxf", "linetype", ("linetype=DASHED2", "linetype=HIDDEN")), ("svg", "stroke-dasharray", ("=4 2", "=3"))],
 )
-def test_dashed_lines_are_left_out_and_can_be_chosen(
-    tmp_path: Path, kind: str, key: str, told: tuple[str, ...]
-) -> None:
+def test_dashed_lines_are_left_out_unless_chosen(tmp_path: Path, kind: str, key: str, told: tuple[str, ...]) -> None:
     path = dashed(tmp_path, kind)
     found = read_map(path, ImportOptions(units="m"))
     assert len(found.map.segments) == 1

@@ -76,9 +76,7 @@ def thresholds(free: float = 0.196, occupied: float = 0.65, *, negate: int = 0) 
 
 @pytest.mark.parametrize("free_thresh", [0.1, 0.196, 0.1961, 0.2, 0.25, 0.5])
 @pytest.mark.parametrize("unknown", [205, 200, 128, 127])
-def test_unknown_cells_are_those_of_the_value_that_tools_write(
-    tmp_path: Path, unknown: int, free_thresh: float
-) -> None:
+def test_unknown_cells_have_the_value_that_tools_write(tmp_path: Path, unknown: int, free_thresh: float) -> None:
     found = imported(tmp_path, Image.fromarray(shades(FREE, unknown, WALL)), said=thresholds(free_thresh))
     assert is_the_hall(found)
     freed = (255 - unknown) / 255 < free_thresh
@@ -192,9 +190,7 @@ def test_gradients_follow_the_thresholds(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("greys", "kind"), [((205, 205, 0), "free"), ((255, 255, 205), "occupied"), ((255, 255, 128), "occupied")]
 )
-def test_a_usual_value_that_is_the_lightest_or_the_darkest(
-    tmp_path: Path, greys: tuple[int, int, int], kind: str
-) -> None:
+def test_a_usual_value_that_is_lightest_or_darkest(tmp_path: Path, greys: tuple[int, int, int], kind: str) -> None:
     found = imported(tmp_path, Image.fromarray(shades(*greys)))
     assert walls(found) >= THREE_WALLS
     assert f"are the only ones that are {kind}" in notes(found)["unknown_grey"].message
