@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,11 +85,6 @@ def joint_information(theta: float, *pairs: Floats) -> Floats:
     """Information of (x, y, theta) at an angle, by complex steps."""
     columns = [joint_residuals(np.array([0.0, 0.0, theta]) + 1e-200j * e, *pairs).imag / 1e-200 for e in np.eye(3)]
     return np.array(columns) @ np.array(columns).T
-
-
-def exact_sums(terms: Floats) -> Floats:
-    """Add rows of doubles without any rounding but the last."""
-    return np.array([float(sum(map(Fraction, map(float, column)))) for column in np.asarray(terms).T])
 
 
 # The paper's estimator -----------------------------------------------------------------------------------------------
