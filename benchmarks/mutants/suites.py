@@ -32,10 +32,8 @@ SUITES = {
     ),
     "registration/": Suite(("tests/registration",)),
     "vectorization/": Suite(("tests/vectorization",)),
-    "association/index/kernels/": Suite(
-        ("tests/association/kernels/test_walls.py", "tests/association/test_map_index.py")
-    ),
-    "association/scan/kernels/joining.py": Suite(("tests/association/kernels/test_joining.py",)),
+    "association/index/kernels/": Suite(("tests/association/test_map_index.py",)),
+    "association/scan/kernels/joining.py": Suite(("tests/association/kernels",)),
     "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),

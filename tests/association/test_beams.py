@@ -69,14 +69,6 @@ def test_beams_show_what_no_segment_does() -> None:
     best_of_two_rooms(walls, scan_of(ends, viewpoint=(0.0, 0.0), beams=ranges(ROOM, at, sigma=1e-4).beams), at)
 
 
-def test_a_wall_that_was_seen_is_not_missing() -> None:
-    """Rays to the wall that is met edge-on graze the end of its neighbour."""
-    walls = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
-    scan = [[-2, 1, -2, -5], [-2, -5, 0, -5], [0, -5, 0, -3], [0, -3, 3, -3], [3, -3, 3, 1]]
-    result = answer_of(index_of(walls), scan_of(scan, viewpoint=(0.0, 0.0)))
-    assert not set(result.missing_map) & {c.map for c in result.correspondences}
-
-
 def test_beams_show_where_along_a_corridor() -> None:
     """The segments are those of the two long walls; single beams meet the one end that is closed."""
     walls, at = np.vstack([CORRIDOR, [[0.0, 2.0, 0.0, 0.0]]]), pose(7.0, 0.8, 0.1)

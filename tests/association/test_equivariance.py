@@ -11,7 +11,7 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from association import AssociationResult, HardPrior, Prior, Scan, SoftPrior, Status, View, assemble
+from association import AssociationResult, HardPrior, Prior, Scan, SoftPrior, View, assemble
 from registration import MeasuredSegments, RigidTransform, Segments
 
 from .scenes import (
@@ -306,25 +306,6 @@ def test_a_reversed_segment_is_another_side_where_directions_mean_something() ->
     both = np.vstack([corner, corner[:, [2, 3, 0, 1]]])
     one, other = (answer_of(index, scan_of(ends)) for ends in (corner, both))
     assert known(other.diagnostics).score > known(one.diagnostics).score + 5.0
-
-
-def test_pieces_do_not_distinguish_similar_rooms() -> None:
-    """Of two such rooms the true one is drawn 5 cm wrong; the map is known to be off by 3 cm."""
-    wrong = LOBBY.copy()
-    wrong[1, [0, 2]] += 0.05
-    wrong[2, 0] += 0.05
-    wrong[0, 2] += 0.05
-    index = index_of(np.vstack([wrong, LOBBY + np.tile([20.0, 0.0], 2)]), 0.03)
-    ends = seen(LOBBY, pose(3.0, 1.5, 0.4), cut=0.3, seed=1)[0]
-    marks = np.linspace(0.0, 1.0, 9)
-    eight = [
-        [*(a + s * (b - a)), *(a + t * (b - a))]
-        for a, b in ends.reshape(-1, 2, 2)
-        for s, t in itertools.pairwise(marks)
-    ]
-    one, other = (answer_of(index, scan_of(sent)) for sent in (ends, eight))
-    assert one.status is Status.AMBIGUOUS
-    assert_hardly_moved(one, other)
 
 
 def test_a_prior_moves_with_the_map() -> None:

@@ -1,4 +1,4 @@
-"""Pose and covariance over many scans: of exact maps, of maps and ranges with errors, of a sensor that rotates."""
+"""Small cases whose answer can be worked out by hand; pose and covariance over many scans."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationResult
-from registration import RigidTransform
+from association import AssociationResult, HardPrior, Status
+from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register, wrap_angle
 
 from .scenes import (
+    INSIDE,
+    ROOM,
     Floats,
     Turning,
     answer_of,
+    carried,
     drawn_room,
+    equal_rooms,
     index_of,
     is_wrong,
     known,
     maze,
     pose,
     ranges,
+    ring,
     same_pose,
     scan_of,
     seen,
@@ -30,6 +35,170 @@ from .scenes import (
     warning_codes,
     without_beams,
 )
+
+# Four walls of different lengths; a scan that sees a part of each, from a place that the other ways round do not fit.
+FOUR = ring([(0, 0), (7, 0), (6, 4), (0, 5)])
+PARTS = ((0.1, 0.8), (0.2, 0.9), (0.0, 0.7), (0.3, 1.0))
+AT = pose(2.5, 1.8, 0.9)
+SIGMA = 0.01  # m, of points
+COUNTS = np.array([60.0, 40.0, 50.0, 45.0])
+
+
+def parts_of_four() -> Floats:
+    """Return the parts of the four walls, in the map frame."""
+    begin, along = FOUR[:, :2], FOUR[:, 2:] - FOUR[:, :2]
+    low, high = np.array(PARTS).T
+    return np.hstack([begin + low[:, None] * along, begin + high[:, None] * along])
+
+
+def seen_of_four(offsets: Floats | None = None) -> Floats:
+    """Return the parts in the scan frame, each moved along its left normal by its offset."""
+    ends = parts_of_four()
+    if offsets is not None:
+        along = ends[:, 2:] - ends[:, :2]
+        normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+        ends = ends + np.tile(normals * offsets[:, None], 2)
+    return carried(ends, AT.inverse())
+
+
+def answer_of_four(ends: Floats, map_sigma: float | None = 0.0) -> AssociationResult:
+    measured = MeasuredSegments.from_segments(Segments.from_array(ends), SIGMA, COUNTS)
+    scan = scan_of(ends)
+    return answer_of(index_of(FOUR, map_sigma), type(scan)(measured, (0.0, 0.0)), HardPrior(AT, 2.0, 0.5))
+
+
+def test_a_room_of_four_walls_and_a_scan_from_a_known_pose() -> None:
+    for sigma in (0.0, 0.02, None):
+        result = answer_of_four(seen_of_four(), sigma)
+        assert (result.status, result.usable) == (Status.OK, True)
+        assert same_pose(result.pose, AT, 1e-9, 1e-9)
+        assert [(pair.scan, pair.map) for pair in result.correspondences] == [(k, k) for k in range(4)]
+        assert result.unmatched_scan == ()
+        assert result.missing_map == ()
+        for pair in result.correspondences:
+            assert (pair.offset, pair.angle) == pytest.approx((0.0, 0.0), abs=1e-9)
+            assert pair.overlap == pytest.approx(1.0, abs=1e-9)
+            assert pair.alternatives == ()
+        assert known(result.diagnostics).inlier_fraction == pytest.approx(1.0)
+        assert known(result.diagnostics).pairs == 4
+        assert known(result.diagnostics).dof == 5
+        assert known(result.diagnostics).chi2 == pytest.approx(0.0, abs=1e-9)
+
+
+def test_residuals_are_those_of_the_formulas() -> None:
+    """Of the contract: ``n_map . (R m_scan + t) - p_map`` and ``wrap(angle(d_map) - angle(d_scan) - theta)``."""
+    ends = seen_of_four(np.array([0.01, -0.004, 0.006, -0.012]))
+    result = answer_of_four(ends, 0.02)
+    at = known(result.pose)
+    for pair in result.correspondences:
+        begin, end = FOUR[pair.map].reshape(2, 2)
+        d = (end - begin) / np.hypot(*(end - begin))
+        n = np.array([-d[1], d[0]])
+        middle = np.asarray(at.apply(ends[pair.scan].reshape(2, 2))).mean(axis=0)
+        assert pair.offset == pytest.approx(float(n @ middle - n @ begin), abs=1e-9)
+        seen_along = ends[pair.scan, 2:] - ends[pair.scan, :2]
+        turn = math.atan2(d[1], d[0]) - math.atan2(seen_along[1], seen_along[0]) - at.theta
+        assert pair.angle == pytest.approx(wrap_angle(turn), abs=1e-9)
+        assert pair.weight == pytest.approx(1.0 / (SIGMA**2 / COUNTS[pair.scan] + 0.02**2), rel=1e-6)
+
+
+def overlap_at(wall: Floats, segment: Floats, at: RigidTransform) -> float:
+    """Return the fraction of a scan segment's length that lies along a wall's."""
+    d = (wall[2:] - wall[:2]) / np.hypot(*(wall[2:] - wall[:2]))
+    along = (np.asarray(at.apply(segment.reshape(2, 2))) - wall[:2]) @ d
+    shared = min(along.max(), float((wall[2:] - wall[:2]) @ d)) - max(along.min(), 0.0)
+    return float(max(0.0, shared) / np.ptp(along))
+
+
+@pytest.mark.parametrize("estimator", ["joint", "one_step"])
+def test_overlaps_are_those_at_the_pose_that_is_returned(estimator: str) -> None:
+    compared = 0
+    for seed in range(4):
+        ends = seen(ROOM, INSIDE, noise=0.04, cut=0.1, seed=seed)[0]
+        result = answer_of(index_of(ROOM), scan_of(ends, 0.04), min_overlap=0.2, estimator=estimator)
+        for pair in result.correspondences:
+            assert pair.overlap == pytest.approx(
+                overlap_at(ROOM[pair.map], ends[pair.scan], known(result.pose)), abs=1e-9
+            )
+            compared += 1
+    assert compared >= 24
+
+
+def test_a_segment_across_a_doorway_is_reported_on_both_walls() -> None:
+    """The pair is the piece that it lies on most; the overlap is that with both."""
+    index = index_of([[0, 0, 3, 0], [4, 0, 9, 0], [9, 0, 9, 6], [9, 6, 0, 6], [0, 6, 0, 0]])
+    scan = scan_of([[1, 0, 8, 0], [9, 1, 9, 5], [8, 6, 2, 6], [0, 5, 0, 1]])
+    result = answer_of(index, scan, HardPrior(pose(), 1.0, 0.3))
+    across = next(pair for pair in result.correspondences if pair.scan == 0)
+    assert (across.map, across.alternatives) == (1, (0,))
+    assert across.overlap == pytest.approx(6.0 / 7.0, abs=1e-6)
+
+
+HALL = np.array([[8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 3, 7], [3, 7, 0, 7], [0, 7, 0, 0]], dtype=float)
+
+
+def with_a_step(step: float) -> Floats:
+    """Return the walls of a hall, the lower one with a step of so many metres."""
+    return np.vstack([[[0.0, 0.0, 4.5, 0.0], [4.5, step, 8.0, step]], HALL])
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.001, 0.003])
+@pytest.mark.parametrize("step", [0.012, 0.02, 0.028])
+def test_a_map_that_is_stated_to_be_exact_keeps_its_steps(step: float, sigma: float) -> None:
+    """A scan of one side of a step in a wall is where that side is."""
+    walls = with_a_step(step)
+    ends = np.array([[5.0, step, 7.8, step], [8.0, 0.5, 8.0, 4.5], [7.5, 5.0, 3.4, 5.0], [3.0, 5.2, 3.0, 6.8]])
+    at = pose(5.0, 2.0, 0.3)
+    found = known(answer_of(index_of(walls, sigma), scan_of(carried(ends, at.inverse()), 0.005)).pose)
+    assert (found.x, found.y, found.theta) == pytest.approx((at.x, at.y, at.theta), abs=3e-4 + sigma)
+
+
+@pytest.mark.parametrize("low", [0.0, 0.01, 0.029, 0.05])
+def test_a_millimetre_more_of_a_step_changes_the_probability_little(low: float) -> None:
+    ends = seen(np.vstack([[[0.4, 0.0, 7.6, 0.0]], HALL[:4]]), pose(4.0, 2.5, 0.4), noise=0.005, cut=0.1, seed=3)[0]
+    one, other = (answer_of(index_of(with_a_step(step)), scan_of(ends, 0.01, (0.0, 0.0))) for step in (low, low + 1e-3))
+    assert other.probability == pytest.approx(one.probability, abs=0.1)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.001, 0.02])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_pairs_of_a_plain_answer_register_to_it(seed: int, sigma: float) -> None:
+    """With the sigma of the map, each pair alone on its wall; of exact maps with covariance and chi-square.
+
+    So the pose is the least-squares estimate, and the covariance that of its errors, as the tests of `register` show.
+    """
+    ends = seen(ROOM, INSIDE, noise=0.01, cut=0.4, seed=seed)[0]
+    scan = scan_of(ends, 0.01)
+    result = answer_of(index_of(ROOM, sigma), scan)
+    pairs = [[one.scan, one.map] for one in result.correspondences]
+    again = register(Segments.from_array(ROOM), scan.measured, pairs, sigma, RegistrationOptions())
+    assert known(result.diagnostics).corrections is None
+    assert same_pose(again.pose, result.pose, 1e-6, 1e-6)
+    assert again.diagnostics.dof == known(result.diagnostics).dof
+    ratios = np.linalg.eigvals(np.linalg.solve(known(again.covariance), known(result.covariance))).real
+    assert ratios.min() >= 0.98, "in no direction less than walls with errors of their own leave"
+    if sigma > 0.0:
+        return
+    np.testing.assert_allclose(known(again.covariance), known(result.covariance), rtol=1e-6, atol=1e-12)
+    assert again.diagnostics.chi2 == pytest.approx(known(result.diagnostics).chi2, rel=1e-6)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.03, None])
+def test_an_equal_room_has_the_same_numbers(sigma: float | None) -> None:
+    """Ambiguity, reliability, score and covariance."""
+    ends = seen(ROOM, INSIDE, noise=0.02, cut=0.4, clutter=2, seed=1)[0]
+    result = answer_of(index_of(equal_rooms(2), sigma), scan_of(ends))
+    (other,), diagnostics = result.alternatives, result.diagnostics
+    assert diagnostics is not None
+    assert (other.score, other.inlier_fraction) == pytest.approx((diagnostics.score, diagnostics.inlier_fraction))
+    assert other.probability == pytest.approx(result.probability, rel=1e-3)
+    assert other.reliability == pytest.approx(diagnostics.reliability)
+    for name in ("rotation", "translation"):
+        expected = getattr(diagnostics.ambiguity, name)
+        assert getattr(other.ambiguity, name) == pytest.approx(expected, rel=1e-6)
+    np.testing.assert_allclose(known(other.covariance), known(result.covariance), rtol=1e-6, atol=1e-12)
+    assert diagnostics.margin == pytest.approx(0.0, abs=1e-6)
+
 
 SCANS = 50
 WITHIN_95 = 7.815  # quantile of a chi-square of three
@@ -162,19 +331,19 @@ def test_without_a_rotation_none_is_reported(how: dict[str, Any]) -> None:
 # --- Maps to another scale --------------------------------------------------------------------------------------------
 
 WALLS = maze(1)
-AT = pose(15.0, 14.0, 0.5)
+MAZE_AT = pose(15.0, 14.0, 0.5)
 
 
 def of_maze(factor: float, seed: int = 1, **options: Any) -> AssociationResult:
     """Answer a scan of the maze by a map of it that is larger by a factor."""
-    scan = scan_of(seen(WALLS, AT, noise=0.01, seed=seed, radius=12.0)[0])
+    scan = scan_of(seen(WALLS, MAZE_AT, noise=0.01, seed=seed, radius=12.0)[0])
     return answer_of(index_of(factor * WALLS), scan, **options)
 
 
 @pytest.mark.parametrize("factor", [0.98, 0.99, 1.01, 1.02])
 def test_the_pose_is_where_a_map_to_another_scale_has_it(factor: float) -> None:
     """Its covariance holds (16.3 is the quantile of 0.1 %), and the warning states the factor."""
-    there = pose(factor * AT.x, factor * AT.y, AT.theta)
+    there = pose(factor * MAZE_AT.x, factor * MAZE_AT.y, MAZE_AT.theta)
     for seed in range(4):
         found = of_maze(factor, seed)
         assert found.usable
@@ -197,7 +366,7 @@ def test_maps_to_scale_have_no_warning(factor: float) -> None:
 def test_walls_that_are_off_one_by_one_are_no_factor() -> None:
     for seed in range(8):
         walls = MapErrors(0.05).of(WALLS, np.random.default_rng(seed))
-        scan = scan_of(seen(WALLS, AT, noise=0.01, seed=seed, radius=12.0)[0])
+        scan = scan_of(seen(WALLS, MAZE_AT, noise=0.01, seed=seed, radius=12.0)[0])
         assert "map_scale" not in warning_codes(answer_of(index_of(walls), scan))
 
 
@@ -222,7 +391,7 @@ def test_no_usable_answer_hides_a_greater_factor(factor: float) -> None:
 @pytest.mark.parametrize("factor", [0.98, 1.02])
 @pytest.mark.parametrize("limit", [[3.0, 3.0, 3.0 + 1e-6, 3.0], [-5000.0, 30.0, 5000.0, 30.0]])
 def test_a_segment_at_the_limits_of_length_is_put_to_scale_like_any(factor: float, limit: list[float]) -> None:
-    ends = np.vstack([seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0], [limit]])
+    ends = np.vstack([seen(WALLS, MAZE_AT, noise=0.01, seed=1, radius=12.0)[0], [limit]])
     assert answer_of(index_of(factor * WALLS), scan_of(ends)).pose is not None
 
 

@@ -101,28 +101,28 @@ def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(number: in
 
 
 def test_equal_floors_are_ambiguous_and_both_are_listed() -> None:
-    found = associate_on_maps(MapSet({"a": part(floor(0)), "b": part(floor(0)), "c": part(floor(1))}), seen_on(0))
+    """Each in the frame of its own map."""
+    there = floor(0) + np.tile([1000.0, -2000.0], 2)
+    found = associate_on_maps(MapSet({"a": part(floor(0)), "b": part(there), "c": part(floor(1))}), seen_on(0))
     assert (found.status, found.usable) == (Status.AMBIGUOUS, False)
-    assert {one.map_id: one.status for one in found.maps}["a"] is Status.AMBIGUOUS
-    assert {one.map_id: one.status for one in found.maps}["b"] is Status.AMBIGUOUS
-    assert all(one.pose is not None and same_pose(one.pose, TRUTH) for one in found.maps[:2])
     other = ({"a", "b"} - {found.map_id}).pop()
     assert found.alternatives[0].map_id == other
+    places = {found.map_id: known(found.pose), other: found.alternatives[0].pose}
+    for one in found.maps[:2]:
+        assert one.status is Status.AMBIGUOUS
+        assert same_pose(one.pose, places[one.map_id], 0.05)
+    assert same_pose(places["a"], TRUTH, 0.05)
+    assert same_pose(places["b"], pose(TRUTH.x + 1000.0, TRUTH.y - 2000.0, TRUTH.theta), 0.05)
     (reason,) = [one for one in found.reasons if one.code == "similar_place"]
     assert f"the map {other}" in reason.message
     assert f"on the map {other}" in found.message
     assert known(found.probability) <= 0.5
 
 
-def test_a_floor_that_is_not_among_them_is_not_usable() -> None:
-    for k in range(5, 9):
-        assert not associate_on_maps(building(), seen_on(k)).usable
-
-
-def test_another_building_is_on_none_of_them() -> None:
-    for k in range(8):
-        room, at = drawn_room(np.random.default_rng([61, k]))
-        found = associate_on_maps(building(), ranges(room, at, k))
+def test_another_floor_or_building_is_on_none_of_them() -> None:
+    rooms = [drawn_room(np.random.default_rng([61, k])) for k in range(8)]
+    for scan in (*map(seen_on, range(5, 9)), *(ranges(room, at, k) for k, (room, at) in enumerate(rooms))):
+        found = associate_on_maps(building(), scan)
         assert not found.usable
         assert found.reasons
 
@@ -202,17 +202,6 @@ def test_a_prior_is_on_its_map(hard: bool) -> None:
         found = associate_on_maps(maps, seen_on(0), KnownOfMaps(prior, name))
         assert found.map_id == name
         assert same_pose(found.pose, TRUTH)
-
-
-def test_alternatives_are_in_the_frames_of_their_maps() -> None:
-    shift = np.array([1000.0, -2000.0])
-    maps = MapSet({"a": part(floor(0)), "b": part(floor(0) + np.tile(shift, 2))})
-    found = associate_on_maps(maps, seen_on(0))
-    places = {found.map_id: known(found.pose), found.alternatives[0].map_id: found.alternatives[0].pose}
-    assert same_pose(places["a"], TRUTH, 0.05)
-    assert same_pose(places["b"], pose(TRUTH.x + 1000.0, TRUTH.y - 2000.0, TRUTH.theta), 0.05)
-    for one in found.maps:
-        assert same_pose(one.pose, places[one.map_id], 0.05)
 
 
 def test_a_scan_wider_than_the_maps_is_on_none_of_them() -> None:

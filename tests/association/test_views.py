@@ -67,16 +67,6 @@ def test_an_exact_view_is_the_scan_in_the_frame_of_the_robot() -> None:
     np.testing.assert_allclose(known(found.beams.origins), known(expected.beams.origins), atol=1e-12)
 
 
-def test_a_scan_split_into_two_views_answers_as_one() -> None:
-    whole = answer_of(INDEX, scan_of(ENDS, viewpoint=(0.0, 0.0)))
-    halves = [View(scan_of(part, viewpoint=(0.0, 0.0))) for part in (ENDS[::2], ENDS[1::2])]
-    split = answer_of(INDEX, assemble(halves))
-    assert (split.status, split.usable) == (whole.status, whole.usable)
-    assert same_pose(split.pose, whole.pose, 1e-6, 1e-6)
-    assert len(split.correspondences) == len(whole.correspondences)
-    assert split.probability == pytest.approx(whole.probability, abs=0.02)
-
-
 @pytest.mark.parametrize("with_beams", [False, True])
 def test_two_sensors_see_what_one_does_not(with_beams: bool) -> None:
     """Each looks to one side; alone neither is usable, together they are. The order of the sensors does not matter."""
