@@ -73,11 +73,9 @@ def test_lines_along_the_middle_of_walls() -> None:
 
 
 def test_a_map_that_says_so_is_not_told_again() -> None:
-    assert codes(told(centre_lines(), oriented=False)) == ["centre_lines"]
-
-
-def test_a_map_with_y_pointing_down() -> None:
-    assert codes(told(reversed_ends(faces() * MIRROR))) == ["mirrored"]
+    report = told(centre_lines(), oriented=False)
+    assert codes(report) == ["centre_lines"]
+    assert report.wall_thickness == pytest.approx(THICK, abs=0.02)
 
 
 def test_a_map_the_wrong_way_round() -> None:
@@ -128,8 +126,8 @@ def test_a_single_sample_shows_a_mistake() -> None:
 
 def test_scans_that_see_nothing_show_nothing() -> None:
     index, blind = index_of(faces()), Scan(MeasuredSegments.from_segments(Segments.from_array([])))
-    samples = [try_sample(index, blind, Deadline(), oriented=True)]
-    assert codes(conclude(index, [blind], samples, Deadline(), oriented=True)) == []
+    report = conclude(index, [blind], [try_sample(index, blind, Deadline(), oriented=True)], Deadline(), oriented=True)
+    assert (report.findings, report.wall_thickness) == ((), None)
 
 
 def test_a_scan_is_usable_here_as_it_is_where_it_is_asked() -> None:
@@ -183,22 +181,14 @@ def test_a_deadline_leaves_out_what_it_has_no_time_for() -> None:
 # --- Thickness of walls -----------------------------------------------------------------------------------------------
 
 
-def found(walls: Floats, *, oriented: bool = True) -> float | None:
-    return told(walls, oriented=oriented).wall_thickness
-
-
-def test_the_thickness_of_centre_lines() -> None:
-    assert found(centre_lines(), oriented=False) == pytest.approx(THICK, abs=0.02)
-
-
 @pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
 def test_the_thickness_of_walls_too_thick_or_too_thin(drawn: float) -> None:
-    assert found(two_faces(drawn)) == pytest.approx(THICK - drawn, abs=0.02)
+    assert told(two_faces(drawn)).wall_thickness == pytest.approx(THICK - drawn, abs=0.02)
 
 
 def test_no_thickness_where_walls_are_right() -> None:
-    assert found(faces()) is None
-    assert found(two_faces(THICK)) is None
+    assert told(faces()).wall_thickness is None
+    assert told(two_faces(THICK)).wall_thickness is None
 
 
 @pytest.mark.parametrize(
@@ -207,13 +197,6 @@ def test_no_thickness_where_walls_are_right() -> None:
 def test_whether_a_map_is_mirrored_or_too_thick(walls: Floats, code: str) -> None:
     """A mirrored map fits badly whatever its walls are; one that is too thick fits badly mirrored, too."""
     assert codes(told(walls)) == [code]
-
-
-def test_no_thickness_by_scans_that_see_nothing() -> None:
-    blind = Scan(MeasuredSegments.from_segments(Segments.from_array([])))
-    index = index_of(faces())
-    sample = try_sample(index, blind, Deadline(), oriented=True)
-    assert conclude(index, [blind], [sample], Deadline(), oriented=True).wall_thickness is None
 
 
 def test_no_thickness_without_trials() -> None:

@@ -52,24 +52,6 @@ def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
     return out
 
 
-def test_flat_beams_that_end_on_the_outer_wall_read_no_wall_that_stood_in_its_corner() -> None:
-    """They end within the tolerance of its line, up to 0.35 m from the corner."""
-    wall = [[5.7, 0.0, 5.7, 3.0], [5.7, 3.0, 5.85, 3.0], [5.85, 3.0, 5.85, 0.0]]
-    hall = segments(RACK, PILLAR, wall)
-    index, chunks = MapIndex.build(hall, SIGMA), Chunks.of(hall)
-    total = np.zeros((len(chunks), 3), dtype=int)
-    for k, one in enumerate(visit(segments(RACK, PILLAR), "monday", 1)):
-        result = search(index, one, Deadline())
-        if result.usable:
-            at = Localized(k, 0, one, result, index.segments, False)
-            seen = follow(chunks, at, NO_LINES, SIGMA, Deadline(), oriented=True)
-            total[seen.chunks] += seen.counts
-    for face in (20, 22):
-        through, ended, _ = total[chunks.of_wall(face)].sum(axis=0)
-        assert through > 100
-        assert ended <= 2
-
-
 def test_beams_are_counted_as_one_by_one() -> None:
     chunks = Chunks.of(segments(PILLAR, RACK))
     for one in localized():
