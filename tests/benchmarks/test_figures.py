@@ -80,9 +80,7 @@ def test_every_run_names_its_origin() -> None:
         ("1", "ms", "nothing", "not measured"),
     ],
 )
-def test_a_figure_is_compared_with_the_digits_that_the_document_has(
-    shown: str, unit: str, measured: str, right: str
-) -> None:
+def test_a_figure_is_compared_with_the_digits_that_are_shown(shown: str, unit: str, measured: str, right: str) -> None:
     assert expected(quote(shown, unit), measured) == right
 
 

@@ -11,7 +11,7 @@ from association.verdict.features import Features
 from association.verdict.model import MANIFEST, MODELS
 from benchmarks import manifest
 from benchmarks.examples import RANGES, SEGMENTS
-from benchmarks.manifest import FORMAT, MODELS_FILE, UNKNOWN, accept, code_of, digest
+from benchmarks.manifest import FORMAT, MODELS_FILE, UNKNOWN, accept, digest
 
 
 def test_the_features_are_those_of_the_code_in_order() -> None:
@@ -32,15 +32,6 @@ def test_a_model_has_features_of_the_code(name: str) -> None:
     assert set(MODELS) == {SEGMENTS, RANGES} == set(MANIFEST["data"]) == set(MANIFEST["metrics"])
     for odds in (MODELS[name].wrong, MODELS[name].elsewhere):
         assert set(odds.curves) <= set(Features._fields)
-
-
-def test_comments_and_layout_are_no_code() -> None:
-    one = code_of(
-        '"""Module."""\nA = 1.0  # m, tables\n\n\ndef f(x):\n    """Double it."""\n    return [x,\n        x,\n    ]\n'
-    )
-    assert one == code_of("A = 1.0\ndef f(x):\n    return [x, x]\n")
-    assert one != code_of("A = 1.1\ndef f(x):\n    return [x, x]\n")
-    assert code_of('A = "m"') != code_of('A = "s"')
 
 
 def test_the_digest_is_of_what_defines_the_features(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

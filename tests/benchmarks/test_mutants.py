@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from cosmic_ray.work_db import use_db
 
-from benchmarks.mutants.__main__ import PACKAGES, WITHOUT_EFFECT, draw, modules_of, prepare, report, run
+from benchmarks.mutants.__main__ import PACKAGES, modules_of, prepare, report, run
 from benchmarks.mutants.suites import SUITES, Suite, changed_lines, known_equivalents, suite_of
 
 ROOT = Path(__file__).parents[2]
@@ -62,35 +61,6 @@ def test_tests_that_fail_without_a_mutant_are_an_error(project: Path) -> None:
     (project / "test_module.py").write_text("def test() -> None:\n    assert False\n")
     with pytest.raises(SystemExit, match="fail without any mutant"):
         run(session, Suite(("test_module.py",)))
-
-
-def test_a_seed_draws_the_same_mutants_and_another_seed_others(project: Path) -> None:
-    """Session identifiers differ from run to run; the places that are drawn do not."""
-
-    def drawn(seed: int) -> list[str]:
-        session = project / f"{seed}.sqlite"
-        prepare(session, [Path("package/module.py")], 0, seed)
-        with use_db(str(session)) as database:
-            items = list(database.work_items)
-        chosen = draw(items, 3, seed)
-        return sorted(str(item.mutations) for item in items if item.job_id in chosen)
-
-    assert len(drawn(1)) == 3
-    assert drawn(1) == drawn(1)
-    assert drawn(1) != drawn(2)
-
-
-@pytest.mark.parametrize(
-    ("operator", "left_out"),
-    [
-        ("core/RemoveDecorator", True),
-        ("core/ReplaceBinaryOperator_BitOr_Add", True),
-        ("core/ReplaceBinaryOperator_Add_BitOr", False),
-        ("core/NumberReplacer", False),
-    ],
-)
-def test_operators_that_change_nothing_at_run_time_are_left_out(operator: str, left_out: bool) -> None:
-    assert bool(WITHOUT_EFFECT.fullmatch(operator)) is left_out
 
 
 def test_changed_lines_are_read_from_a_diff() -> None:

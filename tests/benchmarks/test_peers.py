@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from benchmarks.peers.adapters import PEERS, Answer
-from benchmarks.peers.corners import CornerOptions, MapCorners, best_of, fit_points, match
 from benchmarks.peers.grid_matcher import GridMatcher
 from benchmarks.peers.race import Attempt, Racer, attempts, is_right
 from benchmarks.peers.report import judged
@@ -59,12 +58,6 @@ def test_the_truth_lays_every_inlier_on_its_segment_within_the_noise(drawn) -> N
             assert (ends[2:] - ends[:2]) @ along > 0.0
 
 
-def test_a_cell_is_drawn_again_from_its_seed_and_another_seed_gives_another() -> None:
-    one, again, other = (drawn_cell("offices", 50, DRAWN_LEVELS[1], 3, seed) for seed in (5, 5, 6))
-    assert all(np.array_equal(a.scan, b.scan) for a, b in zip(one.queries, again.queries, strict=True))
-    assert not any(np.array_equal(a.scan, b.scan) for a, b in zip(one.queries, other.queries, strict=True))
-
-
 # --- Adapters ---------------------------------------------------------------------------------------------------------
 
 EASY = Level("easy", (24, 24), 0.0, 1e-4, None)
@@ -96,34 +89,6 @@ def test_a_peer_finds_what_is_easy(racer: Racer, easy: Cell) -> None:
     found = list(attempts(racer, easy, limit=30.0))
     assert [a.right for a in found] == [True, True]
     assert all(0.0 < a.ms < 30_000.0 for a in found)
-
-
-@pytest.mark.long
-def test_corners_fit_where_they_are_and_not_where_a_segment_would_stick_out() -> None:
-    room = np.array([[0.0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]])
-    known = MapCorners.of(room, CornerOptions(known_reach=0.1))
-    assert len(known.corners) == 4
-    pose = RigidTransform(1.0, 2.0, 0.4)
-    scan = pose.inverse().apply(room[:2].reshape(-1, 2)).reshape(-1, 4)
-    (found,) = match(scan, known, CornerOptions(headings=0))
-    # The long wall first, then the short one: two of the four corners of a rectangle.
-    assert len(found) == 2
-    assert any(np.allclose(row[:2], [4.0, 0.0]) for row in found.known)
-    for stretched in ([[-1.0, 0, 4, 0], [4, 0, 4, 3]], [[0, 0, 4.3, 0], [4, 0, 4, 3]], [[0, 0, 4, 0], [4, -0.3, 4, 3]],
-                      [[0, 0, 4, 0], [4, 0, 4, 4.5]]):  # fmt: skip
-        (found,) = match(np.array(stretched), known, CornerOptions(headings=0))
-        assert len(found) == 0, stretched
-
-
-def test_points_give_their_pose_back_and_the_better_pose_is_chosen() -> None:
-    rng = np.random.default_rng(2)
-    pose = RigidTransform(3.0, -1.0, 2.5)
-    points = rng.uniform(-5, 5, (6, 2))
-    assert fit_points(points, pose.apply(points)) == pytest.approx((3.0, -1.0, 2.5))
-    walls = np.array([[0.0, 0, 5, 0], [5, 0, 5, 4]])
-    scan = pose.inverse().apply(walls.reshape(-1, 2)).reshape(-1, 4)
-    truth = (pose.x, pose.y, pose.theta)
-    assert best_of([(0.0, 0.0, 0.0), truth, (3.0, 1.0, 2.5)], scan, walls) == truth
 
 
 @pytest.mark.parametrize(
@@ -187,18 +152,3 @@ def test_the_pose_is_found(x: float, y: float, theta: float) -> None:
     assert math.hypot(found.pose.x - (x * RESOLUTION - 2.0), found.pose.y - (y * RESOLUTION + 5.0)) < 0.15
     assert abs(math.remainder(found.pose.theta - theta, math.tau)) < math.radians(3.0)
     assert found.usable
-
-
-def test_a_room_of_two_equal_halves_leaves_no_lead() -> None:
-    free = np.zeros((40, 60), bool)
-    free[4:36, 4:56] = True
-    occupied = (np.roll(free, 1, 0) | np.roll(free, -1, 0) | np.roll(free, 1, 1) | np.roll(free, -1, 1)) & ~free
-    found = GridMatcher(occupied, free, RESOLUTION, ORIGIN).match(*cast(occupied, 15.5, 12.5, 0.3))
-    assert found.lead < 0.05
-    assert not found.usable
-
-
-def test_without_returns_there_is_no_pose() -> None:
-    found = GridMatcher(*room(), RESOLUTION, ORIGIN).match(np.zeros(0), np.zeros(0))
-    assert found.pose is None
-    assert not found.usable

@@ -8,18 +8,12 @@ import numpy as np
 import pytest
 
 from association import Status
-from batch import Processes
-from benchmarks.worlds import FAMILIES, draw_case
-from benchmarks.worlds.__main__ import _worlds as worlds_named
-from benchmarks.worlds.__main__ import main
+from benchmarks.worlds import draw_case
 from benchmarks.worlds.measured.goals import BEFORE, rows
-from benchmarks.worlds.measured.outcomes import WorldOutcome, answer, read, share_read, write
+from benchmarks.worlds.measured.outcomes import WorldOutcome, answer, share_read
 from benchmarks.worlds.measured.questions import FORMS, question
-from benchmarks.worlds.measured.running import Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.measured.tables import could_be_told, held
 from registration import RigidTransform
-
-FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=125)
 
 ANSWER = WorldOutcome(
     world="museum", condition="clean", number=0, held_out=True, form="ranges", truth=[0.0, 0.0, 0.0],
@@ -30,10 +24,6 @@ ANSWER = WorldOutcome(
 )  # fmt: skip
 WRONG = replace(ANSWER, pose=[5.0, 0.0, 0.0], distance=5.0, read=0.5, nees=900.0)
 AWAY = replace(WRONG, condition="sister", truth=None, distance=None, angle=None, nees=None)
-
-
-def timeless(outcomes: list[WorldOutcome]) -> list[WorldOutcome]:
-    return [replace(o, milliseconds=0.0) for o in outcomes]
 
 
 def judged(outcomes: list[WorldOutcome], what: str) -> str:
@@ -89,19 +79,6 @@ def test_beams_tell_where_a_scan_was_not_taken() -> None:
     assert share_read(replace(case, ranges=ranges), case.truth) == pytest.approx(1.0 / 3.0, abs=0.04)
 
 
-@pytest.mark.long
-def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_path) -> None:
-    alone, together = run(FEW, Processes(1)), run(FEW, Processes(2))
-    assert timeless(alone) == timeless(together)
-    assert [(o.world, o.condition, o.form) for o in alone] == [
-        (w, c, f) for c in FEW.conditions for w in FEW.worlds for f in FORMS
-    ]
-    assert timeless(outcomes_of(Chunk("garage", "sister", range(1)))) == timeless(alone[-2:])
-    write(tmp_path / "answers.jsonl", alone)
-    assert list(read(tmp_path / "answers.jsonl")) == alone
-    assert len((tmp_path / "answers.jsonl").read_bytes().splitlines()) == len(alone)
-
-
 def test_wrong_answers_and_strangers_are_counted() -> None:
     found = (
         [replace(WRONG, world="school", held_out=False)] * 50
@@ -139,21 +116,3 @@ def test_covariances_are_judged_by_right_answers_of_many_and_of_few_walls() -> N
     assert judged(found, "ranges: fewer than 6 walls: truths") == "100.0"
     assert held(replace(ANSWER, nees=7.8))
     assert not held(replace(ANSWER, nees=7.9))
-
-
-def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
-    halves = worlds_named("fitting"), worlds_named("reporting")
-    assert sorted(halves[0] + halves[1]) == sorted(FAMILIES)
-    assert all(FAMILIES[name].held_out for name in halves[1])
-    assert worlds_named("mine,hotel") == ("mine", "hotel")
-    assert worlds_named("") == tuple(FAMILIES)
-    for wrong, told in (
-        (["--worlds", "palace"], "palace"),
-        (["--conditions", "rain"], "rain"),
-        (["--quick", "0"], "0"),
-    ):
-        monkeypatch.setattr("sys.argv", ["worlds", *wrong])
-        with pytest.raises(SystemExit) as caught:
-            main()
-        assert caught.value.code == 2
-        assert told in capsys.readouterr().err

@@ -9,9 +9,9 @@ from experiments.constant_time import drawn_pairs
 from experiments.icp import align, nearest
 from experiments.mean_angles import CASES, examples, mitsuta, spread
 from experiments.precision import translation as rounded_translation
-from experiments.printed import FOLLOWED, Reading, ambiguity, exact_case, rotation, translation
+from experiments.printed import FOLLOWED, ambiguity, exact_case, rotation, translation
 from experiments.scenes import poses, world
-from registration import Correspondences, OneStepSums, RigidTransform, Segments
+from registration import OneStepSums, RigidTransform
 from simulation import Scanner, scan
 from tests.registration import reference
 
@@ -61,26 +61,6 @@ def test_what_each_misprint_gives_of_an_exact_scan():
     assert rotation(pairs, FOLLOWED["corrected"]) == pytest.approx(truth.theta)
     assert rotation(pairs, FOLLOWED["Alg. 1"]) == pytest.approx(truth.theta / len(pairs))
     assert rotation(pairs, FOLLOWED["Eq. 15"]) == pytest.approx(-truth.theta)
-
-
-def test_the_corrected_equations_are_those_of_the_library():
-    pairs = drawn_pairs(7, np.random.default_rng(3), RigidTransform(1.0, 2.0, 0.4))
-    turned = Correspondences.of(*_noisy(pairs))
-    found, _ = OneStepSums.of_set(turned, np.ones(len(turned))).solve("mitsuta")
-    np.testing.assert_allclose(translation(turned, Reading()), [found.x, found.y], atol=1e-9)
-    assert rotation(turned, Reading()) == pytest.approx(found.theta)
-
-
-def _noisy(pairs):
-    rng = np.random.default_rng(4)
-    from registration import MeasuredSegments
-
-    half = 0.5 * pairs.lengths[:, None] * pairs.directions
-    ends = np.hstack([pairs.midpoints - half, pairs.midpoints + half]) + rng.normal(0.0, 0.02, (len(pairs), 4))
-    half = 0.5 * pairs.map_lengths[:, None] * pairs.map_directions
-    map = Segments.from_array(np.hstack([pairs.map_midpoints - half, pairs.map_midpoints + half]))
-    rows = np.repeat(np.arange(len(pairs)), 2).reshape(-1, 2)
-    return map, MeasuredSegments.from_segments(Segments.from_array(ends)), rows
 
 
 def test_ambiguity_as_printed_holds_at_the_optimum_and_at_zero_only():

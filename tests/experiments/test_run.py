@@ -1,8 +1,6 @@
 """The quick mode writes every table and figure."""
 
 import csv
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -52,21 +50,6 @@ def test_every_published_figure_and_table_comes_from_an_experiment():
     assert published <= {name for names in FILES.values() for name in names}
     text = (ROOT / "docs" / "dev" / "experiments.md").read_text(encoding="utf-8")
     assert all(f"experiments/{name}" in text for name in published if name.endswith(".png"))
-
-
-@pytest.mark.long
-def test_two_processes_give_the_numbers_of_one(tmp_path):
-    for processes in (1, 2):
-        run(["unreliable"], QUICK, tmp_path / str(processes), processes)
-    one, two = ((tmp_path / str(k) / "fig9_reliability.csv").read_text() for k in (1, 2))
-    assert one == two
-
-
-def test_the_command_names_what_it_does_not_know(tmp_path):
-    command = [sys.executable, "-m", "experiments", "fig99", "--out", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "no such experiment: fig99" in done.stderr
 
 
 def test_a_place_is_found_within_25_units_and_5_degrees():

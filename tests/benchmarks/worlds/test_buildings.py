@@ -1,16 +1,18 @@
-"""Drawn buildings: their free sides and things, places in them, and floors that share what floors share."""
+"""Drawn buildings have free sides and things, floors share what floors share, cases are what they are called."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.worlds import FAMILIES, FLOOR_KINDS, draw_floors, free_place, free_places
+from benchmarks.worlds import FAMILIES, FLOOR_KINDS, Case, draw_case, draw_floors, free_place
 from benchmarks.worlds.buildings import FIXED, Building
 from benchmarks.worlds.buildings.shapes import box, crosses, edges
 from registration import Segments
+from registration.layout import Floats
 from simulation import Scanner, SimulationError, scan
 
 ALL_AROUND = Scanner.over(math.tau, 720, range_max=500.0, sigma=0.0)
@@ -57,9 +59,6 @@ def test_things_are_closed_outlines_that_stand_apart(name: str) -> None:
         assert not crosses(sides, building.segments.endpoints[building.things != thing])
 
 
-ROOM = np.vstack([edges(box(0, 0, 6, 4)), edges(box(2, 1, 3, 2)[::-1])])  # with a pillar
-
-
 def test_where_there_is_no_room_there_is_an_error() -> None:
     with pytest.raises(SimulationError) as caught:
         free_place(Segments.from_array(edges(box(0, 0, 0.6, 0.6))), np.random.default_rng(0))
@@ -80,20 +79,37 @@ def test_floors_share_outer_walls_and_shafts_and_differ_otherwise(name: str) -> 
     assert all(own != other for k, own in enumerate(rows) for other in rows[:k])
 
 
-def test_the_same_generator_draws_the_same_floors() -> None:
-    kind = FLOOR_KINDS["flats"]
-    first, second = (draw_floors(kind, 2, np.random.default_rng(8)) for _ in range(2))
-    assert all((a.endpoints == b.endpoints).all() for a, b in zip(first, second, strict=True))
+def shown(case: Case) -> Floats:
+    """Ranges of the declared scanner at the true pose in the map, without noise; 1e4 where there is nothing."""
+    assert case.truth is not None
+    return np.minimum(1e4, scan(case.map, case.truth, replace(case.scanner, sigma=0.0)).true_ranges)
 
 
-@pytest.mark.parametrize("name", FLOOR_KINDS)
-def test_places_are_free_and_inside(name: str) -> None:
-    kind, rng = FLOOR_KINDS[name], np.random.default_rng(1)
-    (floor,) = draw_floors(kind, 1, rng)
-    for x, y in free_places(floor, kind, 20, rng):
-        assert 0.0 < x < kind.size[0]
-        assert 0.0 < y < kind.size[1]
-        begins, ends = floor.endpoints[:, :2], floor.endpoints[:, 2:]
-        along = np.clip(((np.array([x, y]) - begins) * (ends - begins)).sum(axis=1) / floor.lengths**2, 0.0, 1.0)
-        gaps = np.linalg.norm(begins + along[:, None] * (ends - begins) - [x, y], axis=1)
-        assert gaps.min() >= 0.45
+def residuals(case: Case) -> Floats:
+    """Measured less shown, of beams that are near neither an edge nor the limits."""
+    expected = shown(case)
+    steady = np.abs(expected - np.roll(expected, 1)) + np.abs(expected - np.roll(expected, -1)) < 0.15
+    inside = np.isfinite(case.ranges) & (expected < case.scanner.range_max - 0.2) & steady
+    return case.ranges[inside] - expected[inside]
+
+
+@pytest.mark.parametrize("world", FAMILIES)
+def test_a_clean_scan_shows_the_map_from_its_truth(world: str) -> None:
+    case = draw_case(world, "clean", 1)
+    off = residuals(case)
+    assert len(off) > 100
+    assert np.abs(off).max() < 6.0 * case.scanner.sigma
+    assert off.std() == pytest.approx(case.scanner.sigma, rel=0.25)
+
+
+def test_noise_bias_and_no_return_are_what_they_are_called() -> None:
+    noisy, biased = draw_case("museum", "noisier", 0), draw_case("museum", "bias", 0)
+    assert residuals(noisy).std() == pytest.approx(2.0 * noisy.scanner.sigma, rel=0.2)
+    assert abs(np.median(residuals(biased))) == pytest.approx(0.02, abs=0.004)
+    full = draw_case("garage", "saturated", 0)
+    nothing = shown(full) > full.scanner.range_max
+    assert nothing.any()
+    assert (full.ranges[nothing] == full.scanner.range_max).all()
+    assert not np.isinf(full.ranges).any()
+    clean = draw_case("garage", "clean", 0)
+    assert np.isinf(clean.ranges[shown(clean) > clean.scanner.range_max]).all()
