@@ -26,7 +26,7 @@ EXAMPLES = re.findall(ASKED, TEXT)
 
 @pytest.mark.parametrize(("path", "body"), EXAMPLES, ids=[path for path, _ in EXAMPLES])
 def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
-    """Its answer is compared by tests/test_consoles.py, where the page shows it."""
+    """Its answer is compared by tests/test_documents.py, where the page shows it."""
     ((place, document),) = STORED
     client.put(place, content=document.encode()).raise_for_status()
     answer = client.post(path, content=body.encode())
