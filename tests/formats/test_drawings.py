@@ -14,8 +14,7 @@ from ezdxf.filemanagement import new
 
 from formats import ImportedMap, ImportOptions, IncompleteFileError, InvalidOptionError, TooLargeError, read_map
 
-from .drawn import feature, geojson, saved, svg, written
-from .reading import counts, notes, rows
+from .reading import counts, feature, geojson, notes, rows, saved, svg, written
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
 AROUND = [[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]]

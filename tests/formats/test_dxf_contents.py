@@ -13,8 +13,7 @@ from ezdxf.xclip import XClip
 
 from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, TooLargeError, read_map
 
-from .drawn import saved, written
-from .reading import notes
+from .reading import notes, saved, written
 
 ROOM = [(0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (3.0, 4.0), (3.0, 6.0), (0.0, 6.0)]
 

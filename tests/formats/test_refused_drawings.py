@@ -8,8 +8,7 @@ import pytest
 
 from formats import FormatError, ImportOptions, MalformedFileError, TooLargeError, UnsupportedFormatError, read_map
 
-from .drawn import feature, geojson, written
-from .reading import notes, rows
+from .reading import feature, geojson, notes, rows, written
 
 LONG = pytest.mark.long
 OPTIONS = ImportOptions(local_metres=True, units="m", drawn="faces")

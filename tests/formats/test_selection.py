@@ -12,8 +12,7 @@ from ezdxf.filemanagement import new
 
 from formats import FormatError, ImportOptions, IncompleteFileError, InvalidOptionError, MalformedFileError, read_map
 
-from .drawn import feature, geojson, saved, svg, written
-from .reading import notes, rows
+from .reading import feature, geojson, notes, rows, saved, svg, written
 
 METRES = ImportOptions(local_metres=True, drawn="faces")
 FACES = ImportOptions(drawn="faces", units="m")

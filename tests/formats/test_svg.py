@@ -8,8 +8,7 @@ import pytest
 
 from formats import ImportedMap, ImportOptions, MalformedFileError, TooLargeError, read_map
 
-from .drawn import svg, written
-from .reading import counts, rows
+from .reading import counts, rows, svg, written
 
 BASE = '<line x1="0" y1="0" x2="9" y2="0"/>'
 OPTIONS = ImportOptions(units="m", drawn="faces")

@@ -13,8 +13,7 @@ from ezdxf.filemanagement import new
 
 from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, read_map
 
-from .drawn import feature, geojson, saved, svg, written
-from .reading import notes, rows
+from .reading import feature, geojson, notes, rows, saved, svg, written
 
 METRES = ImportOptions(units="m", drawn="faces")
 WALL, OTHER = [0.0, 0.0, 4.0, 0.0], [0.0, 3.0, 2.0, 3.0]
