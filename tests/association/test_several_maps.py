@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -131,16 +130,6 @@ def weights() -> list[dict[str, float] | None]:
     return [None, {"a": 0.1, "b": 0.8, "c": 0.1}, {"b": 0.98}, {"b": 0.998}]
 
 
-def similar(seed: int) -> tuple[MapSet, Scan]:
-    """Draw three floors of one building, two of which differ by a block, and a scan of the first."""
-    rng = np.random.default_rng([62, seed])
-    first = floor(20 + seed)
-    second = np.vstack([first[:-4], box(20.5, 8.0, *rng.uniform(0.5, 2.0, 2))])
-    at = pose(rng.uniform(3.0, 16.0), 6.0, rng.uniform(-3.0, 3.0))
-    scan = ranges(first, at, seed, reach=(6.0, 10.0, 20.0)[seed % 3])
-    return MapSet({"a": part(first), "b": part(second), "c": part(floor(40 + seed))}), scan
-
-
 def variants(seed: int) -> tuple[MapSet, Scan]:
     """Draw a room that three maps have with another place of its pillar, and a scan of the first."""
     room, at = drawn_room(np.random.default_rng([71, seed]))
@@ -153,14 +142,11 @@ def variants(seed: int) -> tuple[MapSet, Scan]:
     return MapSet({name: part(one) for name, one in zip("abc", rooms, strict=True)}), scan
 
 
-@pytest.mark.parametrize(("drawn", "seeds"), [(similar, range(8)), (variants, range(25, 43))])
-def test_probabilities_sum_to_at_most_one_and_statuses_agree_with_reasons(
-    drawn: Callable[[int], tuple[MapSet, Scan]], seeds: range
-) -> None:
+def test_probabilities_sum_to_at_most_one_and_statuses_agree_with_reasons() -> None:
     """Those of the maps, and those of the answer and its alternatives; no map without match is a similar place."""
     named = 0
-    for seed in seeds:
-        maps, scan = drawn(seed)
+    for seed in range(25, 43):
+        maps, scan = variants(seed)
         for sent, given in itertools.product((scan, without_beams(scan)), weights()):
             found = associate_on_maps(maps, sent, KnownOfMaps(map_weights=given))
             assert probabilities(found) <= 1.0 + 1e-9
@@ -174,7 +160,7 @@ def test_probabilities_sum_to_at_most_one_and_statuses_agree_with_reasons(
                 on = [name for name in "abc" if name in named_there.replace(",", "").split()[2:]]
                 assert all(statuses[name] is not Status.NO_MATCH for name in on)
                 named += len(on)
-    assert named > 0 or drawn is similar
+    assert named > 0
 
 
 def test_weights_decide_between_equal_floors_and_are_not_fused() -> None:
