@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import tracemalloc
 
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 
 from association import MapIndex
-from association.index.kernels.walls import grid_cells
 from association.index.merging import collinear_groups, ends_of, join_gates
 from association.index.tuning import (
     CELL,
@@ -24,7 +22,7 @@ from association.index.tuning import (
     MOST_LOOKS,
     SWEEP_CELL,
 )
-from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
+from association.layout import ENDS, POINT, as_records
 from association.tables import Walls
 from association.tuning import REACH, SECTORS
 from registration import Segments
@@ -33,8 +31,6 @@ from registration.layout import Floats, Records
 from .kernels import reference as twin
 from .kernels.reference import SEEDS
 from .scenes import index_of, maze
-
-SHAPE = record(GRID_SHAPE, x0=-7.3, y0=-9.1, cell=1.7, columns=27, rows=29)  # holds the maze and 6 m around it
 
 
 def labels_of(ends: Floats, gap: float, lateral: float, angle: float) -> list[int]:
@@ -106,36 +102,6 @@ def test_one_piece_is_compared_with_so_many() -> None:
     assert labels_of(ends[: MOST_LOOKS // 2], 0.3, 0.03, 0.035)[:2] == [0, 0]
 
 
-def turned_maze(seed: int) -> Floats:
-    """Return the maze turned by an angle, so that walls lie across cells, with one along each axis."""
-    angle = np.random.default_rng(seed).uniform(-math.pi, math.pi)
-    r = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    inner = (maze(seed, 12, 10.0).reshape(-1, 2) - 5.0) @ r + 14.0
-    return np.vstack([inner.reshape(-1, 4), [[0.0, 3.0, 20.0, 3.0], [5.0, 30.0, 5.0, 2.0]]])
-
-
-@given(SEEDS)
-@settings(max_examples=8, deadline=None)
-def test_grid_cells(seed: int) -> None:
-    """A wall is listed where it is near, and not farther than the diagonal of what its reach adds to a cell.
-
-    The directions of a cell are those of the walls that it lists, whether it lists them or not.
-    """
-    ends, radius = turned_maze(seed), (0.02, 0.4, 2.0)[seed % 3]
-    sectors = np.random.default_rng(seed).integers(0, SECTORS, len(ends)).astype(np.int32)
-    starts, items, bits = grid_cells(as_records(ENDS, ends), sectors, radius, SHAPE, True)
-    assert grid_cells(as_records(ENDS, ends), sectors, radius, SHAPE, False)[2].tolist() == bits.tolist()
-    assert (starts[0], starts[-1]) == (0, len(items))
-    distances = np.array([twin.distances_to_cells(end, SHAPE) for end in ends])
-    for cell, (begin, end) in enumerate(itertools.pairwise(starts)):
-        listed = items[begin:end].tolist()
-        assert listed == sorted(set(listed))
-        assert bits[cell] == sum({1 << int(sectors[i]) for i in listed})
-        for i in range(len(ends)):
-            assert i in listed or distances[i, cell] > radius - 1e-9
-            assert i not in listed or distances[i, cell] < math.sqrt(2.0) * radius + 0.05
-
-
 MAZE_INDEX = index_of(maze(1))
 
 
@@ -202,6 +168,19 @@ def test_walls_name_their_neighbours_across_doorways() -> None:
     rows = index.walls.rows[place]
     assert rows["before"].tolist() == [-1, place[0], place[1], -1, -1]
     assert rows["after"].tolist() == [place[1], place[2], -1, -1, -1]
+
+
+def test_grid_lists_every_wall_within_reach() -> None:
+    rows = MAZE_INDEX.walls.rows
+    for at in np.random.default_rng(0).uniform(-14.0, 14.0, (400, 2)):
+        along = rows["dx"] * at[0] + rows["dy"] * at[1]
+        across = rows["dx"] * at[1] - rows["dy"] * at[0] - rows["offset"]
+        beyond = np.maximum(0.0, np.maximum(rows["begin"] - along, along - rows["end"]))
+        near = np.nonzero(np.hypot(across, beyond) <= REACH)[0]
+        grid, cell = MAZE_INDEX.grid, cell_of(MAZE_INDEX.grid.shape, at)
+        listed = [] if cell is None else grid.items[slice(*grid.starts[cell : cell + 2])].tolist()
+        assert set(near.tolist()) <= set(listed)
+        assert listed == sorted(set(listed))
 
 
 def test_raster_has_the_directions_of_what_is_near() -> None:

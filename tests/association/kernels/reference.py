@@ -57,16 +57,6 @@ def collinear_groups(ends: Floats, max_gap: float, max_lateral: float, max_angle
     return label
 
 
-def distances_to_cells(end: Floats, shape: Records) -> Floats:
-    """Return the least distance of a segment from each cell of a grid, metres, by many points along it."""
-    grid = shape[0]
-    row, column = np.divmod(np.arange(grid["columns"] * grid["rows"]), grid["columns"])
-    low = point(grid, "x0", "y0") + grid["cell"] * np.stack([column, row], axis=1)[:, None]
-    points = end[:2] + np.linspace(0.0, 1.0, 501)[:, None] * (end[2:] - end[:2])
-    beyond = np.maximum(0.0, np.maximum(low - points, points - low - grid["cell"]))
-    return np.asarray(np.hypot(beyond[..., 0], beyond[..., 1]).min(axis=1))
-
-
 # --- Lines of a scan --------------------------------------------------------------------------------------------------
 
 
