@@ -36,7 +36,8 @@ from .scenes import index_of, maze
 def labels_of(ends: Floats, gap: float, lateral: float, angle: float) -> list[int]:
     directions = as_records(POINT, Segments.from_array(ends).directions)
     gates = join_gates(gap, lateral)._replace(least_cosine=math.cos(angle))
-    return collinear_groups(as_records(ENDS, ends), directions, gates, None).tolist()
+    labels: list[int] = collinear_groups(as_records(ENDS, ends), directions, gates, None).tolist()
+    return labels
 
 
 def continued(rng: np.random.Generator) -> Floats:
