@@ -183,9 +183,7 @@ def test_a_time_increment_in_another_unit_is_replaced(bag: Robots, scan_time: fl
 
 @pytest.mark.parametrize("by_tf", [False, True])
 @pytest.mark.parametrize(("scale", "shift", "known"), [(1.0, 0.0, True), (0.5, 0.0, False), (1.0, 1.0, False)])
-def test_two_sources_that_contradict_each_other_are_named(
-    bag: Robots, by_tf: bool, scale: float, shift: float, known: bool
-) -> None:
+def test_sources_that_contradict_are_named(bag: Robots, by_tf: bool, scale: float, shift: float, known: bool) -> None:
     """The second source has another speed, or is moved by a metre in between."""
     bag.fixed("base_link", "laser")
     for k in range(100):

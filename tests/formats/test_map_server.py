@@ -168,9 +168,7 @@ def test_the_surface_of_thick_walls(
         ),
     ],
 )
-def test_bad_descriptions_are_refused_in_one_line(
-    tmp_path: Path, yaml: str, kind: type[FormatError], message: str
-) -> None:
+def test_bad_descriptions_are_refused(tmp_path: Path, yaml: str, kind: type[FormatError], message: str) -> None:
     path = write(tmp_path, l_room())
     path.write_text(yaml.replace("{image}", "map.pgm").replace("{origin}", "0, 0, 0"))
     with pytest.raises(kind) as caught:

@@ -97,9 +97,7 @@ def test_a_bag_without_a_grid_names_its_topics(recording: Recording) -> None:
         ((0, 0, math.sin(math.pi / 4), math.cos(math.pi / 4)), False, 5.0 - 0.95),  # a quarter turn
     ],
 )
-def test_the_orientation_of_a_grid(
-    recording: Recording, orientation: tuple[float, ...], noted: bool, right: float
-) -> None:
+def test_orientations_of_grids(recording: Recording, orientation: tuple[float, ...], noted: bool, right: float) -> None:
     recording.put("/map", BEGUN, grid_bytes(MAP, (5.0, 0.0, 0.0), tuple(map(float, orientation))), GRID)
     imported = read_map(recording.done())
     assert imported.map.segments.midpoints[:, 0].max() == pytest.approx(right, abs=0.01)

@@ -64,9 +64,7 @@ def test_an_mcap_of_ros_1(tmp_path: Path, kind: str) -> None:
         ("", "cdr", ""),
     ],
 )
-def test_channels_that_are_not_of_ros_are_left_out_and_counted(
-    recording: Recording, kind: str, encoding: str, schema: str
-) -> None:
+def test_channels_that_are_not_of_ros_are_counted(recording: Recording, kind: str, encoding: str, schema: str) -> None:
     recording.put("/state", BEGUN, b"{}", kind, encoding, schema)
     recording.put("/other", BEGUN, b"{}", "Other", "json", "jsonschema")
     recording.scans(3)
@@ -91,9 +89,7 @@ def test_a_scan_in_another_encoding_is_named(recording: Recording) -> None:
     [{"use_statistics": False}, {"use_summary_offsets": False}, {"repeat_channels": False}, {"repeat_schemas": False}],
 )
 @pytest.mark.parametrize("compression", list(CompressionType))
-def test_an_mcap_without_a_part_of_summary(
-    tmp_path: Path, options: dict[str, Any], compression: CompressionType
-) -> None:
+def test_an_mcap_with_a_partial_summary(tmp_path: Path, options: dict[str, Any], compression: CompressionType) -> None:
     recording = Recording(tmp_path / "a.mcap", compression=compression, **options)
     recording.scans(7)
     found, log = read(recording.done())
@@ -110,9 +106,7 @@ def test_chunks_that_overlap_are_read_by_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize("chunk", [0, 1000])
 @pytest.mark.parametrize("compression", list(CompressionType))
 @pytest.mark.parametrize("fraction", [0.3, 0.55, 0.8])
-def test_a_cut_mcap_is_read_to_the_cut(
-    tmp_path: Path, chunk: int, compression: CompressionType, fraction: float
-) -> None:
+def test_a_cut_mcap_is_partly_read(tmp_path: Path, chunk: int, compression: CompressionType, fraction: float) -> None:
     recording = Recording(tmp_path / "a.mcap", chunk=chunk, compression=compression)
     recording.scans(40)
     path = recording.done()

@@ -44,9 +44,7 @@ def dxf(folder: Path, wall: tuple[str, ...], other: tuple[str, ...], block: str 
         (("Wände",), ("Möbel",)),
     ],
 )
-def test_the_own_layer_of_an_entity_tells_whether_it_is_a_wall(
-    tmp_path: Path, wall: tuple[str, ...], other: tuple[str, ...]
-) -> None:
+def test_the_own_layer_of_an_entity_counts(tmp_path: Path, wall: tuple[str, ...], other: tuple[str, ...]) -> None:
     imported = read_map(dxf(tmp_path, wall, other), METRES)
     assert rows(imported) == [WALL]
     assert "set the option layers for others" in notes(imported)["layers"].message

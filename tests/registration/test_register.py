@@ -27,9 +27,7 @@ WEIGHTINGS = ("uniform", "shorter_length", "information")
 @pytest.mark.parametrize("rotation", ROTATIONS)
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 @pytest.mark.parametrize("theta", [0.4, math.pi, -3.0])
-def test_perfect_data_give_the_pose_and_no_ambiguity(
-    theta: float, estimator: Estimator, rotation: Rotation, weighting: Weighting
-) -> None:
+def test_perfect_data_are_exact(theta: float, estimator: Estimator, rotation: Rotation, weighting: Weighting) -> None:
     pose = RigidTransform(3.0, -2.0, theta)
     map_segments, scan = room(pose)
     options = RegistrationOptions(estimator, rotation, weighting=weighting)

@@ -57,14 +57,16 @@ def test_a_pose_turns_and_moves_what_is_seen() -> None:
     assert seen.hits.tolist() == [1, 2, 3]
 
 
-def test_nothing_within_the_limit_is_no_return() -> None:
-    seen = scan(SQUARE, ORIGIN, Scanner(range_max=1.2, sigma=0.0))
-    far = seen.true_ranges > 1.2
-    assert far.any()
-    assert np.isinf(seen.ranges[far]).all()
-    assert (seen.hits[far] == -1).all()
-    assert not seen.facing[far].any()
-    assert (seen.ranges[~far] <= 1.2).all()
+@pytest.mark.parametrize(
+    ("x", "least", "most", "unread"), [(0.0, 0.0, 1.2, math.inf), (0.95, 0.1, 20.0, math.nan)], ids=["far", "near"]
+)
+def test_what_is_out_of_range_is_no_return_or_unknown(x: float, least: float, most: float, unread: float) -> None:
+    seen = scan(SQUARE, RigidTransform(x, 0.0, 0.0), Scanner(range_min=least, range_max=most, sigma=0.0))
+    out = (seen.true_ranges < least) | (seen.true_ranges > most)
+    assert out.any()
+    np.testing.assert_array_equal(seen.ranges, np.where(out, unread, seen.true_ranges))
+    assert (seen.hits[out] == -1).all()
+    assert not seen.facing[out].any()
 
 
 def test_noise_lifts_no_range_above_the_limit() -> None:
@@ -80,14 +82,6 @@ def test_an_empty_map_gives_no_returns() -> None:
     assert (seen.hits == -1).all()
     assert not seen.facing.any()
     assert seen.points.shape == (0, 2)
-
-
-def test_what_is_too_near_is_unknown() -> None:
-    seen = scan(SQUARE, RigidTransform(0.95, 0.0, 0.0), Scanner(range_min=0.1, sigma=0.0))
-    near = seen.true_ranges < 0.1
-    assert near.any()
-    assert np.isnan(seen.ranges[near]).all()
-    assert (seen.hits[near] == -1).all()
 
 
 @pytest.mark.parametrize(("one_sided", "expected"), [(False, [0.5, 0]), (True, [1.0, 1])])
