@@ -126,8 +126,7 @@ def test_another_floor_or_building_is_on_none_of_them() -> None:
         assert found.reasons
 
 
-def weights() -> list[dict[str, float] | None]:
-    return [None, {"a": 0.1, "b": 0.8, "c": 0.1}, {"b": 0.98}, {"b": 0.998}]
+WEIGHTS: list[dict[str, float] | None] = [None, {"a": 0.1, "b": 0.8, "c": 0.1}, {"b": 0.98}, {"b": 0.998}]
 
 
 def variants(seed: int) -> tuple[MapSet, Scan]:
@@ -147,7 +146,7 @@ def test_probabilities_sum_to_at_most_one_and_statuses_agree_with_reasons() -> N
     named = 0
     for seed in range(25, 43):
         maps, scan = variants(seed)
-        for sent, given in itertools.product((scan, without_beams(scan)), weights()):
+        for sent, given in itertools.product((scan, without_beams(scan)), WEIGHTS):
             found = associate_on_maps(maps, sent, KnownOfMaps(map_weights=given))
             assert probabilities(found) <= 1.0 + 1e-9
             others = sum(one.probability or 0.0 for one in found.alternatives)

@@ -7,7 +7,6 @@ import pytest
 
 from experiments.__main__ import EXPERIMENTS, run
 from experiments.plan import QUICK
-from experiments.unknown import found_place
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = {
@@ -50,10 +49,3 @@ def test_every_published_figure_and_table_comes_from_an_experiment():
     assert published <= {name for names in FILES.values() for name in names}
     text = (ROOT / "docs" / "dev" / "experiments.md").read_text(encoding="utf-8")
     assert all(f"experiments/{name}" in text for name in published if name.endswith(".png"))
-
-
-def test_a_place_is_found_within_25_units_and_5_degrees():
-    assert found_place((24.0, 0.08))
-    assert not found_place((26.0, 0.0))
-    assert not found_place((0.0, 0.09))
-    assert not found_place((float("nan"), float("nan")))
