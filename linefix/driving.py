@@ -20,6 +20,7 @@ from association import (
     AssociationResult,
     AssociationWarning,
     Deadline,
+    InvalidSearchError,
     KnownOfMaps,
     MapIndex,
     MapSet,
@@ -98,8 +99,18 @@ def search(
     options: AssociationOptions | None = None,
     deadline: Deadline | None = None,
 ) -> AssociationResult:
-    """Find a scan in a map, or on several: the search of each interface, with drives as `associate`."""
+    """Find a scan in a map, or on several: the search of each interface, with drives as `associate`.
+
+    Raises
+    ------
+    InvalidSearchError
+        As of `association`, and when something about several maps is stated of a single one.
+    """
     how = options or AssociationOptions()
+    if isinstance(maps, MapIndex):
+        for argument, stated in (("prior.map_id", known.prior_map), ("map_weights", known.map_weights)):
+            if stated is not None:
+                raise InvalidSearchError("found it with one map, expected it with several; omit it", argument=argument)
 
     def once(seen: Scan) -> AssociationResult:
         if isinstance(maps, MapSet):

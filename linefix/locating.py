@@ -103,18 +103,9 @@ def locate(
     >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
     '1.00 1.00 1.57'
     """
-    maps, how = _several(map), options or AssociationOptions()
-    if maps is not None:
-        known = KnownOfMaps(prior, prior_map, map_weights)
-        return search(maps, scan_of(scan, angles), known, how, deadline)
-    if prior_map is not None or map_weights is not None:
-        name = "map_weights" if prior_map is None else "prior_map"
-        raise InvalidArgumentError(
-            f"found `{name}` with a single map, expected it with several; use `index_maps`, or omit `{name}`",
-            argument=name,
-        )
-    index, how = prepared(map, how)  # type: ignore[arg-type]
-    return search(index, scan_of(scan, angles), KnownOfMaps(prior), how, deadline)
+    several, known = _several(map), KnownOfMaps(prior, prior_map, map_weights)
+    maps, how = prepared(map, options) if several is None else (several, options)  # type: ignore[arg-type]
+    return search(maps, scan_of(scan, angles), known, how, deadline)
 
 
 def explain(
@@ -168,7 +159,7 @@ def prepared(
 ) -> tuple[MapIndex, AssociationOptions]:
     """Return a map's index and the options of a search; directions count where they do in both."""
     index, how = index_map(map), options or AssociationOptions()
-    how = replace(how, oriented=how.oriented and len(index.segments) == index.directed)
+    how = replace(how, oriented=how.oriented and index.oriented)
     return index if how.oriented else index.undirected, how
 
 

@@ -14,7 +14,6 @@ from association import (
     CancelledError,
     Deadline,
     IndexingEndedError,
-    InvalidSearchError,
     KnownOfMaps,
     MapIndex,
     MapSet,
@@ -90,13 +89,6 @@ class Target:
     references: Mapping[str | None, Json | None]
     weights: Mapping[str, float] | None = None
 
-    @property
-    def oriented(self) -> bool:
-        """Return whether directions of segments mean anything on all of the maps."""
-        if isinstance(self.maps, MapSet):
-            return self.maps.oriented
-        return len(self.maps.segments) == self.maps.directed
-
 
 def require_time(deadline: Deadline) -> None:
     """Raise `DeadlinePassedError` when the deadline has passed, `CancelledError` when it was cancelled."""
@@ -129,12 +121,8 @@ def find(
     watch.lap("decode")
     require_time(deadline)
     prior_map = None if sought.prior is None else sought.prior.map_id
-    if prior_map is not None and not isinstance(target.maps, MapSet):
-        raise InvalidSearchError(
-            "found `map_id` in the prior of a single map, expected it with `maps`; omit it", argument="prior.map_id"
-        )
     known = KnownOfMaps(inputs.prior_of(sought.prior), prior_map, target.weights)
-    how = inputs.association_options_of(options, oriented=target.oriented)
+    how = inputs.association_options_of(options, oriented=target.maps.oriented)
     try:
         result = by(target.maps, scanned.scan, known, how, deadline)
     except IndexingEndedError:

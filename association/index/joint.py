@@ -59,9 +59,8 @@ class MapPart:
     @classmethod
     def of(cls, index: MapIndex) -> MapPart:
         """Return the map of an index."""
-        directed = len(index.segments) == index.directed
-        segments = index.segments if directed else index.segments.take(np.arange(index.directed))
-        return cls(segments, index.sigma, directed, index.points)
+        segments = index.segments if index.oriented else index.segments.take(np.arange(index.directed))
+        return cls(segments, index.sigma, index.oriented, index.points)
 
 
 @dataclass(frozen=True)

@@ -147,6 +147,11 @@ class MapIndex:
             )
         return low, high
 
+    @property
+    def oriented(self) -> bool:
+        """Whether directions of segments mean anything; otherwise each segment is there in both directions."""
+        return len(self.segments) == self.directed
+
     def warmed(self) -> Self:
         """Compute what the first search would wait for, and return the index."""
         for name in ("crowd", "most_near", "area", "diagonal", "tables", "obstacles"):

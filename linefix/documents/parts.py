@@ -9,7 +9,6 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from .arrays import Covariance, MapPointRows, MapSegmentRows
-from .errors import Fault, InvalidRequestError
 from .strict import DeadlineMs, FrameId, FreeJson, MapId, OneOf, Pose, Strict, in_radians
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
@@ -140,27 +139,6 @@ MapWeights = Annotated[
     Field(min_length=1, max_length=MOST_MAPS),
     BeforeValidator(_few_weights),
 ]
-
-
-def require_one_kind(map: object, maps: list[NamedMap | StoredMap] | MapPrefix | None, weights: object) -> None:
-    """Refuse a request with both a map and several, or none, with weights of a single map, or with one map twice.
-
-    Raises
-    ------
-    InvalidRequestError
-        With the place of the fault.
-    """
-    if (map is None) == (maps is None):
-        found = "neither" if map is None else "both"
-        raise InvalidRequestError([Fault("", f"expected exactly one of map and maps, found {found}")])
-    if maps is None and weights is not None:
-        raise InvalidRequestError([Fault("/map_weights", "found it with a single map, expected it with maps; omit it")])
-    if isinstance(maps, list):
-        seen: dict[str, int] = {}
-        for number, one in enumerate(maps):
-            if seen.setdefault(one.map_id, number) != number:
-                message = "found an id that another map has, expected a different one for each map"
-                raise InvalidRequestError([Fault(f"/maps/{number}/map_id", message)])
 
 
 class SoftPriorFields(Pose):

@@ -8,8 +8,9 @@ from pydantic import Field, SkipValidation, ValidationInfo, field_validator, mod
 from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
+from .errors import Fault, InvalidRequestError
 from .limits import require_within
-from .parts import AnyMap, AnyPrior, InlineMap, MapWeights, SearchOptions, SeveralMaps, require_one_kind
+from .parts import AnyMap, AnyPrior, InlineMap, MapWeights, SearchOptions, SeveralMaps
 from .sensors import AnyScan, Laser, MeasuredFields, RaySigma, Twist, require_at_the_sensor, require_times
 from .strict import DeadlineMs, Point, Pose, Referenced, Sigma, Strict
 
@@ -93,7 +94,14 @@ class OnMaps(Strict):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        require_one_kind(self.map, self.maps, self.map_weights)
+        if (self.map is None) == (self.maps is None):
+            found = "neither" if self.map is None else "both"
+            raise InvalidRequestError([Fault("", f"expected exactly one of map and maps, found {found}")])
+        ids = [one.map_id for one in self.maps] if isinstance(self.maps, list) else []
+        for number, map_id in enumerate(ids):
+            if map_id in ids[:number]:
+                message = "found an id that another map has, expected a different one for each map"
+                raise InvalidRequestError([Fault(f"/maps/{number}/map_id", message)])
         return self
 
 

@@ -134,8 +134,7 @@ class Analysis:
         # Of a map without directions the index holds each segment twice.
         segments = Segments.derived(index.segments.endpoints[: index.directed])
         standing = standing_places(segments, robot, spacing, point)
-        oriented = len(index.segments) == index.directed
-        analysis = cls(index, segments, robot, standing, oriented, seed, drive)
+        analysis = cls(index, segments, robot, standing, index.oriented, seed, drive)
         return analysis if landmark is None or not len(landmark) else analysis.with_segments(landmark)
 
     def with_segments(self, landmark: Segments) -> Analysis:

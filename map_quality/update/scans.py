@@ -238,8 +238,7 @@ def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationRe
     CancelledError
         When the deadline was cancelled.
     """
-    oriented = len(index.segments) == index.directed
-    options = AssociationOptions(max_alternatives=0, oriented=oriented, include=("correspondences",))
+    options = AssociationOptions(max_alternatives=0, oriented=index.oriented, include=("correspondences",))
     return associate(index, one.scan, one.prior, options, deadline)
 
 

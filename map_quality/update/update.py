@@ -143,10 +143,9 @@ class _Update:
         """Begin an update."""
         known = Segments.derived(index.segments.endpoints[: index.directed])
         sigma = tuning.USUAL_SIGMA if index.sigma is None else index.sigma
-        oriented = len(index.segments) == index.directed
         names = list(dict.fromkeys(one.visit for one in scans))
         # The proposal must not depend on the order of the visits.
-        return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, oriented, deadline))
+        return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, index.oriented, deadline))
 
     @property
     def known(self) -> Segments:
