@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeVar
+from typing import TYPE_CHECKING, TextIO
 
 from .errors import RefusedError, WrongUseError, needing
 from .inputs import existing
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from formats import Log, LoggedScan
     from registration import RigidTransform
 
-T = TypeVar("T")
 ROBOT = "base_link"  # name of the robot's frame where the user sets the mount
 LOST = 5.0  # m; a prior wider than this is dropped
 FASTEST, FASTEST_TURN = 1.0, 1.0  # m/s and rad/s; deviations of a motion that odometry does not show
@@ -59,23 +58,11 @@ def scans_of(log: Log) -> Iterator[LoggedScan]:
 def some_scans(path: Path, most: int, source: TopicOptions) -> list[LoggedScan]:
     """Return some scans of a log, evenly over all of it; print on stderr what was made of the log; raises as above."""
     log = opened(path, source)
-    taken = thinned(scans_of(log), most)
+    from formats import thinned
+
+    taken, _ = thinned(scans_of(log), most)
     print_notes(log, sys.stderr)
     return taken
-
-
-def thinned(found: Iterable[T], most: int) -> list[T]:
-    """Return so many, evenly over all, without all of them in memory; all of them where there are no more."""
-    kept: list[T] = []
-    step = 1
-    for number, one in enumerate(found):
-        if number % step:
-            continue
-        kept.append(one)
-        if len(kept) > 4 * most:
-            kept, step = kept[::2], 2 * step
-    count = min(most, len(kept))
-    return [kept[k * len(kept) // count] for k in range(count)]
 
 
 def print_notes(log: Log, where: TextIO) -> None:

@@ -11,7 +11,7 @@ from .errors import (
     UprightFrameError,
 )
 from .line_map import GridPicture, ImportedMap, LineMap
-from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions, scan_json
+from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions, scan_json, thinned
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
 from .reading import LOG_SUFFIXES, MAP_SUFFIXES, map_of_grid, read_log, read_map
@@ -47,6 +47,7 @@ __all__ = [
     "read_map",
     "rgb",
     "scan_json",
+    "thinned",
     "verdict_of",
     "write_map",
     "write_tum",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from registration import IDENTITY, RigidTransform, wrap_angle
 from vectorization import LaserScan
@@ -18,6 +18,7 @@ from .tuning import PART_NS
 UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan", "upright_frame")
 """Codes of the notes that count scans which cannot be used."""
 
+T = TypeVar("T")
 FARTHEST = 1e4  # m; where a log names no greatest range
 SECONDS = 1e-9  # of a nanosecond
 
@@ -128,6 +129,23 @@ class Log:
     def report(self) -> ImportReport:
         """Notes of the last iteration so far."""
         return self._notes.report(self.format, (self.name,))
+
+
+def thinned(found: Iterable[T], most: int) -> tuple[list[T], int]:
+    """Return at most so many of the scans of a log, evenly over all of it, and how many it has.
+
+    A multiple of `most` is in memory.
+    """
+    kept: list[T] = []
+    step, total = 1, 0
+    for one in found:
+        if total % step == 0:
+            kept.append(one)
+        total += 1
+        if len(kept) > 4 * most:
+            kept, step = kept[::2], 2 * step
+    count = min(most, len(kept))
+    return [kept[k * len(kept) // count] for k in range(count)], total
 
 
 @dataclass(slots=True)

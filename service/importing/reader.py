@@ -10,7 +10,6 @@ import base64
 import errno
 import io
 import math
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,7 @@ from .fields import SCANS_FIELDS, options_of, read_fields
 from .own_files import Lines, OwnFiles, read_own
 
 if TYPE_CHECKING:
-    from formats import GridPicture, ImportedMap, LoggedScan
+    from formats import GridPicture, ImportedMap
 
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
 MOST_PIXELS = 2048  # of a picture, each way
@@ -149,7 +148,7 @@ def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
     InvalidRequestError
         When the form, an option or a file is wrong.
     """
-    from formats import LOG_SUFFIXES, LogOptions, read_log, scan_json
+    from formats import LOG_SUFFIXES, LogOptions, read_log, scan_json, thinned
 
     from .form import read_form
 
@@ -158,25 +157,9 @@ def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
 
     def read(files: OwnFiles) -> Lines:
         log = read_log(files.map, LogOptions(topic=options.get("topic")))
-        chosen, count = spread(log, options.get("max_scans", DEFAULT_SCANS))
+        chosen, count = thinned(log, options.get("max_scans", DEFAULT_SCANS))
         report = asdict(log.report)
         report["files"] = tuple(map(files.as_sent, report["files"]))
         return [{"report": report, "count": count}, {"scans": list(map(scan_json, chosen))}]
 
     return read_own(form, folder, read, LOG_SUFFIXES, "log", "one log, or a bag with its metadata.yaml")
-
-
-def spread(scans: Iterable[LoggedScan], most: int) -> tuple[list[LoggedScan], int]:
-    """Return at most `most` scans that are evenly spread over a log, the first among them, and how many it has."""
-    kept: list[LoggedScan] = []
-    step, count = 1, 0
-    for number, one in enumerate(scans):
-        count = number + 1
-        if number % step:
-            continue
-        if len(kept) == most:
-            kept, step = kept[::2], 2 * step
-            if number % step:
-                continue
-        kept.append(one)
-    return kept, count

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import cli
-from cli.logs import thinned
 from cli.printing import print_lines, table
+from formats import thinned
 from tests.map_quality.check.drawn import faces
 
 from .drives import write_log
@@ -39,9 +39,9 @@ def test_numbers_stand_on_the_right_of_their_column() -> None:
 
 
 def test_some_of_many_are_spread_evenly_and_of_none_none() -> None:
-    assert thinned([], 3) == []
-    assert thinned([1, 2], 3) == [1, 2]
-    assert thinned(list(range(10)), 5) == [0, 2, 4, 6, 8]
+    assert thinned([], 3) == ([], 0)
+    assert thinned([1, 2], 3) == ([1, 2], 2)
+    assert thinned(list(range(10)), 5) == ([0, 2, 4, 6, 8], 10)
 
 
 def test_help_imports_nothing_that_computes_and_a_replay_no_service(folder: Path) -> None:
