@@ -51,8 +51,6 @@ def analyze(
     """Simulate scans on a grid of poses and report where localization succeeds."""
     if out is not None and out.suffix.lower() not in SUFFIXES:
         raise WrongUseError(f"--out: found {out.name}, expected a name that ends in {' or '.join(SUFFIXES)}")
-    if places.deadline_ms is not None and not places.deadline_ms >= 0.0:
-        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {places.deadline_ms:g}")
     target = read_map_or_id(on)
     names = flags_of(scanner, "/laser") | flags_of(places) | {"/map": on}
     body = {"map": target, "laser": asdict(scanner), **asdict(places), "point": places.point and list(places.point)}

@@ -97,15 +97,12 @@ def existing(path: Path) -> Path:
 
 
 def line_map_of(document: Json) -> LineMap:
-    """Return a map as `formats` has it; raises `InputError` where its segments are none."""
-    from association import MapPoints
+    """Return a map as `formats` has it; raises `InputError` where it is none."""
     from formats import LineMap
-    from registration import Segments
+    from linefix.locating import map_part
 
-    segments, sigma = Segments.from_array(document.get("segments", []), argument="segments"), document.get("sigma")
-    points = MapPoints.of(document.get("points", []), document.get("points_sigma"), path="").positions
-    directed = document.get("oriented") is not False
-    return LineMap(segments, sigma, directed, points=points, points_sigma=document.get("points_sigma"))
+    part, points_sigma = map_part(document, "map"), document.get("points_sigma")
+    return LineMap(part.segments, part.sigma, part.oriented, points=part.points.positions, points_sigma=points_sigma)
 
 
 def write_document(document: Json, out: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from .asking import Where
-from .errors import Names, WrongUseError
+from .errors import Names, WrongUseError, flags_of
 from .inputs import NamedMap, places_of, read_map_file, read_maps, target_of
 from .options import ORIENTED, MapArgument, MapsArgument, ScanArgument, UsableOptions, argument, flag, grouped, option
 from .printing import Json, Output, pose_text, rows, section, table, verdict_rows, write_json
@@ -17,14 +17,7 @@ from .scans import read_json, read_scan
 
 MOST_ALTERNATIVES = 10  # that people read; --json has all
 TAKEN = ("laser", "points", "viewpoint")  # of a scan for vectorize; its frame and stamp make no difference there
-PLACES: Names = {  # options of a search, by their places in a request
-    "/prior": "--near",
-    "/prior/radius": "--radius",
-    "/prior/angle": "--angle",
-    "/prior/map_id": "--near-map",
-    "/map_weights": "--weight",
-    "/options/deadline_ms": "--deadline-ms",
-}
+OF_MAPS: Names = {"/prior": "--near", "/prior/map_id": "--near-map", "/map_weights": "--weight"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +58,7 @@ def locate(
         body["prior"]["map_id"] = several.near_map
     if several.weight:
         body["map_weights"] = dict(map(_weight, several.weight))
-    answer = where.ask("associate", body, names={**PLACES, **places_of(maps), "/scan": scan})
+    answer = where.ask("associate", body, names=_names(maps, scan, search))
     output.print(answer, _located(answer))
 
 
@@ -90,6 +83,12 @@ def _request(maps: Sequence[NamedMap], scan: str, search: SearchOptions, usable:
     return body
 
 
+def _names(maps: Sequence[NamedMap], scan: str, search: SearchOptions) -> Names:
+    """Return the user's names for places in such a request."""
+    flags = flags_of(search, "/options") | flags_of(search, "/prior")
+    return {**flags, **OF_MAPS, **places_of(maps), "/scan": scan}
+
+
 def _weight(told: str) -> tuple[str, float]:
     """Return the map and its probability of ``MAP_ID=PROBABILITY``; raises `WrongUseError` where it is not that."""
     name, _, value = told.rpartition("=")
@@ -108,8 +107,7 @@ def explain(on: MapArgument, scan: ScanArgument, search: SearchOptions, usable: 
     maps = read_maps([on])
     if len(maps) > 1:
         raise WrongUseError(f"{on}: found a folder with {len(maps)} maps, expected one map")
-    names = {**PLACES, **places_of(maps), "/scan": scan}
-    found = Where().ask("explain", _request(maps, scan, search, usable), names=names)
+    found = Where().ask("explain", _request(maps, scan, search, usable), names=_names(maps, scan, search))
     output.print(found, _explained(found))
 
 

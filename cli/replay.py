@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from registration import RigidTransform
 
 
-HOPELESS = 20  # scans from the first on
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
 HINT = "linefix map check MAP --log LOG{} tests the scale, the handedness and the directions of the map"
 MODE = "track: the prior is by odometry from the last usable pose; global: no prior."
@@ -148,21 +147,16 @@ def located(
     """
     from formats import scan_json
 
-    refusals, all_refused = list[str](), True
     for one in scans:
         try:
             one = frames.taken(one)
             prior = None if tracker is None else tracker.prior(one)
             found = locate({"scan": scan_json(one)} | ({} if prior is None else {"prior": prior}))
         except RefusedError as error:
-            refusals.append(str(error))
-            # Many scans, and all so far, with the same message: the map may be the reason.
-            hopeless = all_refused and len(refusals) == HOPELESS and len(set(refusals)) == 1
-            if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or hopeless:
+            if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map"):
                 raise
             yield one, {"usable": False, "reasons": [], "error": str(error)}
             continue
-        all_refused = False
         if tracker is not None:
             tracker.learn(found, one)
         yield one, found

@@ -14,7 +14,6 @@ from .printing import Json
 
 STDIN = "-"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
-WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 MAX_VALUES = 1_000_000_000  # of a file; what a request may hold is the service's business
 LOGS = (".bag", ".mcap", ".db3", ".clf", ".log")
 FORMS = ("laser", "points", "segments", "views")
@@ -25,18 +24,8 @@ NEXT = "\n---"  # between the messages of `ros2 topic echo`
 
 
 def bytes_of(name: str) -> bytes:
-    """Return the content of a text file without a byte-order mark; ``-`` reads stdin.
-
-    Raises
-    ------
-    OSError
-        When there is no such file, or it cannot be read.
-    RefusedError
-        When it is text in UTF-16.
-    """
+    """Return the content of a text file without a byte-order mark; ``-`` reads stdin; raises `OSError`."""
     data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
-    if data.startswith(WIDE):
-        raise RefusedError(f"{name}: found text in UTF-16, expected UTF-8; save the file as UTF-8")
     return data.removeprefix(BYTE_ORDER_MARK)
 
 
@@ -90,8 +79,6 @@ def read_scan(name: str) -> Json:
     if isinstance(inner, str) and inner.lstrip().startswith("{"):
         inner = read_json(name, inner.encode())
     scan: Json = inner if isinstance(inner, dict) else message
-    if {"start_angle", "end_angle"} <= scan.keys():
-        raise RefusedError(f"{name}: is a LaserScan of Foxglove, expected one of ROS; export sensor_msgs/LaserScan")
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
     views = scan.get("views")
@@ -107,8 +94,6 @@ def _yaml(data: bytes, name: str) -> Any:
         from formats.errors import naming
         from formats.files import load_yaml
 
-        if data.startswith(b"%time"):
-            raise RefusedError(f"{name}: is a table of rostopic echo -p, expected one message; print it without -p")
         text = WARNINGS.sub("", LOST.sub("", data.decode("utf-8", errors="replace")), count=1).removeprefix("---\n")
         with naming(name):
             return load_yaml(text.partition(NEXT)[0])
@@ -126,16 +111,13 @@ def _finite(laser: Json, name: str) -> Json:
     """
     laser = {field: value for field, value in laser.items() if field != "intensities"}
     ranges = laser.get("ranges")
-    if isinstance(ranges, str):
-        raise RefusedError(
-            f"{name}: has no ranges, but '{ranges[:60]}'; expected numbers: record the scan without --noarr or --no-arr"
-        )
+    ranges = [CUT] if isinstance(ranges, str) else ranges  # such as '<array type: float32>'
     if not isinstance(ranges, list):
         return laser
     if ranges[-1:] == [CUT]:
         raise RefusedError(
-            f"{name}: the ranges end in '...' after {len(ranges) - 1} values; expected all of them: "
-            "record the scan with ros2 topic echo --full-length"
+            f"{name}: the ranges end after {len(ranges) - 1} values, expected all of them: record the scan with "
+            "ros2 topic echo --full-length, and without --noarr"
         )
     laser |= {field: _number(value) for field, value in laser.items() if field.startswith(("angle_", "range_"))}
     most = laser.get("range_max")

@@ -187,7 +187,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     """
     if isinstance(map, MapIndex):
         return map
-    part = _part(map, "map")
+    part = map_part(map, "map")
     return MapIndex.build(part.segments, part.sigma, oriented=part.oriented, points=part.points)
 
 
@@ -217,7 +217,7 @@ def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
     [('room', 'ok'), ('hall', 'no_match')]
     """
     named = list(maps.items()) if isinstance(maps, Mapping) else [(str(n), one) for n, one in enumerate(maps)]
-    return MapSet([(name, _part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
+    return MapSet([(name, map_part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
 
 
 def _several(map: Any) -> MapSet | None:
@@ -229,7 +229,7 @@ def _several(map: Any) -> MapSet | None:
     return None
 
 
-def _part(map: Any, argument: str) -> MapPart:
+def map_part(map: Any, argument: str) -> MapPart:
     """Return one of several maps; raises `InputError` where it is none."""
     if isinstance(map, MapIndex):
         return MapPart.of(map)

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 from ..asking import Where
-from ..errors import NoServerError, WrongUseError
+from ..errors import WrongUseError
 from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id, write_document
 from ..options import WRITE_MAP, MapArgument, argument, grouped, option, required
-from ..printing import Json, Output, print_json, rows, table
+from ..printing import Json, Output, print_json, print_lines, rows, table
 
-MAX_PAGES = 100_000  # of a list of maps
 COLUMNS = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
 
 
@@ -38,20 +37,17 @@ def list_maps(where: Where, output: Output) -> None:
     """List the stored maps, by id; with --json one a line."""
     found, cursor = list[Json](), None
     with where.opened() as service:
-        for _ in range(MAX_PAGES):
+        while not found or cursor is not None:
             page = service.ask("list_maps", cursor=cursor)
-            found, cursor = [*found, *page["maps"]], page["next"]
-            if cursor is None:
-                break
-        else:
-            raise NoServerError(f"{where.server}: found more than {MAX_PAGES} pages of maps; check the URL")
+            found, cursor = [*found, page], page["next"]
+    maps = [one for page in found for one in page["maps"]]
     if output.as_json:
-        for one in found:
+        for one in maps:
             print_json(one)
         return
     names = ("map_id", "revision", "segment_count")
-    records = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in found]
-    output.print(found, table(COLUMNS, records))
+    records = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in maps]
+    print_lines(table(COLUMNS, records))
 
 
 @grouped

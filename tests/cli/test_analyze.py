@@ -80,7 +80,7 @@ def test_little_time(folder: Path, linefix: Linefix) -> None:
         (("--fov", "360"), 3, "--fov: expected radians"),
         (("--point", "100", "0"), 3, "--point: expected a place"),
         (("--drive", "31"), 3, "--drive: expected at most 30"),
-        (("--deadline-ms", "nan"), 2, "--deadline-ms: expected"),
+        (("--deadline-ms", "nan"), 3, "--deadline-ms: expected"),
         (("--landmark", "none.json"), 2, "none.json"),
         (("--out", "a.txt"), 2, "--out"),
     ],

@@ -14,7 +14,6 @@ from linefix_client import Client, ProblemError, UnreachableError
 from linefix_client import asking as requests
 
 from cli import asking
-from cli.maps import storing
 from tests.batch.logs import ROOM, SEEN
 from tests.formats.bags import BEGUN, Recording
 
@@ -137,13 +136,6 @@ def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
         assert told.value.status == 429
 
 
-def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(storing, "MAX_PAGES", 5)
-    body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
-    with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
-        assert "found more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
-
-
 def test_what_terminals_obey_is_escaped(linefix: Linefix, folder: Path) -> None:
     title = "\x9b31m\x7f\u202e\U000e0001end"
     (folder / "odd.json").write_text(json.dumps({"segments": ROOM, "meta": {"title": title}, "frame_id": title}))
@@ -165,11 +157,6 @@ def test_a_byte_order_mark_is_passed_over(linefix: Linefix, folder: Path) -> Non
     for name in ("room.json", "scan.json"):
         (folder / name).write_bytes(MARK + (folder / name).read_bytes())
     linefix.done("locate", "room.json", "scan.json")
-
-
-def test_text_in_utf_16_is_named(linefix: Linefix, folder: Path) -> None:
-    (folder / "scan.json").write_text(json.dumps({"segments": SEEN}), encoding="utf-16")
-    assert "scan.json: found text in UTF-16, expected UTF-8" in refused(linefix("locate", "room.json", "scan.json"), 3)
 
 
 def test_a_description_that_stands_for_too_much_is_refused(linefix: Linefix, folder: Path) -> None:
