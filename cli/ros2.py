@@ -15,7 +15,6 @@ from .asking import Where
 from .errors import RefusedError, WrongUseError, needing
 from .inputs import read_maps
 from .options import PlainCommand, UsableOptions, flag, grouped, option
-from .printing import Json
 from .ros2_parameters import given_parameter, parameters_of, robots_of
 
 if TYPE_CHECKING:
@@ -167,11 +166,7 @@ def _maps_at(names: Sequence[str]) -> Maps:
     import linefix
     from ros2 import Maps
 
-    documents: dict[str, Json] = {}
-    for one in read_maps(names):
-        if one.name in documents:
-            raise WrongUseError(f"found the map {one.name} twice, expected each map once; omit one of them")
-        documents[one.name] = Where().whole_map(one.document)
+    documents = {one.name: Where().whole_map(one.document) for one in read_maps(names)}
     frames = {name: document.get("frame_id") or "map" for name, document in documents.items()}
     for name, frame in frames.items():
         if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):

@@ -74,16 +74,12 @@ def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:
     """Return a section with `map`, a text, or `maps`, a list, as the option that takes both; raises `WrongUseError`."""
     others = {name: value for name, value in section.items() if value is not None}
     one, several = others.pop("map", None), others.pop("maps", None)
-    if one is None and several is None:
-        return others
-    if one is not None and several is not None:
-        raise WrongUseError(f"{file}: found map and maps in one section, expected one of them")
-    maps = several if one is None else [one]
-    if isinstance(maps, list) and all(isinstance(name, str) for name in maps):
-        return {**others, "on": maps}
-    expected = "maps: found {}, expected a list of names of maps, such as [hq-1.yaml, hq-2.yaml]"
-    expected = expected if one is None else "map: found {}, expected the name of a map"
-    raise WrongUseError(f"{file}: " + expected.format(repr(str(several if one is None else one)[:80])))
+    maps = [*([] if one is None else [one]), *(several if isinstance(several, list) else [several] if several else [])]
+    if not all(isinstance(name, str) for name in maps):
+        raise WrongUseError(
+            f"{file}: found {str(maps)[:80]}, expected map: NAME, or maps: [NAME, ...] with names of maps"
+        )
+    return {**others, "on": maps} if maps else others
 
 
 def robots_of(file: Path) -> list[str]:

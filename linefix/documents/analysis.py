@@ -11,7 +11,7 @@ from association import ReasonCode
 
 from .limits import require_within
 from .parts import AnyMap
-from .reply_parts import MapReference, PoseAnswer, ReferencedAnswer
+from .replies import MapReference, PoseAnswer, ReferencedAnswer
 from .strict import Answer, Coordinate, DeadlineMs, Index, Point, Referenced, Row2, Share, Strict, Verdict, in_radians
 
 Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]

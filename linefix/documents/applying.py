@@ -11,7 +11,7 @@ from map_quality import ChangeCode
 
 from .arrays import MapSegmentRows
 from .parts import MapDocument, MapSigma
-from .reply_parts import ReferencedAnswer
+from .replies import ReferencedAnswer
 from .strict import Coordinate, FreeJson, Referenced, Strict
 from .updates import NewMapAnswer
 

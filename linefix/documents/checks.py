@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from map_quality import FindingCode
 
-from .reply_parts import MapReference, PoseAnswer, ReferencedAnswer
+from .replies import MapReference, PoseAnswer, ReferencedAnswer
 from .strict import Answer, Index, Verdict
 
 

@@ -15,6 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from registration import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,12 @@ class Fault:
     def __str__(self) -> str:
         """Return both in one line."""
         return f"{self.pointer}: {self.message}" if self.pointer else self.message
+
+
+def fault_of(error: InputError) -> Fault:
+    """Return the place of a request that a library refuses; its arguments are named as fields, with dots."""
+    index = "" if error.index is None else f"/{error.index}"
+    return Fault("/" + error.argument.replace(".", "/") + index, error.message)
 
 
 def in_one_line(faults: Sequence[Fault]) -> str:

@@ -8,8 +8,15 @@ from pydantic import Field
 
 from association import ReasonCode
 
-from .replies import AmbiguityAnswer, RegistrationDiagnosticsAnswer, Residual
-from .reply_parts import MapReference, PoseAnswer, ReferencedAnswer, WarningAnswer
+from .replies import (
+    AmbiguityAnswer,
+    MapReference,
+    PoseAnswer,
+    ReferencedAnswer,
+    RegistrationDiagnosticsAnswer,
+    Residual,
+    WarningAnswer,
+)
 from .strict import Answer, Index, Matrix, Row2, Row3, Row4, Share, Verdict
 
 

@@ -15,7 +15,7 @@ from registration import InputError, InvalidArgumentError, RegistrationOptions, 
 
 from .analysis import AnalyzeRequest
 from .applying import ApplyRequest, SharpenedWalls
-from .errors import Fault, InvalidRequestError, RequestError
+from .errors import Fault, InvalidRequestError, RequestError, fault_of
 from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields, is_oriented
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
@@ -219,9 +219,3 @@ def faults_in(error: RequestError | InputError) -> tuple[Fault, ...]:
     if isinstance(error, InvalidRequestError):
         return error.faults
     return (fault_of(error) if isinstance(error, InputError) else Fault(getattr(error, "pointer", ""), str(error)),)
-
-
-def fault_of(error: InputError) -> Fault:
-    """Return the place of a request that a library refuses; its arguments are named as fields, with dots."""
-    index = "" if error.index is None else f"/{error.index}"
-    return Fault("/" + error.argument.replace(".", "/") + index, error.message)

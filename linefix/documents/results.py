@@ -21,7 +21,7 @@ from vectorization import Vectorization
 from ..checking import CheckedMap
 from . import analysis, checks, found, replies, updates
 from .parts import MapDocument
-from .reply_parts import WarningAnswer
+from .replies import WarningAnswer
 from .strict import SEAL, Answer
 
 if TYPE_CHECKING:

@@ -24,11 +24,12 @@ from vectorization import (
 )
 
 from ..ranges import RangeScan, motion_warning, view_of
-from .errors import Fault, InvalidRequestError
+from .errors import Fault, InvalidRequestError, fault_of
 from .requests import VectorizeRequest
 from .sensors import Laser, MeasuredFields, OneScan, OneView, PointFields, RangeFields, Twist, ViewsScan
 from .strict import Pose
 
+OF_OPTIONS = ("sigma", "min_points", "min_length", "max_gap")
 MOST_NULLS = 1.0 / 3.0  # fraction of a scan's ranges
 LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
@@ -111,7 +112,7 @@ def _view_of(seen: OneScan | OneView, place: str, *, timed: bool) -> View:
 
 def _laser_view(ranges: RangeScan, pose: RigidTransform, seen: RangeFields, place: str) -> View:
     """Return a scanner's view; the single beams stay evidence. `pose` is that of the frame it is mounted on."""
-    with _naming_argument(place, f"{place}/laser"):
+    with _naming_argument(place, "/laser"):
         view = view_of(ranges, pose, seen.sigma)
     nulls = _nulls_warning(ranges.laser)
     if nulls is not None:
@@ -134,7 +135,7 @@ def _range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = 
     motion = None
     if twist is not None and laser.time_increment:
         motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
-    with _naming_argument(place, f"{place}/laser"):
+    with _naming_argument(place, "/laser"):
         if laser.angle_max is not None and len(laser.ranges):
             require_angle_max(laser.angle_min, laser.angle_max, laser.angle_increment, len(laser.ranges))
         given = {name: bound for name, bound in bounds.items() if bound is not None}
@@ -161,15 +162,14 @@ def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
 
 
 @contextmanager
-def _naming_argument(scan: str, form: str | None = None, options: str | None = None) -> Iterator[None]:
-    """Name the place of an argument that the vectorizer rejects, by the pointers of scan, its ranges, and options."""
+def _naming_argument(scan: str, form: str = "", options: str = "") -> Iterator[None]:
+    """Name the place of an argument that the vectorizer rejects; `form` and `options` go after that of the scan."""
     try:
         yield
     except VectorizationError as error:
-        beside = dict.fromkeys(("sigma", "min_points", "min_length", "max_gap"), scan if options is None else options)
-        place = (beside | {"twist": scan}).get(error.argument, scan if form is None else form)
-        row = "" if error.index is None else f"/{error.index}"
-        raise InvalidRequestError([Fault(f"{place}/{error.argument}{row}", error.message)]) from error
+        below = options if error.argument in OF_OPTIONS else "" if error.argument == "twist" else form
+        fault = fault_of(error)
+        raise InvalidRequestError([Fault(f"{scan}{below}{fault.pointer}", fault.message)]) from error
 
 
 def vectorization_of(asked: VectorizeRequest) -> tuple[Vectorization, AssociationWarning | None]:

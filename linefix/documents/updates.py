@@ -11,7 +11,7 @@ from map_quality import ChangeCode, KeptCode
 
 from .arrays import Covariance
 from .limits import require_within
-from .reply_parts import MapReference, ReferencedAnswer
+from .replies import MapReference, ReferencedAnswer
 from .sensors import LaserScan
 from .strict import Answer, DeadlineMs, Index, Pose, Referenced, Row2, Row4, Share, Strict
 

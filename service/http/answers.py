@@ -8,7 +8,7 @@ from pydantic import Field
 
 from linefix.documents.checks import MapCheckAnswer
 from linefix.documents.found import FoundAnswer
-from linefix.documents.reply_parts import MapReference, PoseAnswer, ReferencedAnswer
+from linefix.documents.replies import MapReference, PoseAnswer, ReferencedAnswer
 from linefix.documents.strict import Answer, Index, Milliseconds, Row4
 from linefix.documents.updates import NewMapAnswer
 

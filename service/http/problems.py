@@ -26,11 +26,11 @@ from linefix.documents.errors import (
     InvalidRequestError,
     NotJsonError,
     TooManyError,
+    fault_of,
     in_one_line,
 )
-from linefix.documents.faults import faults_of
-from linefix.documents.inputs import fault_of
 from linefix.documents.limits import MAX_FAULTS
+from linefix.documents.reading import faults_of
 from registration import InputError
 
 from .. import errors

@@ -146,10 +146,8 @@ def test_the_namespace_chooses_the_parameters_of_a_robot(
         ("when: never", "when"),
         ("map: nowhere.yaml", "nowhere.yaml: there is no such file"),
         ("maps: [nowhere.yaml]", "nowhere.yaml: there is no such file"),
-        ("map: [hq-1.yaml]", "map: found \"['hq-1.yaml']\", expected the name of a map"),
-        ("maps: hq-1.yaml", "maps: found 'hq-1.yaml', expected a list of names of maps"),
-        ("maps: [7]", "maps: found '[7]', expected a list of names of maps"),
-        ("{map: a.yaml, maps: [b.yaml]}", "found map and maps in one section, expected one of them"),
+        ("map: [hq-1.yaml]", "found [['hq-1.yaml']], expected map: NAME, or maps: [NAME, ...]"),
+        ("maps: [7]", "found [7], expected map: NAME, or maps: [NAME, ...]"),
     ],
 )
 def test_a_wrong_parameter_ends_with_2(
