@@ -36,7 +36,7 @@ MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "points", "
 
 
 def locate(
-    map: MapIndex | MapSet | Sequence[MapIndex] | LineMap | ImportedMap | Segments | ArrayLike,
+    map: MapIndex | MapSet | LineMap | ImportedMap | Segments | ArrayLike,
     scan: Scan | MountedScan | LaserScan | Segments | ArrayLike,
     angles: tuple[float, float] | None = None,
     *,
@@ -50,10 +50,9 @@ def locate(
 
     Parameters
     ----------
-    map : MapIndex, MapSet, sequence of MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
+    map : MapIndex, MapSet, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
         Metres in the map frame, free space on the left of every segment. For many scans of one map index it once, by
-        `index_map`: that takes longer than a search. Several maps likewise, by `index_maps`; a sequence of indices
-        is named "0", "1" and so on.
+        `index_map`: that takes longer than a search. Several maps are indexed by `index_maps`.
     scan : Scan, LoggedScan or other MountedScan, LaserScan, Segments, or array-like
         In the sensor's frame, metres: ranges of shape (m,), points of shape (m, 2) in scanning order, or segments of
         shape (n, 4). A scan of a log counts with its mount, its motion, and upside down where it is mounted so.
@@ -103,8 +102,8 @@ def locate(
     >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
     '1.00 1.00 1.57'
     """
-    several, known = _several(map), KnownOfMaps(prior, prior_map, map_weights)
-    maps, how = prepared(map, options) if several is None else (several, options)  # type: ignore[arg-type]
+    known = KnownOfMaps(prior, prior_map, map_weights)
+    maps, how = (map, options) if isinstance(map, MapSet) else prepared(map, options)
     return search(maps, scan_of(scan, angles), known, how, deadline)
 
 
@@ -218,15 +217,6 @@ def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
     """
     named = list(maps.items()) if isinstance(maps, Mapping) else [(str(n), one) for n, one in enumerate(maps)]
     return MapSet([(name, map_part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
-
-
-def _several(map: Any) -> MapSet | None:
-    """Return several maps, None where it is one."""
-    if isinstance(map, MapSet):
-        return map
-    if isinstance(map, list | tuple) and map and all(isinstance(one, MapIndex) for one in map):
-        return index_maps(map)
-    return None
 
 
 def map_part(map: Any, argument: str) -> MapPart:
