@@ -136,7 +136,8 @@ def server_at(url: str) -> Iterator[Server]:
             f"--server needs {error.name}: in a checkout, pip install ./clients/python, or omit --server"
         ) from None
     if not _URL.fullmatch(url):
-        raise WrongUseError("--server: expected a URL such as http://127.0.0.1:8000, found another text")
+        found = "one with a name or a password" if "@" in url else repr(url)
+        raise WrongUseError(f"--server: expected a URL such as http://127.0.0.1:8000, found {found}")
     key = os.environ.get(KEY) or None
     if key is not None and not _HEADER.fullmatch(key):
         raise WrongUseError(f"{KEY} in the environment: found a character that no key has, expected printable ASCII")
