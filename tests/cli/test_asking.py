@@ -199,7 +199,7 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
     (folder / "noarr.yaml").write_text(echoed([]).replace("ranges:", "ranges: '<array type: float32>'"))
     assert "without --noarr" in refused(linefix("locate", "room.json", "noarr.yaml"), 3)
     (folder / "table.csv").write_text("%time,field.header.seq,field.ranges0\n1,2,3.0\n")
-    assert "table.csv: found no scan" in refused(linefix("locate", "room.json", "table.csv"), 3)
+    assert "table.csv: is not YAML" in refused(linefix("locate", "room.json", "table.csv"), 3)
 
 
 def test_ranges_that_ros2_topic_echo_has_cut_are_refused(linefix: Linefix, folder: Path) -> None:
