@@ -118,7 +118,7 @@ def test_scans_of_a_log_can_be_sent_as_they_are(client: httpx.Client) -> None:
     answer = found.json()
     assert answer["count"] == 9
     # Evenly spread, the first among them.
-    assert [scan["views"][0]["laser"]["ranges"][0] for scan in answer["scans"]] == [1.0, 5.0, 9.0]
+    assert [scan["views"][0]["laser"]["ranges"][0] for scan in answer["scans"]] == [1.0, 3.0, 5.0, 7.0]
     assert answer["report"]["format"].startswith("carmen")
     asked = {"map": examples.MAP, "scan": answer["scans"][0]}
     found = client.post("/v1/associate", json=asked)
