@@ -89,6 +89,19 @@ class RigidTransform:
         carried: NDArray[np.float64] = about @ np.asarray(covariance, dtype=np.float64) @ about.T
         return carried
 
+    def chi_square(self, other: RigidTransform, covariance: ArrayLike) -> float:
+        """Return the squared Mahalanobis distance of two poses, which has three degrees of freedom.
+
+        Parameters
+        ----------
+        other : RigidTransform
+            Another pose in the same frame.
+        covariance : (3, 3) array-like
+            Of their difference, additive (x, y, theta) in that frame; m^2, m rad, rad^2.
+        """
+        difference = np.array([other.x - self.x, other.y - self.y, wrap_angle(other.theta - self.theta)])
+        return float(difference @ np.linalg.solve(np.asarray(covariance, dtype=np.float64), difference))
+
     def apply(self, points: ArrayLike) -> NDArray[np.float64]:
         """Transform points, shape (..., 2), metres."""
         p = np.asarray(points, dtype=np.float64)

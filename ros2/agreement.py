@@ -23,7 +23,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import IDENTITY, RigidTransform, wrap_angle
+from registration import IDENTITY, RigidTransform
 
 from . import tuning
 from .clock import Confirmation
@@ -287,12 +287,6 @@ def predict(begin: Observation, step: RigidTransform, unknown_s: float = 0.0) ->
     return predicted, known + np.diag([place**2, place**2, turn**2])
 
 
-def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> float:
-    """Return the squared Mahalanobis distance of two poses, three degrees of freedom."""
-    difference = np.array([a.x - b.x, a.y - b.y, wrap_angle(a.theta - b.theta)])
-    return float(difference @ np.linalg.solve(covariance, difference))
-
-
 def _verdict(begin: Observation, scan: Observation, step: RigidTransform, unknown_s: float) -> bool | None:
     """Return whether a scan agrees with what odometry predicts; None where that is undecided.
 
@@ -302,9 +296,9 @@ def _verdict(begin: Observation, scan: Observation, step: RigidTransform, unknow
     if scan.usable and scan.map_id != begin.map_id:
         return False
     if scan.usable:
-        return chi_square(predicted, scan.pose, covariance + scan.covariance) <= tuning.AGREEING_CHI_SQUARE
+        return predicted.chi_square(scan.pose, covariance + scan.covariance) <= tuning.AGREEING_CHI_SQUARE
     if not scan.conclusive:
         return None
     places = [one.pose for one in (Place(scan.pose, scan.map_id), *scan.others) if one.map_id == begin.map_id]
-    near = any(chi_square(predicted, pose, covariance) <= tuning.AGREEING_CHI_SQUARE for pose in places)
+    near = any(predicted.chi_square(pose, covariance) <= tuning.AGREEING_CHI_SQUARE for pose in places)
     return None if near else False

@@ -10,7 +10,7 @@ import numpy as np
 from registration import RigidTransform, wrap_angle
 
 from . import tuning
-from .agreement import Event, Observation, chi_square
+from .agreement import Event, Observation
 from .frames import FrameError, Frames, matrix_of, planar
 from .messages import NS, PoseWithCovarianceStamped, nanoseconds
 from .odometry import OdometryHistory
@@ -72,7 +72,7 @@ class Watch:
             return None
         both = estimate.covariance + scan.covariance
         both = both + np.diag([tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA**2, tuning.LOCALIZER_SIGMA_THETA**2])
-        agrees = chi_square(estimate.pose, scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
+        agrees = estimate.pose.chi_square(scan.pose, both) <= tuning.AGREEING_CHI_SQUARE
         self._against = 0 if agrees else self._against + 1
         return agrees
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from formats.logs.tracks import Known
 
-from .agreement import Observation, chi_square, predict
+from .agreement import Observation, predict
 from .frames import planar
 from .messages import NS
 from .odometry import OdometryHistory
@@ -59,7 +59,7 @@ class Lag:
         if a is None or b is None or a.part != b.part:
             return None
         predicted, covariance = predict(begin[0], planar(a.matrix).inverse().compose(planar(b.matrix)))
-        return min(AGREEING_CHI_SQUARE, chi_square(predicted, end[0].pose, covariance + end[0].covariance))
+        return min(AGREEING_CHI_SQUARE, predicted.chi_square(end[0].pose, covariance + end[0].covariance))
 
     def _known(self, scan: Observation, received: int, *, by_reception: bool) -> Known | None:
         shift = self._apart(scan.stamp, received) if by_reception else 0
