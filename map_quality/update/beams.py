@@ -6,13 +6,12 @@ A scan is no evidence for the walls that its pose depends on alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from association import Deadline
-from registration import JointSums, RigidTransform, Segments
+from registration import Segments
 
 from . import tuning
 from .result import Bools, Floats, Indices
@@ -91,7 +90,7 @@ def follow(
     chunks : Chunks
     one : Localized
     lines : (k, 3)
-        Lines of walls that the scan is no evidence for, as of `hanging_lines`.
+        Lines of walls that the scan is no evidence for, as of `critical_lines`.
     sigma : float
         Standard deviation of the walls, metres.
     deadline : Deadline
@@ -132,8 +131,7 @@ def _met(
     beams, columns, slant = beams[met], columns[met], slant[met]
     distance = ahead[met] / slant
     gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
-    kept = np.flatnonzero(gap >= -np.maximum(tuning.HIDDEN, tolerance))
-    kept = kept[_nearest(beams[kept], distance[kept])]
+    kept = gap >= -np.maximum(tuning.HIDDEN, tolerance)
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
     directions, lengths = walls.directions[columns], walls.lengths[columns]
@@ -163,22 +161,15 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
     return np.divmod(np.flatnonzero(begins != ends), len(walls))
 
 
-def _nearest(beams: Indices, distance: Floats) -> Indices:
-    """Return the rows of the nearest walls of each beam, at most `MOST_PASSED`."""
-    order = np.lexsort((distance, beams))
-    sorted_beams = beams[order]
-    rank = np.arange(len(order)) - np.searchsorted(sorted_beams, sorted_beams)
-    return np.sort(order[rank < tuning.MOST_PASSED])
+def seen_walls(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> Indices:
+    """Return the walls that beams of a scan end on, or a little before, or pass through.
 
-
-def sees(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> bool:
-    """Return whether any beam of a scan ends on some walls, a little before them, or passes through.
-
-    True where the pose of the scan is not known: it may be anywhere.
+    All where the pose of the scan is not known: it may be anywhere.
     """
     if one.result.pose is None or one.result.covariance is None:
-        return True
-    return bool(len(follow(chunks, one, np.zeros((0, 3)), sigma, deadline, oriented=False).chunks))
+        return np.arange(len(chunks.walls))
+    seen = follow(chunks, one, np.zeros((0, 3)), sigma, deadline, oriented=False)
+    return np.unique(chunks.walls_of(seen.chunks))
 
 
 def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
@@ -214,66 +205,21 @@ def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
     return np.maximum(tuning.LEAST_TOLERANCE, tuning.DEVIATIONS * deviation)
 
 
-def hanging_lines(one: Localized, sigma: float) -> Floats:
-    """Return the lines of walls without which the pose of a scan would not be known along their normal.
+def critical_lines(one: Localized) -> Floats:
+    """Return the lines of the wall without which the pose of a scan would move or be free: normal and offset, (k, 3).
 
-    The sums of the other correspondences are what remains when those of a wall are taken out.
-
-    Parameters
-    ----------
-    one : Localized
-    sigma : float
-        Standard deviation of the walls, metres.
-
-    Returns
-    -------
-    (k, 3)
-        Normal and offset of each line in the map frame.
+    They are of the segments of the map that are pieces of this wall; none where the pose depends on no single wall.
     """
-    pairs = one.pairs
-    weights = 1.0 / (pairs.variances + sigma**2)
-    local = pairs.about((one.pose.x, one.pose.y), (0.0, 0.0))
-    total = JointSums.of_set(local, weights)
-    normals, directions, middles = pairs.map_normals, pairs.map_directions, pairs.map_midpoints
-    lines: list[Floats] = []
-    rests: list[JointSums] = []
-    left = np.ones(len(pairs), dtype=bool)
-    while left.any():
-        first = int(np.argmax(left))
-        normal, offset = normals[first], pairs.map_offsets[first]
-        mine = _on_line(directions, middles, normal, offset)
-        mine[first] = True
-        left &= ~mine
-        lines.append(np.array([*normal, offset]))
-        rests.append(total - JointSums.of_set(local.take(mine), weights[mine]))
-    found = np.array(lines).reshape(-1, 3)
-    return found[_deviations(rests, one.pose, found[:, :2]) > tuning.HANGING]
+    diagnostics = one.result.diagnostics
+    wall = None if diagnostics is None else diagnostics.critical_wall
+    on = one.on.take(np.array(() if wall is None else wall.map, dtype=np.intp))
+    return np.column_stack([on.normals, on.offsets])
 
 
 def on_lines(walls: Segments, lines: Floats) -> Bools:
-    """Return which walls lie on any of some lines, (n,)."""
+    """Return which walls lie on any of some lines, as pieces of one wall do, (n,)."""
     out = np.zeros(len(walls), dtype=bool)
     for line in lines:
-        out |= _on_line(walls.directions, walls.midpoints, line[:2], float(line[2]))
+        along, off = np.abs(walls.directions @ line[:2]), np.abs(walls.midpoints @ line[:2] - line[2])
+        out |= (along < 0.05) & (off < tuning.LEAST_TOLERANCE)
     return out
-
-
-def _on_line(directions: Floats, midpoints: Floats, normal: Floats, offset: float) -> Bools:
-    """Return which segments lie on a line, as pieces of one wall do."""
-    return np.asarray(
-        (np.abs(directions @ normal) < 0.05) & (np.abs(midpoints @ normal - offset) < tuning.LEAST_TOLERANCE)
-    )
-
-
-def _deviations(sums: Sequence[JointSums], pose: RigidTransform, normals: Floats) -> Floats:
-    """Return the standard deviation of a pose along a direction by each of some sums, (k,) metres; inf where free.
-
-    Of fewer than two correspondences it is inf.
-    """
-    information = np.array([one.information(pose.theta) for one in sums]).reshape(-1, 3, 3)
-    values, vectors = np.linalg.eigh(information)
-    along = np.einsum("kji,kj->ki", vectors[:, :2], normals)
-    free = values <= 1e-9 * np.maximum(1.0, values.max(axis=1, initial=0.0))[:, None]
-    square = np.where(free, 0.0, along**2 / np.where(free, 1.0, values)).sum(axis=1)
-    unknown = np.array([one.count < 2 for one in sums], dtype=bool) | (free & (np.abs(along) > 1e-3)).any(axis=1)
-    return np.where(unknown, math.inf, np.sqrt(square))

@@ -17,12 +17,10 @@ from .result import Bools, Change, Evidence, Floats
 from .scans import blocks, go_on
 from .walls import NO_SIGMA, NO_WALLS, Draft, find_cuts, runs
 
-Shown = list[tuple[Draft, Change]]
-
 
 def draft_changes(
     evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, names: Sequence[str], deadline: Deadline
-) -> tuple[Shown, Shown]:
+) -> tuple[list[Change], list[Change]]:
     """Return the changes that the evidence shows, and those of a trial.
 
     The trial takes each wall that may have moved for gone: scans searched on its map see more of the new one.
@@ -42,26 +40,27 @@ def draft_changes(
     deadline : Deadline
     """
 
-    def shown(drafts: Sequence[Draft]) -> Shown:
+    def shown(drafts: Sequence[Draft]) -> list[Draft]:
         go_on(deadline)
-        told = [(one, change_of(one, evidence, names)) for one in drafts]
-        return [(one, change) for one, change in told if change is not None]
+        return [one for one in drafts if change_of(one, evidence, names) is not None]
 
     judged = evidence.judge()
     cuts, passed = find_cuts(evidence, judged, known, sigma, deadline)
     extended, added = _new_walls(judged, known, {cut.segments[0] for cut in cuts}, sigmas, sigma, deadline)
-    added = [one for one, _ in shown(_joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline))]
+    added = shown(_joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline))
     # Nothing of a wall that moved is seen again; its faces may have no end in common.
     unread = [replace(cut, code="removed", new=NO_WALLS, sigma=NO_SIGMA) for cut in cuts if not cut.rest_read]
     whole = {cut.segments[0]: cut for cut in (*unread, *passed)}
-    gone = [one for one, _ in shown(_joined_in_map(list(whole.values()), known, tuning.NEW_JOINED, deadline))]
+    gone = shown(_joined_in_map(list(whole.values()), known, tuning.NEW_JOINED, deadline))
     moved, added = _moves(gone, added, known, deadline)
     taken = {segment for one in moved for segment in one.segments}
 
-    def changes(cuts: Iterable[Draft]) -> Shown:
+    def changes(cuts: Iterable[Draft]) -> list[Change]:
         left = [cut for cut in cuts if cut.segments[0] not in taken]
         removed = _joined_in_map([cut for cut in left if cut.code == "removed"], known, tuning.JOINED, deadline)
-        return shown([*moved, *removed, *added, *extended, *(cut for cut in left if cut.code == "shortened")])
+        shortened = [cut for cut in left if cut.code == "shortened"]
+        told = (change_of(one, evidence, names) for one in (*moved, *removed, *added, *extended, *shortened))
+        return [one for one in told if one is not None]
 
     trial = {cut.segments[0]: cut for cut in (*cuts, *passed)}
     return changes(cuts), changes(trial.values())

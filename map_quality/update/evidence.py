@@ -12,7 +12,7 @@ from registration import Segments
 
 from ..views import Steps
 from . import tuning
-from .beams import NOTHING, Chunks, Followed, follow, hanging_lines
+from .beams import NOTHING, Chunks, Followed, critical_lines, follow
 from .result import Bools, Floats, Indices
 from .scans import Localized
 
@@ -128,10 +128,6 @@ class WallEvidence:
         """Return the number of places from which the chunks of some rows are read, or passed through."""
         return len(np.unique(self.place[rows][self._shown(rows, on=on)]))
 
-    def scans_of(self, rows: Indices) -> set[int]:
-        """Return the numbers of the scans that read chunks of some rows, or passed through."""
-        return set(self.scan[rows][self.counts[rows, :2].any(axis=1)].tolist())
-
     def visits_of(self, rows: Indices, *, on: bool) -> set[int]:
         """Return the visits that show that the chunks of some rows are there, or not there."""
         visits, cells = _by_visit(self.visit[rows], np.zeros_like(rows), self.counts[rows])
@@ -217,7 +213,7 @@ class Gatherer:
         """Return the lines that a scan is no evidence for, and its beams at the map."""
         kept = self.kept.get(one.number)
         if kept is None or kept[0] is not one.result:
-            lines = hanging_lines(one, self.sigma)
+            lines = critical_lines(one)
             kept = one.result, lines, follow(chunks, one, lines, self.sigma, self.deadline, oriented=self.oriented)
             self.kept[one.number] = kept
         return kept[1], kept[2]

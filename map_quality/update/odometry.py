@@ -15,7 +15,7 @@ from registration import RigidTransform
 
 from ..views import Steps
 from . import tuning
-from .scans import Localized, mahalanobis
+from .scans import Localized
 
 
 def odometry_deviations(driven: float, turned: float) -> tuple[float, float]:
@@ -124,7 +124,7 @@ class Carrying:
         pose, covariance = self._predicted(a, b)
         other = self.found[b]
         assert other.result.covariance is not None
-        return mahalanobis(pose, other.pose, covariance + other.result.covariance)
+        return pose.chi_square(other.pose, covariance + other.result.covariance)
 
     def _predicted(self, a: int, b: int) -> tuple[RigidTransform, np.ndarray]:
         """Return the pose of a scan by that of another and odometry, with its covariance."""

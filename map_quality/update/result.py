@@ -211,31 +211,29 @@ def apply_changes(
     if len(sharpened.segments) and int(sharpened.segments.max()) >= len(known):
         told = f"found segment {int(sharpened.segments.max())}, expected indices below {len(known)}"
         raise InvalidArgumentError(told, argument="sharpened.segments")
-    new, _ = apply(with_ends(known, sharpened), changes)
+    new = apply(with_ends(known, sharpened), changes)
     if not len(new):
         told = "found no segment that is left, expected at least one; refuse a change"
         raise InvalidArgumentError(told, argument="changes")
     return new, sharper_sigma(known, sigma, sharpened)
 
 
-def apply(known: Segments, changes: Sequence[Replacement]) -> tuple[Segments, Indices]:
-    """Return the segments of a map with some changes, and which old segment each of them is, -1 for new ones.
+def apply(known: Segments, changes: Sequence[Replacement]) -> Segments:
+    """Return the segments of a map with some changes.
 
     Segments that no change names keep their order. The first new segment of a change takes the place of its first old
     one; others are appended.
     """
-    kept = {k: (ends, k) for k, ends in enumerate(known.endpoints)}
-    appended: list[tuple[Floats, int]] = []
+    kept = dict(enumerate(known.endpoints))
+    appended: list[Floats] = []
     for one in changes:
-        new = [(ends, -1) for ends in one.new]
+        new = list(one.new)
         for old in one.segments:
             kept.pop(old, None)
         if one.segments and new and one.code in ("shortened", "extended"):
             kept[one.segments[0]] = new.pop(0)
         appended += new
-    found = [*(kept[k] for k in sorted(kept)), *appended]
-    ends = np.array([ends for ends, _ in found]).reshape(-1, 4)
-    return Segments.derived(ends), np.array([k for _, k in found], dtype=np.intp)
+    return Segments.derived(np.array([*(kept[k] for k in sorted(kept)), *appended]).reshape(-1, 4))
 
 
 def with_ends(known: Segments, sharpened: Sharpened) -> Segments:

@@ -20,11 +20,11 @@ from association import (
     SoftPrior,
     associate,
 )
-from registration import Correspondences, InputError, RigidTransform, Segments, wrap_angle
+from registration import Correspondences, InputError, RigidTransform, Segments
 
 from ..scale import Matched, errors_of
 from . import tuning
-from .result import Floats, Indices, RefusedVisit
+from .result import Floats, RefusedVisit
 
 # Warnings about the ranges or the map: such a scan may be localized, and is no evidence of where walls are.
 DOUBTFUL = frozenset(("map_scale", "stuck_ranges", "scan_exceeds_map"))
@@ -212,24 +212,6 @@ def held_back(visits: Iterable[Hashable]) -> list[bool]:
     return held
 
 
-def on_map(found: Sequence[Localized], old: MapIndex, new: MapIndex, kept: Indices) -> list[Localized]:
-    """Return scans with their correspondences on a changed map; without those on walls that this does not have.
-
-    `kept` has the old segment that each segment of the new map is, below 0 for those that are new. Scans were searched
-    in either map.
-    """
-    if old is new:
-        return list(found)
-    place = {old_segment: k for k, old_segment in enumerate(kept.tolist()) if old_segment >= 0}
-    out = []
-    for one in found:
-        pairs = one.result.correspondences
-        if one.on is old.segments:
-            pairs = tuple(replace(pair, map=place[pair.map]) for pair in pairs if pair.map in place)
-        out.append(replace(one, result=replace(one.result, correspondences=pairs), on=new.segments))
-    return out
-
-
 def search(index: MapIndex, one: VisitScan, deadline: Deadline) -> AssociationResult:
     """Search a scan in a map, with the directions that count in the index.
 
@@ -249,14 +231,8 @@ def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
     if not {reason.code for reason in result.reasons} <= OF_OLD_MAPS or result.usable:
         return False
     x, y, _ = np.sqrt(np.diag(one.covariance))
-    square = mahalanobis(one.pose, result.pose, np.asarray(one.covariance) + result.covariance)
+    square = one.pose.chi_square(result.pose, one.covariance + result.covariance)
     return bool(max(x, y) <= tuning.MOST_OWN_SIGMA and square <= tuning.AGREEING)
-
-
-def mahalanobis(a: RigidTransform, b: RigidTransform, covariance: Floats) -> float:
-    """Return the squared Mahalanobis distance of two poses; chi-square of three degrees of freedom."""
-    away = np.array([b.x - a.x, b.y - a.y, wrap_angle(b.theta - a.theta)])
-    return float(away @ np.linalg.solve(covariance, away))
 
 
 def choose_evidence(

@@ -27,11 +27,9 @@ CHUNK = 0.2  # m; walls are judged in pieces of about this length
 LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are no evidence
 LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
-MOST_PASSED = 32  # walls that one beam is evidence of, the nearest; memory
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
 HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
 PLACE = 0.5  # m; scans from the same square of this side count as one pose
-HANGING = 0.1  # m; deviation without a wall above which a pose depends on that wall, and is no evidence for it
 
 # --- Decisions about a chunk ------------------------------------------------------------------------------------------
 

@@ -16,11 +16,11 @@ from registration import InvalidArgumentError, Segments
 from ..views import Steps, finished
 from . import tuning
 from .additions import candidates, unexplained
-from .beams import Chunks, sees
+from .beams import Chunks, seen_walls
 from .changes import draft_changes
 from .evidence import Gatherer, WallEvidence
 from .odometry import Carrying
-from .result import Change, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
+from .result import Bools, Change, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
 from .scans import (
     Localized,
     TimeOverError,
@@ -31,7 +31,6 @@ from .scans import (
     go_on,
     held_back,
     is_vouched,
-    on_map,
     search,
 )
 from .sharpening import sharpen
@@ -46,9 +45,8 @@ from .verifying import (
     total_score,
     usable_of,
 )
-from .walls import Draft
+from .walls import NO_WALLS
 
-Drafts = Sequence[tuple[Draft, Change]]
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
 
 
@@ -123,7 +121,7 @@ def updating(
     proposed = Proposed()
     with contextlib.suppress(TimeOverError):
         proposed = yield from begun.propose(chosen, first)
-        proposed = yield from begun.sharpen(proposed, first)
+        proposed = yield from begun.sharpen(proposed, chosen, first)
     return begun.proposal(proposed, first, refused, accept, refuse)
 
 
@@ -179,73 +177,60 @@ class _Update:
         latest = first
         shown: list[tuple[str, tuple[int, ...], int]] = []
         for number in range(tuning.ROUNDS):
-            drafts, trial, evidence = yield from self.draft(chosen)
-            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one, _ in trial)
+            changes, trial, evidence = yield from self.draft(chosen)
+            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one in trial)
             if shown == before or number == tuning.ROUNDS - 1:
                 break
             latest = yield from self.search_others(trial, first, latest)
             chosen, _ = choose_evidence(self.names, latest, self.sigma)
-        proposed = yield from self.verify(drafts, evidence, first)
-        drafted = {k for _, change in drafts for k in change.segments}
+        proposed = yield from self.verify(changes, first)
+        drafted = {k for change in changes for k in change.segments}
         changed = {k for change in proposed.changes for k in change.segments}
         return replace(proposed, kept=tuple(kept_walls(evidence, len(self.known), drafted, changed)))
 
-    def draft(self, chosen: Sequence[Localized]) -> Steps[tuple[Drafts, Drafts, WallEvidence]]:
+    def draft(self, chosen: Sequence[Localized]) -> Steps[tuple[list[Change], list[Change], WallEvidence]]:
         """Return changes, those of a trial, and the evidence about all walls of the map and possible new ones."""
         known, deadline = self.known, self.deadline
         new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
         evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
         return *draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
 
-    def verify(self, drafts: Drafts, evidence: WallEvidence, first: Sequence[Localized]) -> Steps[Proposed]:
+    def verify(self, changes: Sequence[Change], first: Sequence[Localized]) -> Steps[Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
-        found, changed = list(first), drafts
+        seen, held = self._seeing(changes, first), np.array([one.held_back for one in first], dtype=bool)
+        left, dropped, found = np.arange(len(changes)), np.arange(len(changes)), list(first)
         for _ in range(tuning.DROPS):
-            new = self._index(drafts) if drafts else None
+            kept = [changes[k] for k in left]
+            new = self._index(kept) if kept else None
             if new is None:
                 break
-            again = [saw or one.held_back for saw, one in zip(self._seeing(changed, found), found, strict=True)]
-            found = yield from self._search_again(new, found, again, found)
-            dropped = [k for k, one in enumerate(drafts) if not is_better(one[0], evidence, first, found)]
-            dropped = dropped or self._blamed(drafts, first, found)
-            if not dropped:
-                kept = drafts if keeps_usable(first, found) else []
-                return Proposed(tuple(change for _, change in kept), tuple(found) if kept else ())
-            changed = [drafts[k] for k in dropped]
-            drafts = [one for k, one in enumerate(drafts) if k not in dropped]
+            found = yield from self._search_again(new, found, seen[dropped].any(axis=0) | held, found)
+            dropped = np.array([k for k in left if not is_better(seen[k], first, found)], dtype=np.intp)
+            if not len(dropped):
+                dropped = left[blamed(seen[left][:, lost_scans(first, found)], most_lost(len(first)))]
+            if not len(dropped):
+                return Proposed(tuple(kept), tuple(found)) if keeps_usable(first, found) else Proposed()
+            left = np.setdiff1d(left, dropped)
         return Proposed()
 
-    def _blamed(self, drafts: Drafts, first: Sequence[Localized], found: Sequence[Localized]) -> list[int]:
-        """Return the changes that are seen by usable scans which fit the new map less; none if these are few."""
-        lost = lost_scans(first, found)
-        if len(lost) <= most_lost(len(first)):
-            return []
-        return blamed(np.array([self._seeing([one], lost) for one in drafts]), most_lost(len(first)))
-
-    def sharpen(self, proposed: Proposed, first: Sequence[Localized]) -> Steps[Proposed]:
-        """Estimate the walls from all scans, and search all scans on the sharper map.
+    def sharpen(self, proposed: Proposed, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
+        """Estimate the walls that no change names from all scans, and search all scans on the sharper map.
 
         Returns
         -------
         Proposed
             The same if the map is sharp enough, or if the sharper one fits the scans less.
         """
-        if self.index.sigma is None or self.index.sigma < tuning.LEAST_BLUR:
+        if self.index.sigma is None or self.index.sigma < tuning.LEAST_BLUR or not chosen:
             return proposed
-        found = proposed.found or tuple(first)
-        chosen, _ = choose_evidence(self.names, found, self.sigma)
-        if not chosen:
-            return proposed
-        segments, kept = apply(self.known, proposed.changes)
-        index = self._indexed(segments) if proposed.changes else self.index
-        better = sharpen(index, on_map(chosen, self.index, index, kept), self.sigma, self.deadline)
-        old = kept[better.segments]
-        mine = old >= 0
+        better = sharpen(self.index, chosen, self.sigma, self.deadline)
+        mine = ~np.isin(better.segments, [k for change in proposed.changes for k in change.segments])
         if not mine.any():
             return proposed
-        sharpened = Sharpened(old[mine], better.ends[mine], better.sigma[mine])
-        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes)[0])
-        again = yield from self._search_again(new, first, [True] * len(first), first)
+        sharpened = Sharpened(better.segments[mine], better.ends[mine], better.sigma[mine])
+        new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
+        found = proposed.found or tuple(first)
+        again = yield from self._search_again(new, first, np.ones(len(first), dtype=bool), first)
         if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
             return proposed
         return replace(proposed, found=tuple(again), sharpened=sharpened)
@@ -259,30 +244,34 @@ class _Update:
             raise
 
     def search_others(
-        self, drafts: Drafts, first: Sequence[Localized], latest: Sequence[Localized]
+        self, changes: Sequence[Change], first: Sequence[Localized], latest: Sequence[Localized]
     ) -> Steps[list[Localized]]:
         """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
 
         Scans that were precise at first keep that pose, which depends on no change.
         """
-        new = self._index(drafts)
+        new = self._index(changes)
         if new is None:
             return list(latest)
-        seen = self._seeing(drafts, first)
-        again = [saw and not one.precise for saw, one in zip(seen, first, strict=True)]
+        again = self._seeing(changes, first).any(axis=0) & [not one.precise for one in first]
         found = yield from self._search_again(new, first, again, latest)
         yield from Carrying(new, found, self.deadline).carry()
         return found
 
-    def _seeing(self, drafts: Drafts, found: Sequence[Localized]) -> list[bool]:
-        """Return which scans see walls that changes take away, or that they bring."""
-        old = sorted({k for _, change in drafts for k in change.segments})
-        ends = [self.known.endpoints[old], *(change.new for _, change in drafts)]
-        changed = Chunks.of(Segments.derived(np.concatenate(ends)))
-        return [sees(changed, one, self.sigma, self.deadline) for one in found]
+    def _seeing(self, changes: Sequence[Change], found: Sequence[Localized]) -> Bools:
+        """Return which scans see walls that each change takes away, or that it brings, (changes, scans)."""
+        ends = [np.concatenate([self.known.endpoints[list(one.segments)], one.new]) for one in changes]
+        owner = np.repeat(np.arange(len(changes)), [len(one) for one in ends])
+        chunks, out = (
+            Chunks.of(Segments.derived(np.concatenate([NO_WALLS, *ends]))),
+            np.zeros((len(changes), len(found)), dtype=bool),
+        )
+        for k, one in enumerate(found):
+            out[owner[seen_walls(chunks, one, self.sigma, self.deadline)], k] = True
+        return out
 
     def _search_again(
-        self, index: MapIndex, found: Sequence[Localized], again: Sequence[bool], others: Sequence[Localized]
+        self, index: MapIndex, found: Sequence[Localized], again: Bools, others: Sequence[Localized]
     ) -> Steps[list[Localized]]:
         """Search some of the scans in another map, unless that is the map of their last search; return all."""
         out = list(others)
@@ -297,9 +286,9 @@ class _Update:
         go_on(self.deadline)
         return out
 
-    def _index(self, drafts: Drafts) -> MapIndex | None:
+    def _index(self, changes: Sequence[Change]) -> MapIndex | None:
         """Return the index of the map with some changes; None if nothing of it is left."""
-        segments, _ = apply(self.known, [change for _, change in drafts])
+        segments = apply(self.known, changes)
         return self._indexed(segments) if len(segments) else None
 
     def proposal(

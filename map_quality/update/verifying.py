@@ -7,13 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import tuning
 from .evidence import WallEvidence
-from .result import NOT_SHARPENED, Change, KeptCode, KeptWalls, Sharpened, Usable
+from .result import NOT_SHARPENED, Bools, Change, KeptCode, KeptWalls, Sharpened, Usable
 from .scans import Localized
-from .walls import Draft
 
 KEPT: dict[KeptCode, str] = {
     "still_seen": "beams pass through a part of the wall, and beams of a visit end on a part of it",
@@ -46,12 +44,12 @@ def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
     return sum(one.score for one, before in zip(found, of, strict=True) if before.located)
 
 
-def is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether a change leaves the poses of the scans that saw it, and does not lower their score."""
-    concerned = evidence.scans_of(evidence.rows_of(draft.chunks))
+def is_better(saw: Bools, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether a change leaves the poses of the scans that saw it, (n,), and does not lower their score."""
     gain = 0.0
-    for before, after in zip(first, found, strict=True):
-        if before.number not in concerned or not before.located:
+    for k in np.flatnonzero(saw).tolist():
+        before, after = first[k], found[k]
+        if not before.located:
             continue
         gain += after.score - before.score
         if after.located and math.hypot(after.pose.x - before.pose.x, after.pose.y - before.pose.y) > tuning.SAME_POSE:
@@ -59,22 +57,16 @@ def is_better(draft: Draft, evidence: WallEvidence, first: Sequence[Localized], 
     return gain >= -tuning.LOWER_SCORE
 
 
-def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether hardly any usable scan fits the new map less, and may not be used there.
+def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> Bools:
+    """Return which scans were usable, and now fit the new map less and may not be used there, (n,).
 
     A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
     its room looks like others.
     """
-    return len(lost_scans(first, found)) <= most_lost(len(first))
-
-
-def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> list[Localized]:
-    """Return the usable scans, as they were located before, that fit the new map less and may not be used there."""
-    return [
-        before
-        for before, after in zip(first, found, strict=True)
-        if before.usable and not after.usable and after.score < before.score - tuning.LOWER_SCORE
-    ]
+    both = zip(first, found, strict=True)
+    return np.array(
+        [one.usable and not new.usable and new.score < one.score - tuning.LOWER_SCORE for one, new in both], dtype=bool
+    )
 
 
 def most_lost(count: int) -> float:
@@ -82,7 +74,12 @@ def most_lost(count: int) -> float:
     return max(1.0, tuning.FEWER_USABLE * count)
 
 
-def blamed(seen: NDArray[np.bool_], most: float) -> list[int]:
+def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether a proposal loses hardly any scan."""
+    return bool(lost_scans(first, found).sum() <= most_lost(len(first)))
+
+
+def blamed(seen: Bools, most: float) -> list[int]:
     """Return changes without which few of the lost scans are left; the one that most of them see comes first.
 
     Parameters

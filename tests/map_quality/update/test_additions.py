@@ -34,7 +34,7 @@ def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
     counts = np.stack([9 * ~on[chunk], 9 * on[chunk], 0 * chunk], axis=1)
     evidence = WallEvidence(chunks, chunk, scan, scan % 2, scan % 3, counts)
     drafts, _ = draft_changes(evidence, MAP, sigmas, 0.005, ["monday", "tuesday"], Deadline())
-    return np.concatenate([one.new for one, _ in drafts if one.code == "added"])
+    return np.concatenate([one.new for one in drafts if one.code == "added"])
 
 
 @pytest.mark.parametrize("across", [0.18, -0.18])
@@ -73,6 +73,6 @@ def test_single_beams_do_not_remove_a_wall_whose_rest_nothing_reads() -> None:
     counts[:, 0] = [9] * len(many) + [1] * len(single)
     evidence = WallEvidence(chunks, np.concatenate([many, single]), scan, scan % 2, scan % 3, counts)
     drafts, _ = draft_changes(evidence, MAP, np.zeros(0), 0.005, ["monday", "tuesday"], Deadline())
-    ((draft, _),) = drafts
+    (draft,) = drafts
     assert draft.code == "shortened"
     assert draft.new == pytest.approx(np.array([[50.0, 50.0, 52.0, 50.0], [55.6, 50.0, 60.0, 50.0]]))

@@ -12,7 +12,6 @@ import map_quality
 from association import MapIndex
 from map_quality import Change, Evidence, MapUpdate, VisitScan, apply_changes
 from map_quality.update.evidence import are_enough
-from map_quality.update.result import apply
 from registration import Segments
 
 from .hall import OUTLINE, PILLAR, RACK, SCANNER, box, segments, visit
@@ -195,7 +194,6 @@ def test_changes_are_applied_in_the_order_of_the_segments() -> None:
     applied, sigma = apply_changes(old, 0.02, changes)
     assert applied.endpoints.tolist() == np.array(expected).tolist()
     assert sigma == 0.02
-    assert apply(old, changes)[1].tolist() == [0, -1, 2, 4, -1, -1]
 
 
 def partition(x: float) -> list[list[float]]:

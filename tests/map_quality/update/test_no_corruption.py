@@ -15,7 +15,7 @@ from association import CancelledError, Deadline, MapIndex, mirrored
 from linefix import LaserScan, scan_of
 from map_quality import UpdateError, VisitScan
 from map_quality.scale import Matched, errors_of
-from map_quality.update.beams import hanging_lines, on_lines
+from map_quality.update.beams import critical_lines, on_lines
 from map_quality.update.scans import Localized, held_back, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner, scan
@@ -127,7 +127,7 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     assert result.pose is not None
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
     localized = Localized(0, 0, one, result, corridor, False)
-    assert on_lines(corridor, hanging_lines(localized, 0.01)).tolist() == [False, True, False]
+    assert on_lines(corridor, critical_lines(localized)).tolist() == [False, True, False]
 
 
 FEW_USABLE = pytest.mark.xfail(strict=True, reason="1 to 3 scans are usable, not 4")

@@ -15,7 +15,6 @@ from map_quality.update.odometry import Carrying
 from map_quality.update.result import Change, Evidence
 from map_quality.update.scans import Localized, search
 from map_quality.update.update import _Update
-from map_quality.update.walls import Draft
 from registration import RigidTransform, Segments
 
 from .rooms import FIRST, IN_HALL, SECOND, drive, places_in, rooms, with_odometry
@@ -117,10 +116,9 @@ def test_poses_are_carried_from_scans_that_changes_make_usable() -> None:
     """The map does not have the outline of the hall; a change adds it. Before, one of the rooms' scans is usable."""
     old, new = Segments.derived(TODAY.endpoints[12:]), TODAY.endpoints[:12]
     begun = _Update.of(MapIndex.build(old, 0.005), days([*IN_HALL, *places_in(SECOND)]), Deadline())
-    first, none = finished(begun.localize()), np.zeros(0, dtype=np.intp)
+    first = finished(begun.localize())
     added = Change("added", (), new, np.full(12, 0.005), Evidence(0, 99, 9, 3, "day 0", "day 2"), 0.99)
-    draft = Draft(added.code, (), new, added.sigma, none, none)
-    found = finished(begun.search_others([(draft, added)], first, first))
+    found = finished(begun.search_others([added], first, first))
     rooms_first, rooms_then = ([one.located for one in some if one.number % 10 > 4] for some in (first, found))
     assert sum(rooms_first) <= 1
     assert sum(rooms_then) >= 12
