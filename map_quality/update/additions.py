@@ -133,16 +133,12 @@ def _along(endpoints: Floats, directions: Floats) -> Bools:
     for points in (endpoints[:, :2], endpoints[:, 2:]):
         mine &= np.abs(points @ normal - offset) <= tuning.SAME_LINE
     begins, ends = endpoints[:, :2] @ direction, endpoints[:, 2:] @ direction
-    low, high = begins[0], ends[0]
-    inside = mine & (begins <= high + tuning.SAME_GAP) & (ends >= low - tuning.SAME_GAP)
-    inside[0] = True
-    for _ in range(8):
-        low, high = begins[inside].min(), ends[inside].max()
-        more = mine & (begins <= high + tuning.SAME_GAP) & (ends >= low - tuning.SAME_GAP)
-        if (more == inside).all():
-            break
-        inside = more | inside
-    return np.asarray(inside)
+    order = np.flatnonzero(mine)
+    order = order[np.argsort(begins[order], kind="stable")]
+    apart = begins[order[1:]] > np.maximum.accumulate(ends[order])[:-1] + tuning.SAME_GAP
+    piece = np.cumsum(np.append(0, apart))
+    mine[order] = piece == piece[order == 0]
+    return np.asarray(mine)
 
 
 def _pieces(group: SeenLines, known: Segments, deadline: Deadline) -> list[tuple[Floats, float]]:

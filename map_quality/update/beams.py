@@ -73,7 +73,7 @@ class Followed:
     chunks : (k,)
         That beams meet, in order.
     counts : (k, 3)
-        Number of beams that pass through each, that end on it, and that end a little before it.
+        Number of beams that pass through each, that end on it, and that end on another wall or back next to it.
     """
 
     chunks: Indices
@@ -117,7 +117,7 @@ def follow(
 def _met(
     walls: Segments, one: Localized, seen: tuple[Floats, Floats, Floats], sigma: float, *, oriented: bool
 ) -> tuple[Indices, Floats, Bools]:
-    """Return the walls that beams meet, where along them (m), and whether a beam passes, ends on, or ends before.
+    """Return the walls that beams meet, where along them (m), and whether a beam passes, ends on it, or ends near it.
 
     A beam ends on the wall that is nearest to its end. Flat beams that end on a wall next to a corner also end near the
     other wall of the corner, or where it stood: of that they show nothing.
@@ -131,7 +131,7 @@ def _met(
     beams, columns, slant = beams[met], columns[met], slant[met]
     distance = ahead[met] / slant
     gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
-    kept = gap >= -np.maximum(tuning.HIDDEN, tolerance)
+    kept = gap >= -tolerance
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
     directions, lengths = walls.directions[columns], walls.lengths[columns]
@@ -146,8 +146,7 @@ def _met(
     nearest = np.full(len(ranges), np.inf)
     np.minimum.at(nearest, beams[ended], np.abs(gap[ended]))
     ended &= np.abs(gap) <= nearest[beams]
-    hidden = (gap >= -tuning.HIDDEN) & (gap <= np.where(np.isinf(nearest[beams]), tolerance, 0.0)) & ~ended
-    return columns, along, np.stack([passed, ended, hidden], axis=1)
+    return columns, along, np.stack([passed, ended, (np.abs(gap) <= tolerance) & ~ended], axis=1)
 
 
 def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, Indices]:
@@ -162,7 +161,7 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
 
 
 def seen_walls(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> Indices:
-    """Return the walls that beams of a scan end on, or a little before, or pass through.
+    """Return the walls that beams of a scan end on or near, or pass through.
 
     All where the pose of the scan is not known: it may be anywhere.
     """
@@ -205,14 +204,14 @@ def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
     return np.maximum(tuning.LEAST_TOLERANCE, tuning.DEVIATIONS * deviation)
 
 
-def critical_lines(one: Localized) -> Floats:
+def critical_lines(one: Localized, known: Segments) -> Floats:
     """Return the lines of the wall without which the pose of a scan would move or be free: normal and offset, (k, 3).
 
-    They are of the segments of the map that are pieces of this wall; none where the pose depends on no single wall.
+    They are of the segments of the map, `known`, that are pieces of this wall; none where the pose depends on no wall.
     """
     diagnostics = one.result.diagnostics
     wall = None if diagnostics is None else diagnostics.critical_wall
-    on = one.on.take(np.array(() if wall is None else wall.map, dtype=np.intp))
+    on = known.take(np.array(() if wall is None else wall.map, dtype=np.intp))
     return np.column_stack([on.normals, on.offsets])
 
 

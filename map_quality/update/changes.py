@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +20,8 @@ from .walls import NO_SIGMA, NO_WALLS, Draft, find_cuts, runs
 
 def draft_changes(
     evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, names: Sequence[str], deadline: Deadline
-) -> tuple[list[Change], list[Change]]:
-    """Return the changes that the evidence shows, and those of a trial.
-
-    The trial takes each wall that may have moved for gone: scans searched on its map see more of the new one.
+) -> list[Change]:
+    """Return the changes that the evidence shows.
 
     Parameters
     ----------
@@ -47,23 +45,19 @@ def draft_changes(
     judged = evidence.judge()
     cuts, passed = find_cuts(evidence, judged, known, sigma, deadline)
     extended, added = _new_walls(judged, known, {cut.segments[0] for cut in cuts}, sigmas, sigma, deadline)
-    added = shown(_joined(added, [one.new for one in added], tuning.NEW_JOINED, deadline))
+    added = shown(_joined(added, known, deadline))
     # Nothing of a wall that moved is seen again; its faces may have no end in common.
     unread = [replace(cut, code="removed", new=NO_WALLS, sigma=NO_SIGMA) for cut in cuts if not cut.rest_read]
     whole = {cut.segments[0]: cut for cut in (*unread, *passed)}
-    gone = shown(_joined_in_map(list(whole.values()), known, tuning.NEW_JOINED, deadline))
+    gone = shown(_joined([whole[wall] for wall in sorted(whole)], known, deadline))
     moved, added = _moves(gone, added, known, deadline)
     taken = {segment for one in moved for segment in one.segments}
 
-    def changes(cuts: Iterable[Draft]) -> list[Change]:
-        left = [cut for cut in cuts if cut.segments[0] not in taken]
-        removed = _joined_in_map([cut for cut in left if cut.code == "removed"], known, tuning.JOINED, deadline)
-        shortened = [cut for cut in left if cut.code == "shortened"]
-        told = (change_of(one, evidence, names) for one in (*moved, *removed, *added, *extended, *shortened))
-        return [one for one in told if one is not None]
-
-    trial = {cut.segments[0]: cut for cut in (*cuts, *passed)}
-    return changes(cuts), changes(trial.values())
+    left = [cut for cut in cuts if cut.segments[0] not in taken]
+    removed = _joined([cut for cut in left if cut.code == "removed"], known, deadline)
+    shortened = [cut for cut in left if cut.code == "shortened"]
+    told = (change_of(one, evidence, names) for one in (*moved, *removed, *added, *extended, *shortened))
+    return [one for one in told if one is not None]
 
 
 def _new_walls(
@@ -160,18 +154,15 @@ def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Float
     return np.concatenate([place + min(reach) * along, place + max(reach) * along])
 
 
-def _joined_in_map(drafts: Sequence[Draft], known: Segments, gap: float, deadline: Deadline) -> list[Draft]:
-    return _joined(drafts, [known.endpoints[list(one.segments)] for one in drafts], gap, deadline)
-
-
-def _joined(drafts: Sequence[Draft], ends: Sequence[Floats], gap: float, deadline: Deadline) -> list[Draft]:
-    """Join changes of walls whose ends are near one another: they are one thing."""
+def _joined(drafts: Sequence[Draft], known: Segments, deadline: Deadline) -> list[Draft]:
+    """Join changes of walls, old or new, whose ends are near one another: they are one thing."""
+    ends = [np.concatenate([known.endpoints[list(one.segments)], one.new]) for one in drafts]
     label = np.arange(len(drafts))
     corners = np.concatenate([NO_WALLS, *ends]).reshape(-1, 2)
     owner = np.repeat(label, [2 * len(one) for one in ends])
     for corner, own in zip(corners, owner, strict=True):
         go_on(deadline)
-        near = label[owner[np.hypot(*(corners - corner).T) <= gap]]
+        near = label[owner[np.hypot(*(corners - corner).T) <= tuning.JOINED]]
         label[np.isin(label, near)] = label[own]
     joined: dict[int, Draft] = {}
     for one, of in zip(drafts, label.tolist(), strict=True):
@@ -203,25 +194,22 @@ def _fits(new: Floats, old: Floats) -> bool:
 
     An obstacle before a side hides all of it, or a part: it never seems longer.
     """
-    free, longest = sorted(old.tolist()), float(new.max())
-    sides = new[new >= min(tuning.LONGEST_STUB, longest)]
-    for length in sorted(sides.tolist(), reverse=True):
+    sides, free = (sorted(one[one >= min(tuning.LONGEST_STUB, one.max())].tolist()) for one in (new, old))
+    for length in sides[::-1]:
         same = max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length)
         best = min(free, key=lambda one: abs(one - length), default=0.0)
-        if length - best > same or (length == longest and best - length > same):
+        if length - best > same or (length == sides[-1] and best - length > same):
             return False
         free.remove(best)
     return True
 
 
 def change_of(draft: Draft, evidence: WallEvidence, names: Sequence[str]) -> Change | None:
-    """Return a change with its evidence; None if too little shows it, or too much contradicts it."""
+    """Return a change with its evidence; None if too little shows it."""
     gone, there = evidence.rows_of(draft.gone), evidence.rows_of(draft.there)
     through, contra, _ = evidence.counts[gone].sum(axis=0).tolist()
     passed, on, _ = evidence.counts[there].sum(axis=0).tolist()
     against = contra + passed
-    if against > tuning.CONTRADICTING * (through + on + against):
-        return None
     sides = [(rows, is_on) for rows, is_on in ((gone, False), (there, True)) if len(rows)]
     visits = sorted({visit for rows, is_on in sides for visit in evidence.visits_of(rows, on=is_on)})
     poses = [evidence.places_of(rows, on=is_on) for rows, is_on in sides]

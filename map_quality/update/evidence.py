@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from association import AssociationResult, Deadline
+from association import Deadline
 from registration import Segments
 
 from ..views import Steps
 from . import tuning
-from .beams import NOTHING, Chunks, Followed, critical_lines, follow
-from .result import Bools, Floats, Indices
+from .beams import NOTHING, Chunks, critical_lines, follow
+from .result import Bools, Indices
 from .scans import Localized
 
 
@@ -50,16 +50,14 @@ class WallEvidence:
     chunks : Chunks
     chunk : (r,)
         Ascending.
-    scan, visit, place : (r,)
-        Number of the scan, of its visit, and of the square of 0.5 m that it was taken in.
+    visit, place : (r,)
+        Number of the visit of the scan, and of the square of 0.5 m that it was taken in.
     counts : (r, 3)
-        Beams that pass through the chunk, that end on it, and that end a little before it, so that it may be there
-        and hidden.
+        Beams that pass through the chunk, that end on it, and that end near it, so that it may be there and hidden.
     """
 
     chunks: Chunks
     chunk: Indices
-    scan: Indices
     visit: Indices
     place: Indices
     counts: Indices
@@ -68,13 +66,11 @@ class WallEvidence:
         """Decide about each chunk."""
         seen, at = np.unique(self.chunk, return_inverse=True)
         chunk, cells = _by_visit(at, self.visit, self.counts)
-        through, on, before = cells.T
-        total, read, hidden = np.zeros((len(seen), 3), dtype=np.intp), *np.zeros((2, len(seen)), dtype=bool)
+        total, read = np.zeros((len(seen), 3), dtype=np.intp), np.zeros(len(seen), dtype=bool)
         np.add.at(total, chunk, cells)
-        np.logical_or.at(read, chunk, on >= tuning.LEAST_BEAMS)
-        np.logical_or.at(hidden, chunk, shows(on + before, through))
-        passed, ended = total[:, 0], total[:, 1]
-        is_open = (passed >= tuning.LEAST_BEAMS) & (ended <= tuning.FEW * (passed + ended)) & ~hidden
+        np.logical_or.at(read, chunk, cells[:, 1] >= tuning.LEAST_BEAMS)
+        passed, ended, _ = total.T
+        is_open = (passed >= tuning.LEAST_BEAMS) & (ended <= tuning.FEW * (passed + ended))
         rows, near = self._spread(seen, at)
         gone, there = (self._decided(total, rows, near, on=is_on) for is_on in (False, True))
         flags = np.zeros((4, len(self.chunks)), dtype=bool)
@@ -159,61 +155,33 @@ def shows(agree: Indices, against: Indices) -> Bools:
     return np.asarray((agree >= tuning.LEAST_BEAMS) & (agree >= tuning.MOST * (agree + against)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Gatherer:
-    """Follows the beams of scans through the walls of a map, once for each pose.
+def gather(
+    walls: Segments, found: Sequence[Localized], sigma: float, deadline: Deadline, *, oriented: bool
+) -> Steps[WallEvidence]:
+    """Follow the beams of localized scans through walls, one scan at a step, and return the evidence.
 
-    Attributes
+    Parameters
     ----------
-    known : Segments
-        The map, metres in the map frame.
+    walls : Segments
+        Of the map, and those that may be there; metres in the map frame.
+    found : sequence of Localized
+        Scans that give evidence.
     sigma : float
         Standard deviation of the walls, metres.
+    deadline : Deadline
     oriented : bool
         True if a wall is seen from its left only.
-    deadline : Deadline
-    kept : dict of int to (AssociationResult, Floats, Followed)
-        By the number of a scan: its answer, the lines that it is no evidence for, and its beams at the map.
     """
-
-    known: Segments
-    sigma: float
-    oriented: bool
-    deadline: Deadline
-    kept: dict[int, tuple[AssociationResult, Floats, Followed]] = field(default_factory=dict)
-
-    def gather(self, new: Segments, found: Sequence[Localized]) -> Steps[WallEvidence]:
-        """Follow the beams of localized scans, one scan at a step, and return the evidence.
-
-        Parameters
-        ----------
-        new : Segments
-            Walls that may be there; the evidence has them behind those of the map.
-        found : sequence of Localized
-            Scans that give evidence.
-        """
-        at_map, at_new = Chunks.of(self.known), Chunks.of(new)
-        places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
-        chunk, counts, of_scan = [NOTHING], [np.zeros((0, 3), dtype=np.intp)], [np.zeros((0, 3), dtype=np.intp)]
-        for one in found:
-            lines, seen = self._at_map(at_map, one)
-            beyond = follow(at_new, one, lines, self.sigma, self.deadline, oriented=self.oriented)
-            chunk += [seen.chunks, beyond.chunks + len(at_map)]
-            counts += [seen.counts, beyond.counts]
-            numbers = one.number, one.visit, places[one.place]
-            of_scan.append(np.tile(numbers, (len(seen.chunks) + len(beyond.chunks), 1)))
-            yield
-        chunks = Chunks.of(Segments.derived(np.concatenate([self.known.endpoints, new.endpoints])))
-        met = np.concatenate(chunk)
-        order = np.argsort(met, kind="stable")
-        scan, visit, place = np.concatenate(of_scan)[order].T
-        return WallEvidence(chunks, met[order], scan, visit, place, np.concatenate(counts)[order])
-
-    def _at_map(self, chunks: Chunks, one: Localized) -> tuple[Floats, Followed]:
-        """Return the lines that a scan is no evidence for, and its beams at the map."""
-        kept = self.kept.get(one.number)
-        if kept is None or kept[0] is not one.result:
-            lines = critical_lines(one)
-            kept = one.result, lines, follow(chunks, one, lines, self.sigma, self.deadline, oriented=self.oriented)
-            self.kept[one.number] = kept
-        return kept[1], kept[2]
+    chunks = Chunks.of(walls)
+    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
+    chunk, counts, of_scan = [NOTHING], [np.zeros((0, 3), dtype=np.intp)], [np.zeros((0, 2), dtype=np.intp)]
+    for one in found:
+        seen = follow(chunks, one, critical_lines(one, walls), sigma, deadline, oriented=oriented)
+        chunk.append(seen.chunks)
+        counts.append(seen.counts)
+        of_scan.append(np.tile((one.visit, places[one.place]), (len(seen.chunks), 1)))
+        yield
+    met = np.concatenate(chunk)
+    order = np.argsort(met, kind="stable")
+    visit, place = np.concatenate(of_scan)[order].T
+    return WallEvidence(chunks, met[order], visit, place, np.concatenate(counts)[order])

@@ -111,15 +111,11 @@ class Localized:
 
     Attributes
     ----------
-    number : int
-        Of the scan, in the order in which they came.
     visit : int
         Number of its visit.
     sent : VisitScan
         With the pose that odometry carries to it, if any.
     result : AssociationResult
-    on : Segments
-        The map that it was searched in; the result's correspondences name its segments.
     held_back : bool
         True if it gives no evidence, and tests the new map.
     vouched : bool
@@ -128,11 +124,9 @@ class Localized:
         True if other usable scans of the visit contradict its pose by odometry.
     """
 
-    number: int
     visit: int
     sent: VisitScan
     result: AssociationResult
-    on: Segments
     held_back: bool
     vouched: bool = False
     contradicted: bool = False
@@ -141,7 +135,7 @@ class Localized:
         """Return it with the answer of a search in another map, or with another pose of the sender."""
         sent = sent or self.sent
         result = search(index, sent, deadline)
-        return replace(self, sent=sent, result=result, on=index.segments, vouched=is_vouched(sent, result))
+        return replace(self, sent=sent, result=result, vouched=is_vouched(sent, result))
 
     @property
     def scan(self) -> Scan:
@@ -183,11 +177,10 @@ class Localized:
         """The square that it was taken in."""
         return math.floor(self.pose.x / tuning.PLACE), math.floor(self.pose.y / tuning.PLACE)
 
-    @property
-    def pairs(self) -> Correspondences:
-        """The correspondences, by scan segment."""
+    def pairs(self, segments: Segments) -> Correspondences:
+        """Return the correspondences, by scan segment, with the segments of the map that it was searched in."""
         pairs = [(one.scan, one.map) for one in self.result.correspondences]
-        return Correspondences.of(self.on, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
+        return Correspondences.of(segments, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
 
 
 def by_content(scans: Iterable[VisitScan]) -> list[VisitScan]:
@@ -236,7 +229,7 @@ def is_vouched(one: VisitScan, result: AssociationResult) -> bool:
 
 
 def choose_evidence(
-    names: Sequence[str], found: Sequence[Localized], sigma: float
+    names: Sequence[str], found: Sequence[Localized], known: Segments, sigma: float
 ) -> tuple[list[Localized], list[RefusedVisit]]:
     """Return the scans that give evidence, and the visits that give none.
 
@@ -246,15 +239,16 @@ def choose_evidence(
     refused: dict[int, RefusedVisit] = {}
     for number, name in enumerate(names):
         own = [one for one in found if one.visit == number]
-        told = _doubt(own, [one for one in own if one.precise], sigma)
+        told = _doubt(own, known, sigma)
         if told is not None:
             refused[number] = RefusedVisit(name, told)
     chosen = [one for one in found if one.precise and not one.held_back and one.visit not in refused]
     return chosen, list(refused.values())
 
 
-def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float) -> str | None:
+def _doubt(own: Sequence[Localized], known: Segments, sigma: float) -> str | None:
     """Return why a visit gives no evidence; None if it does."""
+    precise = [one for one in own if one.precise]
     sure = sum(one.usable for one in precise)
     least = max(tuning.LEAST_SCANS, math.ceil(tuning.LEAST_USABLE * len(own)))
     if sure < least:
@@ -262,7 +256,7 @@ def _doubt(own: Sequence[Localized], precise: Sequence[Localized], sigma: float)
             f"{sure} of {len(own)} scans are usable and precise, expected at least {least}. Check that the scans are "
             "from this building, and that the map shows the places where they were taken."
         )
-    matched = [Matched(one.scan, one.pose, one.pairs) for one in precise]
+    matched = [Matched(one.scan, one.pose, one.pairs(known)) for one in precise]
     errors = errors_of(matched, sigma)
     if errors.scale_deviation > tuning.SURE_OF_SCALE:
         return (

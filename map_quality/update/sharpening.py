@@ -48,10 +48,6 @@ class _Pairs:
     residual: Floats
     variance: Floats
 
-    def take(self, rows: Bools) -> _Pairs:
-        """Return some of the rows."""
-        return _Pairs(*(getattr(self, name)[rows] for name in self.__slots__))
-
 
 def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline: Deadline) -> Sharpened:
     """Estimate the position of the walls that many scans see.
@@ -82,14 +78,10 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline:
     pairs = _pairs_of(known, wall_of, middles, found)
     prior = np.stack([np.full(len(walls), sigma), np.minimum(tuning.MOST_TILT, 2.0 * sigma / lengths)], axis=1)
     shift, covariance = _solve(pairs, prior, deadline)
-    off = np.abs(pairs.residual - np.einsum("ij,ij->i", pairs.of_wall, shift[pairs.wall]))
-    inliers = off <= tuning.OUTLYING * np.sqrt(pairs.variance + sigma**2)
-    shift, covariance = _solve(pairs.take(inliers), prior, deadline)
     spread = _deviations(own, number, middles, covariance)
     widest = np.zeros(len(walls))
     np.maximum.at(widest, number, spread)
     better = _seen_often(pairs, found, len(walls)) & (widest <= tuning.SHARPER * sigma)
-    better &= np.abs(shift[:, 0]) <= tuning.OUTLYING * sigma
     mine = np.flatnonzero(better[number])
     moved, ends = pieces[mine], known.endpoints.copy()
     ends[moved] = _moved(own, number, middles, shift)[mine]
@@ -112,7 +104,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
     """Return the rows of all pairs, those of offsets before those of angles in each scan."""
     parts: list[_Pairs] = []
     for number, one in enumerate(found):
-        pairs = one.pairs
+        pairs = one.pairs(known)
         on = np.array([pair.map for pair in one.result.correspondences], dtype=np.intp)
         wall, normals = wall_of[on], known.normals[on]
         c, s = np.cos(one.pose.theta), np.sin(one.pose.theta)

@@ -28,7 +28,6 @@ LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are
 LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it
-HIDDEN = 0.3  # m; what a beam shows that ends no farther before a wall may hide it
 PLACE = 0.5  # m; scans from the same square of this side count as one pose
 
 # --- Decisions about a chunk ------------------------------------------------------------------------------------------
@@ -37,7 +36,6 @@ LEAST_BEAMS = 3  # of a visit
 FEW, MOST = 0.1, 0.7  # fractions of a visit's beams: those that contradict it, those that agree
 LEAST_VISITS, LEAST_POSES = 2, 3
 ENOUGH_VISITS = 3  # that agree, where they have seen it from fewer poses
-CONTRADICTING = 0.1  # fraction of all beams on a change, drawn
 
 # --- Changes ----------------------------------------------------------------------------------------------------------
 
@@ -62,7 +60,7 @@ FULLY_ON_MAP = 0.85  # fraction of a scan line's length
 LONGEST_LEAF = 1.5  # m; of a door, and its width where it is a double door
 JAMB = 0.25  # m; between a leaf and the end of a wall that it is fixed to, or shuts against
 DOOR_VISITS = 4  # that show a wall which may be a leaf; on fewer a door may happen to stand alike
-JOINED, NEW_JOINED = 0.05, 0.2  # m; ends of walls that are one thing: in the map, and of new walls
+JOINED = 0.2  # m; ends of walls that are one thing
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
 SAME_LENGTH, SAME_FRACTION = 0.15, 0.05  # m, and fraction; by which a side of a moved thing may differ
 
@@ -74,7 +72,6 @@ LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one sc
 MOST_POSES = 1000  # of scans that are estimated with the walls; memory and time
 MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
 FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
-OUTLYING = 4.0  # times the deviation; a line of a scan farther off its wall does not count
 CORNER, CORNER_SINE = 0.02, 0.35  # m, and sine of the angle; ends of two walls that are one corner
 
 # --- Confidence, and the check of the proposal ------------------------------------------------------------------------
@@ -85,4 +82,3 @@ LOWER_SCORE = 1.0  # nats; a change may lower the score of its scans by no more
 SAME_POSE = 0.3  # m; between the poses of one scan on the old and the new map
 FEWER_USABLE = 0.01  # fraction of the scans; a proposal that loses more is withdrawn
 DROPS = 3  # times that changes are dropped and the rest is verified again
-ROUNDS = 4  # scans that are usable on the new map only give more evidence

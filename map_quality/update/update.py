@@ -6,7 +6,7 @@ import contextlib
 import math
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from . import tuning
 from .additions import candidates, unexplained
 from .beams import Chunks, seen_walls
 from .changes import draft_changes
-from .evidence import Gatherer, WallEvidence
+from .evidence import gather
 from .odometry import Carrying
 from .result import Bools, Change, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
 from .scans import (
@@ -36,13 +36,9 @@ from .scans import (
 from .sharpening import sharpen
 from .verifying import (
     Proposed,
-    blamed,
     is_better,
     keeps_usable,
     kept_walls,
-    lost_scans,
-    most_lost,
-    total_score,
     usable_of,
 )
 from .walls import NO_WALLS
@@ -64,8 +60,8 @@ def update(
     2. Suggest: join lines of scans that the map does not show to walls that may be new.
     3. Gather: follow all beams through old and new walls; count those that end on each chunk, or pass through.
     4. Decide: two visits and three places agree, or three visits; no visit contradicts.
-    5. Verify: search the scans that see a change in the new map. A change that lowers the score of its scans, or that
-       scans see which are no longer usable, is dropped.
+    5. Verify: search the scans that see a change in the new map. A change that lowers the score of its scans, or moves
+       their poses, is dropped. If 1 % of the scans fit less and are no longer usable, nothing is proposed.
     6. Sharpen: estimate the walls of a map that declares 8 mm or more from all scans, and verify again.
 
     Parameters
@@ -117,7 +113,7 @@ def updating(
         raise InvalidArgumentError(f"found {accept!r}, expected a confidence from 0 to 1", argument="accept")
     begun = _Update.of(index, scans, deadline or Deadline())
     first = yield from begun.localize()
-    chosen, refused = choose_evidence(begun.names, first, begun.sigma)
+    chosen, refused = choose_evidence(begun.names, first, begun.known, begun.sigma)
     proposed = Proposed()
     with contextlib.suppress(TimeOverError):
         proposed = yield from begun.propose(chosen, first)
@@ -130,11 +126,11 @@ class _Update:
     """An update in the making; its steps raise TimeOverError when the deadline passes."""
 
     index: MapIndex
+    known: Segments  # the map as sent
+    sigma: float  # of its walls, metres
     scans: list[VisitScan]
     names: list[str]  # of the visits, in the order in which they came
     deadline: Deadline
-    gatherer: Gatherer
-    latest: dict[int, Localized] = field(default_factory=dict)  # by the number of a scan: its last search
 
     @classmethod
     def of(cls, index: MapIndex, scans: Sequence[VisitScan], deadline: Deadline) -> _Update:
@@ -143,17 +139,7 @@ class _Update:
         sigma = tuning.USUAL_SIGMA if index.sigma is None else index.sigma
         names = list(dict.fromkeys(one.visit for one in scans))
         # The proposal must not depend on the order of the visits.
-        return cls(index, by_content(scans), names, deadline, Gatherer(known, sigma, index.oriented, deadline))
-
-    @property
-    def known(self) -> Segments:
-        """The map as sent."""
-        return self.gatherer.known
-
-    @property
-    def sigma(self) -> float:
-        """Of its walls, metres."""
-        return self.gatherer.sigma
+        return cls(index, known, sigma, by_content(scans), names, deadline)
 
     def localize(self) -> Steps[list[Localized]]:
         """Search all scans that there is time for: each alone, and those that are not usable by odometry."""
@@ -167,50 +153,38 @@ class _Update:
                 break
             visit, result = self.names.index(one.visit), search(self.index, one, self.deadline)
             vouched = is_vouched(one, result)
-            found.append(Localized(number, visit, one, result, self.index.segments, held[number], vouched))
+            found.append(Localized(visit, one, result, held[number], vouched))
             yield
         yield from Carrying(self.index, found, self.deadline, at).carry()
         return found
 
     def propose(self, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
-        """Draft changes until they show no more scans, and verify them."""
-        latest = first
-        shown: list[tuple[str, tuple[int, ...], int]] = []
-        for number in range(tuning.ROUNDS):
-            changes, trial, evidence = yield from self.draft(chosen)
-            before, shown = shown, sorted((str(one.code), one.segments, len(one.new)) for one in trial)
-            if shown == before or number == tuning.ROUNDS - 1:
-                break
-            latest = yield from self.search_others(trial, first, latest)
-            chosen, _ = choose_evidence(self.names, latest, self.sigma)
+        """Draft changes, and verify them."""
+        known, deadline = self.known, self.deadline
+        new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
+        walls = Segments.derived(np.concatenate([known.endpoints, new]))
+        evidence = yield from gather(walls, chosen, self.sigma, deadline, oriented=self.index.oriented)
+        changes = draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline)
         proposed = yield from self.verify(changes, first)
         drafted = {k for change in changes for k in change.segments}
         changed = {k for change in proposed.changes for k in change.segments}
-        return replace(proposed, kept=tuple(kept_walls(evidence, len(self.known), drafted, changed)))
-
-    def draft(self, chosen: Sequence[Localized]) -> Steps[tuple[list[Change], list[Change], WallEvidence]]:
-        """Return changes, those of a trial, and the evidence about all walls of the map and possible new ones."""
-        known, deadline = self.known, self.deadline
-        new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
-        evidence = yield from self.gatherer.gather(Segments.derived(new), chosen)
-        return *draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline), evidence
+        return replace(proposed, kept=tuple(kept_walls(evidence, len(known), drafted, changed)))
 
     def verify(self, changes: Sequence[Change], first: Sequence[Localized]) -> Steps[Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
         seen, held = self._seeing(changes, first), np.array([one.held_back for one in first], dtype=bool)
-        left, dropped, found = np.arange(len(changes)), np.arange(len(changes)), list(first)
+        left = dropped = list(range(len(changes)))
+        found = list(first)
         for _ in range(tuning.DROPS):
             kept = [changes[k] for k in left]
             new = self._index(kept) if kept else None
             if new is None:
                 break
-            found = yield from self._search_again(new, found, seen[dropped].any(axis=0) | held, found)
-            dropped = np.array([k for k in left if not is_better(seen[k], first, found)], dtype=np.intp)
-            if not len(dropped):
-                dropped = left[blamed(seen[left][:, lost_scans(first, found)], most_lost(len(first)))]
-            if not len(dropped):
+            found = yield from self._search_again(new, found, seen[dropped].any(axis=0) | held)
+            dropped = [k for k in left if not is_better(seen[k], first, found)]
+            if not dropped:
                 return Proposed(tuple(kept), tuple(found)) if keeps_usable(first, found) else Proposed()
-            left = np.setdiff1d(left, dropped)
+            left = [k for k in left if k not in dropped]
         return Proposed()
 
     def sharpen(self, proposed: Proposed, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
@@ -230,33 +204,17 @@ class _Update:
         sharpened = Sharpened(better.segments[mine], better.ends[mine], better.sigma[mine])
         new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
         found = proposed.found or tuple(first)
-        again = yield from self._search_again(new, first, np.ones(len(first), dtype=bool), first)
-        if total_score(again, found) < total_score(found, found) or not keeps_usable(found, again):
-            return proposed
-        return replace(proposed, found=tuple(again), sharpened=sharpened)
+        again = yield from self._search_again(new, first)
+        better_for_all = is_better(np.ones(len(first), dtype=bool), found, again) and keeps_usable(found, again)
+        return replace(proposed, found=tuple(again), sharpened=sharpened) if better_for_all else proposed
 
     def _indexed(self, segments: Segments) -> MapIndex:
-        index, oriented = self.index, self.gatherer.oriented
+        index, oriented = self.index, self.index.oriented
         try:
             return MapIndex.build(segments, index.sigma, oriented=oriented, points=index.points, deadline=self.deadline)
         except IndexingEndedError:
             go_on(self.deadline)
             raise
-
-    def search_others(
-        self, changes: Sequence[Change], first: Sequence[Localized], latest: Sequence[Localized]
-    ) -> Steps[list[Localized]]:
-        """Search the scans that are not precise on the map with changes that are not verified yet; they may show more.
-
-        Scans that were precise at first keep that pose, which depends on no change.
-        """
-        new = self._index(changes)
-        if new is None:
-            return list(latest)
-        again = self._seeing(changes, first).any(axis=0) & [not one.precise for one in first]
-        found = yield from self._search_again(new, first, again, latest)
-        yield from Carrying(new, found, self.deadline).carry()
-        return found
 
     def _seeing(self, changes: Sequence[Change], found: Sequence[Localized]) -> Bools:
         """Return which scans see walls that each change takes away, or that it brings, (changes, scans)."""
@@ -271,17 +229,13 @@ class _Update:
         return out
 
     def _search_again(
-        self, index: MapIndex, found: Sequence[Localized], again: Bools, others: Sequence[Localized]
+        self, index: MapIndex, found: Sequence[Localized], again: Bools | None = None
     ) -> Steps[list[Localized]]:
-        """Search some of the scans in another map, unless that is the map of their last search; return all."""
-        out = list(others)
-        for k in np.flatnonzero(again).tolist():
+        """Search scans, or some of them, in another map; return all."""
+        out = list(found)
+        for k in range(len(found)) if again is None else np.flatnonzero(again).tolist():
             go_on(self.deadline)
-            one, before = found[k], self.latest.get(found[k].number)
-            if before is not None and np.array_equal(before.on.endpoints, index.segments.endpoints):
-                out[k] = replace(before, on=index.segments)
-                continue
-            out[k] = self.latest[one.number] = one.searched(index, self.deadline)
+            out[k] = found[k].searched(index, self.deadline)
             yield
         go_on(self.deadline)
         return out

@@ -39,11 +39,6 @@ class Proposed:
     kept: tuple[KeptWalls, ...] = ()
 
 
-def total_score(found: Sequence[Localized], of: Sequence[Localized]) -> float:
-    """Return the score of the scans that were located before, nats."""
-    return sum(one.score for one, before in zip(found, of, strict=True) if before.located)
-
-
 def is_better(saw: Bools, first: Sequence[Localized], found: Sequence[Localized]) -> bool:
     """Return whether a change leaves the poses of the scans that saw it, (n,), and does not lower their score."""
     gain = 0.0
@@ -57,48 +52,15 @@ def is_better(saw: Bools, first: Sequence[Localized], found: Sequence[Localized]
     return gain >= -tuning.LOWER_SCORE
 
 
-def lost_scans(first: Sequence[Localized], found: Sequence[Localized]) -> Bools:
-    """Return which scans were usable, and now fit the new map less and may not be used there, (n,).
+def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
+    """Return whether hardly any usable scan fits the new map less, and may not be used there.
 
     A scan that fits the new map better, and may not be used there, has met an honest doubt: a door is shut, say, and
     its room looks like others.
     """
-    both = zip(first, found, strict=True)
-    return np.array(
-        [one.usable and not new.usable and new.score < one.score - tuning.LOWER_SCORE for one, new in both], dtype=bool
-    )
-
-
-def most_lost(count: int) -> float:
-    """Return how many of so many scans a proposal may lose."""
-    return max(1.0, tuning.FEWER_USABLE * count)
-
-
-def keeps_usable(first: Sequence[Localized], found: Sequence[Localized]) -> bool:
-    """Return whether a proposal loses hardly any scan."""
-    return bool(lost_scans(first, found).sum() <= most_lost(len(first)))
-
-
-def blamed(seen: Bools, most: float) -> list[int]:
-    """Return changes without which few of the lost scans are left; the one that most of them see comes first.
-
-    Parameters
-    ----------
-    seen : (k, n)
-        True where a lost scan sees a change: k changes, n scans.
-    most : float
-        Number of lost scans that may be left.
-    """
-    found: list[int] = []
-    left = np.ones(seen.shape[1], dtype=bool)
-    while left.sum() > most:
-        counts = seen[:, left].sum(axis=1)
-        worst = int(np.argmax(counts))
-        if counts[worst] == 0:
-            break
-        found.append(worst)
-        left &= ~seen[worst]
-    return found
+    both = [(one, new) for one, new in zip(first, found, strict=True) if one.usable and not new.usable]
+    lost = sum(new.score < one.score - tuning.LOWER_SCORE for one, new in both)
+    return lost <= max(1.0, tuning.FEWER_USABLE * len(first))
 
 
 def kept_walls(evidence: WallEvidence, known: int, drafted: set[int], changed: set[int]) -> Iterator[KeptWalls]:

@@ -93,16 +93,18 @@ def find_cuts(
             cut = _cut(judged, wall, sigma)
             if cut is not None:
                 cuts[wall] = cut
-    cuts |= {wall: Draft("removed", (wall,)) for wall in _between(judged, known, cuts)}
+    cuts |= _between(judged, known, cuts)
+    passed |= _between(judged, known, cuts | passed)
     return [cuts[wall] for wall in sorted(cuts)], [passed[wall] for wall in sorted(passed)]
 
 
-def _between(judged: Judged, known: Segments, cuts: Mapping[int, Draft]) -> list[int]:
-    """Return the walls no longer than a stub that nothing reads, and that have removed walls at both ends."""
+def _between(judged: Judged, known: Segments, cuts: Mapping[int, Draft]) -> dict[int, Draft]:
+    """Return the removal of other walls no longer than a stub that nothing reads, with removed walls at both ends."""
     corner, removed = _corners(known), [wall for wall, cut in cuts.items() if cut.code == "removed"]
     between = np.isin(corner, corner[removed]).all(axis=1) & (known.lengths < tuning.LONGEST_STUB)
     between[list(cuts)] = False
-    return [wall for wall in np.flatnonzero(between).tolist() if not judged.read[judged.chunks.of_wall(wall)].any()]
+    found = np.flatnonzero(between).tolist()
+    return {k: Draft("removed", (k,)) for k in found if not judged.read[judged.chunks.of_wall(k)].any()}
 
 
 def _corners(walls: Segments) -> Indices:

@@ -9,7 +9,7 @@ import numpy as np
 from association import Deadline, MapIndex
 from map_quality.update.beams import Chunks, beams_in_map, follow
 from map_quality.update.scans import Localized, search
-from map_quality.update.tuning import DEVIATIONS, HIDDEN, LEAST_SLANT, LEAST_TOLERANCE, THROUGH
+from map_quality.update.tuning import DEVIATIONS, LEAST_SLANT, LEAST_TOLERANCE, THROUGH
 
 from .hall import PILLAR, RACK, segments, visit
 
@@ -20,11 +20,11 @@ def localized() -> list[Localized]:
     """Return scans of a hall in which the rack is gone."""
     index = MapIndex.build(segments(PILLAR, RACK), SIGMA)
     taken = visit(segments(PILLAR), "monday", 1)
-    return [Localized(k, 0, one, search(index, one, Deadline()), index.segments, False) for k, one in enumerate(taken)]
+    return [Localized(0, one, search(index, one, Deadline()), False) for one in taken]
 
 
 def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
-    """Count the beams through, on and before each chunk, one beam and one wall after the other; (3, c)."""
+    """Count the beams through, on and near each chunk, one beam and one wall after the other; (3, c)."""
     assert one.result.covariance is not None
     out, walls = np.zeros((3, len(chunks)), dtype=int), chunks.walls
     position = np.linalg.eigvalsh(one.result.covariance[:2, :2]).max()
@@ -48,7 +48,7 @@ def counted(chunks: Chunks, one: Localized, *, oriented: bool) -> np.ndarray:
         for chunk, gap, tolerance, near in met:
             ended = near and abs(gap) == nearest
             out[1, chunk] += ended
-            out[2, chunk] += -HIDDEN <= gap <= (tolerance if nearest == math.inf else 0.0) and not ended
+            out[2, chunk] += abs(gap) <= tolerance and not ended
     return out
 
 

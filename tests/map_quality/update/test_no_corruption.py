@@ -126,8 +126,8 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     result = search(known, one, Deadline())
     assert result.pose is not None
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
-    localized = Localized(0, 0, one, result, corridor, False)
-    assert on_lines(corridor, critical_lines(localized)).tolist() == [False, True, False]
+    localized = Localized(0, one, result, False)
+    assert on_lines(corridor, critical_lines(localized, corridor)).tolist() == [False, True, False]
 
 
 FEW_USABLE = pytest.mark.xfail(strict=True, reason="1 to 3 scans are usable, not 4")

@@ -12,7 +12,7 @@ from association import Deadline, MapIndex, Reason, ReasonCode
 from map_quality import VisitScan
 from map_quality.update.beams import Chunks, seen_walls
 from map_quality.update.scans import Localized, is_vouched, search
-from map_quality.update.verifying import blamed, is_better, keeps_usable
+from map_quality.update.verifying import is_better, keeps_usable
 from registration import Segments
 
 from .hall import PILLAR, RACK, segments, visit
@@ -23,7 +23,7 @@ HALL, EMPTY = segments(RACK, PILLAR), segments(PILLAR)
 def localized(on: Segments, today: Segments) -> list[Localized]:
     index, scans = MapIndex.build(on, 0.005), [one for k in range(2) for one in visit(today, f"day {k}", k)]
     found = [(one, search(index, one, Deadline())) for one in scans]
-    return [Localized(k, k // 8, one, result, on, False) for k, (one, result) in enumerate(found)]
+    return [Localized(k // 8, one, result, False) for k, (one, result) in enumerate(found)]
 
 
 @pytest.mark.parametrize(("today", "better"), [(EMPTY, True), (HALL, False)])
@@ -42,14 +42,6 @@ def test_a_map_on_which_many_scans_fit_less_is_withdrawn() -> None:
     assert sum(one.usable for one in worse) < sum(one.usable for one in first) - 2
     assert not keeps_usable(first, worse)
     assert keeps_usable(worse, first)
-
-
-def test_the_changes_that_lost_scans_see_are_blamed_and_no_others() -> None:
-    seen = np.array([[1, 1, 0, 0], [0, 0, 0, 0], [1, 1, 1, 0], [0, 0, 0, 1]], dtype=bool)
-    assert blamed(seen, 0.0) == [2, 3]
-    assert blamed(seen, 1.0) == [2]
-    assert blamed(seen, 4.0) == []
-    assert blamed(seen[1:2], 0.0) == []  # no change is to blame
 
 
 def test_a_scan_sees_a_wall_if_a_beam_meets_it() -> None:
