@@ -156,8 +156,10 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > tuning.GREATEST_GAP)])
     if not len(alone) or deadline.passed:
         return
-    found = set()
-    for end, gap in in_time(_loose_ends(ends, alone, least, deadline), deadline):
+    # After the end itself; infinite where there is none.
+    nearest = scipy.spatial.cKDTree(ends).query(ends[alone], k=2, distance_upper_bound=tuning.GREATEST_GAP)[0][:, 1]
+    loose, found = np.flatnonzero(nearest > least)[: tuning.MOST_ENDS], set()
+    for end, gap in in_time(zip(alone[loose].tolist(), nearest[loose].tolist(), strict=True), deadline):
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
         if apart > least + tuning.SAME_LINE and min(apart, gap) <= tuning.GREATEST_GAP:
             found.add(end // 2)
@@ -168,22 +170,6 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
             "segment: rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
-
-
-def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline) -> Iterator[tuple[int, float]]:
-    """Yield those of the chosen ends (k,) that touch no other, `MOST_ENDS` at most, and how far the nearest is, metres.
-
-    An end within `least` metres touches. It is infinitely far where none is within `GREATEST_GAP`.
-    """
-    tree, left = scipy.spatial.cKDTree(ends), tuning.MOST_ENDS
-    for begin in range(0, len(chosen), tuning.ENDS_AT_A_TIME):
-        some = chosen[begin : begin + tuning.ENDS_AT_A_TIME]
-        if left <= 0 or deadline.passed:
-            return
-        nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=tuning.GREATEST_GAP)[0])[:, 1]
-        free = np.flatnonzero(nearest > least)[:left]  # after the end itself
-        left -= len(free)
-        yield from zip(some[free].tolist(), nearest[free].tolist(), strict=True)
 
 
 def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:

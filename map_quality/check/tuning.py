@@ -12,7 +12,6 @@ SHORT = 0.1  # m, tables; a wall shorter than that is no evidence for a search
 LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between ends that meet and a slit that was drawn on purpose
 GAP_SIGMAS = 4.0  # of the declared deviation of the map, geometry; ends that are nearer to each other than that meet
 MOST_ENDS = 20_000  # that are looked about from, some 10 microseconds each
-ENDS_AT_A_TIME = 5_000  # whose nearest other is sought between two looks at the deadline
 OVERLAP = 0.05  # m, tables; pieces of one line share less than that where they are cut
 PARALLEL = math.sin(math.radians(3.0))  # tables
 SAME_LINE = 0.03  # m, as `MERGE_LATERAL`; lines nearer to each other than that are one
