@@ -77,7 +77,7 @@ def _new_walls(
                 continue
             pieces.append(piece)
             off = tuning.DEVIATIONS * float(np.hypot(sigma, map_sigma))
-            old, door = _continued(known, piece, max(tuning.LEAST_STEP, off)), _may_be_door(known, piece)
+            old, door = _continued(known, piece, off), _may_be_door(known, piece)
             if old is None or old in cut:
                 added.append(Draft("added", (), piece[None], np.array([sigma]), there=read, door=door))
                 continue

@@ -175,12 +175,13 @@ class _Update:
         seen, held = self._seeing(changes, first), np.array([one.held_back for one in first], dtype=bool)
         left = dropped = list(range(len(changes)))
         found = list(first)
-        for _ in range(tuning.DROPS):
+        while left:
             kept = [changes[k] for k in left]
-            new = self._index(kept) if kept else None
-            if new is None:
+            segments = apply(self.known, kept)
+            if not len(segments):
                 break
-            found = yield from self._search_again(new, found, seen[dropped].any(axis=0) | held)
+            again = seen[dropped].any(axis=0) | held
+            found = yield from self._search_again(self._indexed(segments), found, again)
             dropped = [k for k in left if not is_better(seen[k], first, found)]
             if not dropped:
                 return Proposed(tuple(kept), tuple(found)) if keeps_usable(first, found) else Proposed()
@@ -220,10 +221,8 @@ class _Update:
         """Return which scans see walls that each change takes away, or that it brings, (changes, scans)."""
         ends = [np.concatenate([self.known.endpoints[list(one.segments)], one.new]) for one in changes]
         owner = np.repeat(np.arange(len(changes)), [len(one) for one in ends])
-        chunks, out = (
-            Chunks.of(Segments.derived(np.concatenate([NO_WALLS, *ends]))),
-            np.zeros((len(changes), len(found)), dtype=bool),
-        )
+        chunks = Chunks.of(Segments.derived(np.concatenate([NO_WALLS, *ends])))
+        out = np.zeros((len(changes), len(found)), dtype=bool)
         for k, one in enumerate(found):
             out[owner[seen_walls(chunks, one, self.sigma, self.deadline)], k] = True
         return out
@@ -239,11 +238,6 @@ class _Update:
             yield
         go_on(self.deadline)
         return out
-
-    def _index(self, changes: Sequence[Change]) -> MapIndex | None:
-        """Return the index of the map with some changes; None if nothing of it is left."""
-        segments = apply(self.known, changes)
-        return self._indexed(segments) if len(segments) else None
 
     def proposal(
         self,
