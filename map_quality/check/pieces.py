@@ -157,7 +157,8 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     if not len(alone) or deadline.passed:
         return
     # After the end itself; infinite where there is none.
-    nearest = scipy.spatial.cKDTree(ends).query(ends[alone], k=2, distance_upper_bound=tuning.GREATEST_GAP)[0][:, 1]
+    distances, _ = scipy.spatial.cKDTree(ends).query(ends[alone], k=2, distance_upper_bound=tuning.GREATEST_GAP)
+    nearest = np.asarray(distances)[:, 1]
     loose, found = np.flatnonzero(nearest > least)[: tuning.MOST_ENDS], set()
     for end, gap in in_time(zip(alone[loose].tolist(), nearest[loose].tolist(), strict=True), deadline):
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
