@@ -18,6 +18,7 @@ Json = dict[str, Any]
 Lines = Iterable[str]
 
 LOOK_SECONDS = 0.3
+REPORT_SECONDS = 10.0  # between two lines where there is no terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +157,7 @@ def progress() -> Iterator[Callable[[str, float, float | None], None]]:
 def compile_first() -> None:
     """Compile the kernels that are not cached, in a process that ends with it: the compiler takes 330 MB.
 
-    A terminal shows a bar.
+    A terminal shows a bar; elsewhere a line every ten seconds reports the progress.
     """
     from compiled import compiled_fraction, is_complete
 
@@ -166,11 +167,16 @@ def compile_first() -> None:
 
     message = "linefix: compiling the kernels, about a minute on two idle cores; later runs load them from the cache"
     print(message, file=sys.stderr)
+    reported = time.monotonic()
     # If it ends early or can keep nothing this process compiles what it needs.
     with progress() as show, suppress(OSError), start_compiler() as compiler:
         try:
             while compiler.poll() is None:
-                show("kernels, %", round(100.0 * compiled_fraction()), 100)
+                fraction = compiled_fraction()
+                show("kernels, %", round(100.0 * fraction), 100)
+                if not sys.stderr.isatty() and time.monotonic() - reported > REPORT_SECONDS:
+                    reported = time.monotonic()
+                    print(f"linefix: {fraction:.0%} of the kernels are compiled", file=sys.stderr)
                 time.sleep(LOOK_SECONDS)
         finally:
             compiler.kill()
