@@ -27,7 +27,7 @@ from examples.running import free_port, running_service
 from linefix.documents.encoding import encode
 from linefix.documents.reading import read_model
 from linefix.documents.requests import AssociateRequest
-from linefix.operations import Stopwatch
+from linefix.operations import Stopwatch, Target
 from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore
 from service.maps.lookup import FoundMaps, MapLookup
@@ -182,10 +182,12 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
         store = MapStore(database_url(f"sqlite:///{folder}/maps.sqlite3"))
         store.put("m", asked.map, MapOutline(1, 0, (0.0, 0.0, 1.0, 1.0)))
         lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, Child())
-        associator = Associator(lookup, Metrics())
+        associator = Associator(Metrics())
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
         stored = store.load("m")
-        target = associator.target(wanted, FoundMaps({None: stored.record}, stored.document), deadline)
+        found = FoundMaps({None: stored.record}, stored.document)
+        ready = lookup.indexed(found, oriented=None, deadline=deadline)
+        target = Target(ready.maps, ready.frames, found.references)
         answer = associator.find(target, wanted, wanted.options, deadline, Stopwatch())
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),

@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from functools import cache, partial
+from typing import Any
 
 from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 
 from compiled import compiled_fraction, is_complete
@@ -21,13 +24,13 @@ from linefix.warmup import warm_up
 from .errors import StoreError
 from .http.middleware import RequestMiddleware
 from .http.openapi import describe
-from .http.problems import handle_errors
-from .http.routes import batch, importing, maps, operations, pages, quality, scans
+from .http.problems import pass_on
+from .http.routes import importing, maps, operations, pages, quality, scans
 from .http.services import Services
 from .importing.folders import remove_abandoned
 from .memory import return_free_pages
 from .settings import Settings
-from .thread_pool import Threads
+from .telemetry.metrics import REFRESH_SECONDS
 from .version import VERSION
 
 logger = logging.getLogger("linefix")
@@ -53,6 +56,7 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
+        exception_handlers=dict.fromkeys((HTTPException, RequestValidationError), pass_on),
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
         lifespan=partial(_lifespan, services=services, started=started),
     )
@@ -61,12 +65,13 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
     app.state.contract = cache(lambda: encode(describe(app, guarded=settings.guarded)))
     # In the order in which they are tried: robots come most often, and the paths of what is done with a map are also
     # those of a map. An included router would be one more layer for each of them.
-    for module in (scans, batch, quality, importing, maps, operations, pages):
+    for module in (scans, quality, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     for route in app.router.routes:
         if isinstance(route, APIRoute):
             route.operation_id = route.name  # generated clients name their functions so
-    handle_errors(app)
+            summary, _, route.description = route.description.partition("\n\n")
+            route.summary = summary.removesuffix(".")
     routes = frozenset(getattr(route, "path", "") for route in app.routes)
     app.add_middleware(RequestMiddleware, services=services, routes=routes)
     if settings.cors_origins:  # outside of it: a page may read refusals, too
@@ -89,9 +94,15 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI, services: Services, started: Started | None) -> AsyncIterator[None]:
-    getting_ready = asyncio.create_task(_get_ready(services))
-    refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
-    following = asyncio.create_task(_follow(services.key_threads, services.keyring.refresh))
+    refresh_keys = partial(services.key_threads.run, services.keyring.refresh)
+    getting_ready, *repeating = map(
+        asyncio.create_task,
+        (
+            _get_ready(services),
+            _repeat(REFRESH_SECONDS, services.metrics.refreshed),  # for requests that reach another worker
+            _repeat(KEYS_SECONDS, refresh_keys),  # keys come and go without a restart
+        ),
+    )
     if started is not None:
         started(services)
     if is_complete():  # no request comes to a process that has to refuse it; a first start answers probes meanwhile
@@ -99,9 +110,8 @@ async def _lifespan(app: FastAPI, services: Services, started: Started | None) -
     try:
         yield
     finally:
-        getting_ready.cancel()
-        refreshing.cancel()
-        following.cancel()
+        for task in (getting_ready, *repeating):
+            task.cancel()
         services.close()
 
 
@@ -143,8 +153,12 @@ async def _prepare(services: Services) -> None:
 async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and log the progress."""
     logger.info("compiling the kernels, which takes one to two minutes; later starts load them from the cache")
-    following = asyncio.create_task(_follow_compiling(services))
-    compiler = start_compiler()
+
+    async def follow() -> None:
+        services.readiness.compiled = fraction = await services.store_threads.run(compiled_fraction)
+        logger.info("compiling", extra={"share": round(fraction, 2)})
+
+    following, compiler = asyncio.create_task(_repeat(PROGRESS_SECONDS, follow)), start_compiler()
     try:
         await services.parse_threads.run(compiler.wait)  # if it ends early, this process compiles the missing kernels
     finally:
@@ -153,19 +167,11 @@ async def _compile(services: Services) -> None:
     services.readiness.compiled = None
 
 
-async def _follow_compiling(services: Services) -> None:
-    """Count the compiled kernels now and then, in a thread: refusals and the log report the count."""
-    while True:
-        services.readiness.compiled = fraction = await services.store_threads.run(compiled_fraction)
-        logger.info("compiling", extra={"share": round(fraction, 2)})
-        await asyncio.sleep(PROGRESS_SECONDS)
-
-
-async def _follow(threads: Threads, refresh: Callable[[], None]) -> None:
-    """Take up keys that come, and forget those that go, without a restart."""
+async def _repeat(seconds: float, call: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Call now and then, also after a defect."""
     while True:
         try:
-            await threads.run(refresh)
+            await call()
         except Exception:
-            logger.exception("a defect")  # the keys stay as they were
-        await asyncio.sleep(KEYS_SECONDS)
+            logger.exception("a defect")
+        await asyncio.sleep(seconds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import gc
+import json
 import math
 import os
 import signal
@@ -36,7 +37,8 @@ SWITCH_SECONDS = 0.001
 GARBAGE = (20_000, 10, 10)  # few objects of a request are cyclic; by default Python looks after each 700 objects
 COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client: the folder of the counts that workers share
 EXTRA = ("fastapi", "fastapi_offline", "prometheus_client", "pydantic_settings", "sqlalchemy", "starlette", "uvicorn")
-NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
+ARGUMENTS = "LINEFIX_ARGUMENTS"  # of the command line, from which each worker reads its settings again
+NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY", ARGUMENTS)
 
 
 def serve(arguments: Sequence[str]) -> int:
@@ -56,6 +58,7 @@ def serve(arguments: Sequence[str]) -> int:
         return 2
     for name in unknown_settings():
         print(f"linefix: {name} in the environment is not a setting", file=sys.stderr)
+    os.environ[ARGUMENTS] = json.dumps([*arguments])
     return run(settings)
 
 
@@ -87,7 +90,6 @@ def run(settings: Settings) -> int:
     with ExitStack() as stack:
         if settings.workers > 1:
             os.environ[COUNTS] = stack.enter_context(tempfile.TemporaryDirectory(prefix="linefix-workers-"))
-        settings.export()
         try:
             uvicorn.run(
                 f"{__name__}:application",
@@ -117,11 +119,11 @@ def run(settings: Settings) -> int:
 
 
 def application() -> FastAPI:
-    """Return the application of this process, by the settings that `run` has put into the environment."""
+    """Return the application of this process, by the arguments that `serve` has put into the environment."""
     gc.disable()  # until the service is ready
     from .app import create_app
     from .memory import return_large_blocks
-    from .settings import Settings
+    from .settings import read_settings
     from .telemetry.metrics import forget_ended_workers
 
     return_large_blocks()
@@ -129,7 +131,7 @@ def application() -> FastAPI:
     gc.set_threshold(*GARBAGE)
     if COUNTS in os.environ:
         forget_ended_workers(os.environ[COUNTS])
-    return create_app(Settings(), started=drain_on_signals)
+    return create_app(read_settings(json.loads(os.environ[ARGUMENTS])), started=drain_on_signals)
 
 
 def drain_on_signals(services: Services) -> None:

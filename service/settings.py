@@ -16,6 +16,7 @@ from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, Setting
 from sqlalchemy import URL
 
 from linefix.documents.limits import Limits
+from linefix.documents.strict import descriptions_of
 
 from .admission.keys import KeyFileError, read_keys
 from .database_location import database_url
@@ -60,7 +61,73 @@ class SettingsError(Exception):
 
 
 class Settings(BaseSettings):
-    """Settings of the service."""
+    """Settings of the service.
+
+    Attributes
+    ----------
+    host
+        address to listen on
+    port
+        port to listen on; 0 takes a free one
+    data_dir
+        folder of the map store (SQLite)
+    database_url
+        postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory
+    keys
+        bearer keys with all rights, comma separated
+    keys_file
+        file with keys and roles, or folder of such files; a change applies within 2 s
+    hosts
+        without keys: accepted host names in the Host header, comma separated
+    cors_origins
+        sites whose pages may send requests, as https://site.example, comma separated
+    tls_cert
+        file of the certificate chain, PEM; the service then accepts HTTPS only
+    tls_key
+        file of the private key, PEM, without a password
+    allow_anonymous
+        accept every client: listen on other addresses than loopback without keys
+    workers
+        processes that share the port, the searches and the queue
+    searches
+        searches that run at once
+    queue
+        maximum number of requests that wait for a search
+    max_body_bytes
+        maximum bytes of a request, uncompressed
+    max_values
+        maximum number of numbers, strings, arrays and objects in a request
+    max_bodies_bytes
+        maximum bytes of all requests that are being read, uncompressed; half of it for one key
+    max_answers_bytes
+        maximum bytes of large answers that wait to be read; half of it for one key
+    max_stored_bytes
+        maximum bytes of all stored maps
+    max_import_bytes
+        maximum bytes of memory of a process that reads an import; at most two run, of different keys
+    max_connections
+        number of open connections at which further requests are refused
+    max_map_segments
+        maximum number of segments of a map, and of its points
+    max_scan_segments
+        maximum number of segments of a scan
+    max_beams
+        maximum number of ranges or points of a scan
+    max_correspondences
+        maximum number of correspondences of a registration
+    max_batch
+        maximum number of scans of a batch
+    max_deadline_ms
+        longest deadline of a request in milliseconds, and the default
+    cache_bytes
+        bytes of indexed maps that are cached in memory
+    request_timeout_s
+        seconds for the body of a request, and between two requests of a connection
+    drain_s
+        seconds of answering after SIGTERM, while /readyz returns 503
+    log_level
+        level of the log on stderr: debug, info, warning or error
+    """
 
     model_config = SettingsConfigDict(
         env_prefix="LINEFIX_",
@@ -70,100 +137,49 @@ class Settings(BaseSettings):
         frozen=True,
     )
 
-    host: str = Field("127.0.0.1", description="address to listen on")
-    port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
-    data_dir: Path = Field(default_factory=_data_home, description="folder of the map store (SQLite)")
-    database_url: SecretStr | None = Field(
-        None,
-        description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
-    )
-    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field(
-        (), description="bearer keys with all rights, comma separated"
-    )
-    keys_file: Path | None = Field(
-        None, description="file with keys and roles, or folder of such files; a change applies within 2 s"
-    )
-    hosts: Annotated[tuple[str, ...], NoDecode] = Field(
-        (), description="without keys: accepted host names in the Host header, comma separated"
-    )
-    cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
-        (), description="sites whose pages may send requests, as https://site.example, comma separated"
-    )
-    tls_cert: Path | None = Field(
-        None, description="file of the certificate chain, PEM; the service then accepts HTTPS only"
-    )
-    tls_key: Path | None = Field(None, description="file of the private key, PEM, without a password")
-    allow_anonymous: bool = Field(
-        False, description="accept every client: listen on other addresses than loopback without keys"
-    )
+    host: str = "127.0.0.1"
+    port: int = Field(8000, ge=0, le=65535)
+    data_dir: Path = Field(default_factory=_data_home)
+    database_url: SecretStr | None = None
+    keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
+    keys_file: Path | None = None
+    hosts: Annotated[tuple[str, ...], NoDecode] = ()
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
+    tls_cert: Path | None = None
+    tls_key: Path | None = None
+    allow_anonymous: bool = False
 
-    workers: int = Field(1, ge=1, le=256, description="processes that share the port, the searches and the queue")
-    searches: int = Field(default_factory=_cores, ge=1, le=1024, description="searches that run at once")
-    queue: int = Field(16, ge=0, le=10_000, description="maximum number of requests that wait for a search")
-    max_body_bytes: int = Field(
-        32_000_000, ge=1_000, le=1_000_000_000, description="maximum bytes of a request, uncompressed"
-    )
-    max_values: int = Field(
-        2_000_000, ge=1_000, description="maximum number of numbers, strings, arrays and objects in a request"
-    )
-    max_bodies_bytes: int = Field(
-        96_000_000,
-        ge=1_000,
-        description="maximum bytes of all requests that are being read, uncompressed; half of it for one key",
-    )
-    max_answers_bytes: int = Field(
-        64_000_000, ge=1_000, description="maximum bytes of large answers that wait to be read; half of it for one key"
-    )
-    max_stored_bytes: int = Field(4_000_000_000, ge=1_000, description="maximum bytes of all stored maps")
-    max_import_bytes: int = Field(
-        1_000_000_000,
-        ge=400_000_000,
-        description="maximum bytes of memory of a process that reads an import; at most two run, of different keys",
-    )
-    max_connections: int = Field(
-        512,
-        ge=8,
-        le=100_000,
-        description="number of open connections at which further requests are refused",
-    )
-    max_map_segments: int = Field(200_000, ge=1, description="maximum number of segments of a map, and of its points")
-    max_scan_segments: int = Field(2_000, ge=1, description="maximum number of segments of a scan")
-    max_beams: int = Field(20_000, ge=1, description="maximum number of ranges or points of a scan")
-    max_correspondences: int = Field(200_000, ge=1, description="maximum number of correspondences of a registration")
-    max_batch: int = Field(256, ge=1, description="maximum number of scans of a batch")
-    max_deadline_ms: Finite = Field(
-        30_000.0, gt=0.0, le=3.6e6, description="longest deadline of a request in milliseconds, and the default"
-    )
-    cache_bytes: int = Field(112_000_000, ge=0, description="bytes of indexed maps that are cached in memory")
-    request_timeout_s: Finite = Field(
-        9.0,
-        gt=0.0,
-        le=3600.0,
-        description="seconds for the body of a request, and between two requests of a connection",
-    )
-    drain_s: Finite = Field(
-        1.0, ge=0.0, le=5.0, description="seconds of answering after SIGTERM, while /readyz returns 503"
-    )
-    log_level: str = Field(
-        "info",
-        pattern="^(debug|info|warning|error)$",
-        description="level of the log on stderr: debug, info, warning or error",
-    )
+    workers: int = Field(1, ge=1, le=256)
+    searches: int = Field(default_factory=_cores, ge=1, le=1024)
+    queue: int = Field(16, ge=0, le=10_000)
+    max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000)
+    max_values: int = Field(2_000_000, ge=1_000)
+    max_bodies_bytes: int = Field(96_000_000, ge=1_000)
+    max_answers_bytes: int = Field(64_000_000, ge=1_000)
+    max_stored_bytes: int = Field(4_000_000_000, ge=1_000)
+    max_import_bytes: int = Field(1_000_000_000, ge=400_000_000)
+    max_connections: int = Field(512, ge=8, le=100_000)
+    max_map_segments: int = Field(200_000, ge=1)
+    max_scan_segments: int = Field(2_000, ge=1)
+    max_beams: int = Field(20_000, ge=1)
+    max_correspondences: int = Field(200_000, ge=1)
+    max_batch: int = Field(256, ge=1)
+    max_deadline_ms: Finite = Field(30_000.0, gt=0.0, le=3.6e6)
+    cache_bytes: int = Field(112_000_000, ge=0)
+    request_timeout_s: Finite = Field(9.0, gt=0.0, le=3600.0)
+    drain_s: Finite = Field(1.0, ge=0.0, le=5.0)
+    log_level: str = Field("info", pattern="^(debug|info|warning|error)$")
 
     @field_validator("keys", "hosts", "cors_origins", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
-        items = value.split(",") if isinstance(value, str) else value
-        if value == "":  # set, but to nothing, as compose files do
-            return ()
-        if not isinstance(items, list | tuple):
-            return items
-        parts = [part for item in items for part in (item.split(",") if isinstance(item, str) else [item])]
-        stripped = (part.strip() if isinstance(part, str) else part for part in parts)
-        found = tuple(part for part in stripped if part != "")
-        if parts and not found:
+        items = [value] if isinstance(value, str) else value
+        if not (isinstance(items, list | tuple) and all(isinstance(item, str) for item in items)):
+            return value
+        found = tuple(filter(None, (part.strip() for item in items for part in item.split(","))))
+        if any(items) and not found:  # it may be set, but to nothing, as compose files do
             raise ValueError("found only spaces, expected a value; for none, leave it empty")
-        if any(isinstance(part, str) and not _PRINTABLE.fullmatch(part) for part in found):
+        if not all(map(_PRINTABLE.fullmatch, found)):
             raise ValueError(
                 "found a space, or a character that HTTP headers cannot contain; expected keys of printable ASCII"
             )
@@ -199,12 +215,6 @@ class Settings(BaseSettings):
         """Return one worker's part of something that all workers have together."""
         return whole // self.workers
 
-    def export(self) -> None:
-        """Put what was set into the environment, from which worker processes read their settings."""
-        for name in [name for name in os.environ if name.upper() in map(_variable, self.model_fields_set)]:
-            del os.environ[name]
-        os.environ.update({_variable(name): _text(getattr(self, name)) for name in self.model_fields_set})
-
     def limits(self) -> Limits:
         """Return the counts that requests are held to."""
         return Limits(
@@ -217,15 +227,8 @@ class Settings(BaseSettings):
         )
 
 
-def _variable(name: str) -> str:
-    return f"LINEFIX_{name.upper()}"
-
-
-def _text(value: Any) -> str:
-    """Return a setting as it stands in the environment."""
-    if isinstance(value, tuple):
-        return ",".join(map(_text, value))
-    return str(value.get_secret_value() if isinstance(value, SecretStr) else value)
+for _field, _description in descriptions_of(Settings).items():
+    Settings.model_fields[_field].description = _description
 
 
 def is_loopback(host: str) -> bool:

@@ -10,19 +10,16 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-class Threads:
+class Threads(ThreadPoolExecutor):
     """Some threads under one name.
 
     Each kind of call has its own, so that none waits for the threads of another.
     """
 
-    def __init__(self, count: int, name: str) -> None:
-        self._executor = ThreadPoolExecutor(count, thread_name_prefix=name)
-
     async def run(self, call: Callable[[], T]) -> T:
         """Return the result of a call in one of the threads."""
-        return await asyncio.get_running_loop().run_in_executor(self._executor, call)
+        return await asyncio.get_running_loop().run_in_executor(self, call)
 
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        self.shutdown(wait=False, cancel_futures=True)

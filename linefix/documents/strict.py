@@ -42,6 +42,14 @@ def nearest_name(name: str) -> str | None:
     return None if name in _names else next(iter(get_close_matches(name, sorted(_names), 1, LIKE)), None)
 
 
+def descriptions_of(kind: type) -> dict[str, str]:
+    """Return the descriptions of the attributes in the docstring of a class, by their names."""
+    attributes = cleandoc(kind.__doc__ or "").partition(_ATTRIBUTES)[2]
+    return {
+        name: " ".join(text.split()) for names, text in _ATTRIBUTE.findall(attributes) for name in names.split(", ")
+    }
+
+
 class Described(BaseModel):
     """Has the descriptions of its fields in its docstring, as other classes; the schema reads them there."""
 
@@ -51,11 +59,9 @@ class Described(BaseModel):
         schema = handler(core)
         model = handler.resolve_ref_schema(schema)
         for kind in reversed(cls.__mro__[: cls.__mro__.index(Described)]):
-            summary, _, attributes = cleandoc(kind.__doc__ or "").partition(_ATTRIBUTES)
-            model["description"] = summary.strip()
-            for names, text in _ATTRIBUTE.findall(attributes):
-                for name in names.split(", "):
-                    model["properties"][cls.model_fields[name].alias or name]["description"] = " ".join(text.split())
+            model["description"] = cleandoc(kind.__doc__ or "").partition(_ATTRIBUTES)[0].strip()
+            for name, text in descriptions_of(kind).items():
+                model["properties"][cls.model_fields[name].alias or name]["description"] = text
         last = [name for name in SEAL if name in cls.model_fields]
         model.get("properties", {}).update({name: model["properties"].pop(name) for name in last})
         return schema

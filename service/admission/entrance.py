@@ -33,13 +33,20 @@ _PORTS = {"http": 80, "https": 443}
 
 
 class Entrance:
-    """Gives tickets, and refuses requests without permission, and searches while the queue is full."""
+    """Gives tickets, and refuses requests without permission, and searches while the queue is full.
 
-    def __init__(self, gate: Gate, keyring: Keyring, origins: Origins, max_body_bytes: int) -> None:
+    Without keys, `hosts` are names in addition to `localhost` and every address, and pages of `origins` may send
+    requests.
+    """
+
+    def __init__(
+        self, gate: Gate, keyring: Keyring, max_body_bytes: int, hosts: Sequence[str], origins: Sequence[str]
+    ) -> None:
         self._gate = gate
         self._keyring = keyring
-        self._origins = origins
         self._max_body_bytes = max_body_bytes
+        self._hosts = {"localhost", "localhost.", *(host.lower() for host in hosts)}
+        self._origins = frozenset(origins)
 
     def admit(self, head: Mapping[str, Any]) -> Ticket:
         """Return the ticket of a request, given its ASGI scope.
@@ -58,7 +65,8 @@ class Entrance:
             When there is no place for a search.
         """
         method, path, headers = head["method"], head["path"], head["headers"]
-        self._origins.require(headers)
+        if not self._keyring.guarded:  # a page of another site has no key
+            self._require_own_page(headers)
         grant, searches = Grant(), False
         if path.startswith(GUARDED):
             grant = self._keyring.grant(headers, head.get("client"))
@@ -72,6 +80,30 @@ class Entrance:
             self._gate.require_place(grant.holder)
         return Ticket(grant.holder, grant.maps)
 
+    def _require_own_page(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
+        """Refuse requests that the page of another site may have sent.
+
+        Raises
+        ------
+        ForeignHostError
+            When the host is neither an address nor a name that is known. Only HTTP/1.0, which no browser speaks, has
+            none.
+        ForeignOriginError
+            When the browser's headers name another site's page as the sender.
+        """
+        sent = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _READ}
+        host, origin = sent.get(b"host"), sent.get(b"origin")
+        if host is not None and not self._is_known(host):
+            raise ForeignHostError
+        if origin in self._origins:
+            return
+        if sent.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
+            raise ForeignOriginError
+
+    def _is_known(self, host: str) -> bool:
+        found = _HOST.fullmatch(host)
+        return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
+
 
 def _require(grant: Grant, method: str, path: str) -> None:
     """Raise where the caller lacks the permission for this request."""
@@ -83,44 +115,6 @@ def _require(grant: Grant, method: str, path: str) -> None:
     # An id ends where a prefix cannot go on, so that the rest of the path begins like the id.
     if path.startswith(MAPS) and not path.startswith(MAPS + grant.maps):
         raise UnknownMapError
-
-
-class Origins:
-    """Checks the hosts and origins of requests to a service without keys.
-
-    `hosts` are names in addition to `localhost` and every address; pages of the origins `named` may send requests.
-    """
-
-    def __init__(self, hosts: Sequence[str], *, guarded: bool, named: Sequence[str] = ()) -> None:
-        self._hosts = {"localhost", "localhost.", *(host.lower() for host in hosts)}
-        self._named = frozenset(named)
-        self._guarded = guarded
-
-    def require(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
-        """Refuse requests that the page of another site may have sent.
-
-        Raises
-        ------
-        ForeignHostError
-            When the host is neither an address nor a name that is known. Only HTTP/1.0, which no browser speaks, has
-            none.
-        ForeignOriginError
-            When the browser's headers name another site's page as the sender.
-        """
-        if self._guarded:
-            return
-        sent = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _READ}
-        host, origin = sent.get(b"host"), sent.get(b"origin")
-        if host is not None and not self._is_known(host):
-            raise ForeignHostError
-        if origin in self._named:
-            return
-        if sent.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
-            raise ForeignOriginError
-
-    def _is_known(self, host: str) -> bool:
-        found = _HOST.fullmatch(host)
-        return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
 
 
 @lru_cache(maxsize=256)

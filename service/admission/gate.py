@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -61,7 +61,7 @@ class _Run:
     answer: asyncio.Future[Any]
     begun: float
     worker: _Worker
-    timers: list[asyncio.TimerHandle] = field(default_factory=list)
+    timer: asyncio.TimerHandle | None = None
     long: bool = False
 
 
@@ -186,13 +186,12 @@ class Gate:
         if self._has_free_slot and self._may_start(share):
             share.running += 1
         else:
-            await self._wait(share, deadline, ticket)
+            await _until(deadline, self._wait(share, ticket))
         ticket.had_slot = True
-        answer = self._start(function, deadline, ticket.holder)
-        try:
-            return await answer
-        finally:
-            del answer  # else a cycle: an error holds this frame, and everything that the function worked with
+        # Not by a name: else a cycle, for an error holds this frame, and everything that the function worked with.
+        if self._waits:
+            return await self._start(function, deadline, ticket.holder)
+        return await _until(deadline, self._start(function, deadline, ticket.holder))
 
     def cancel_all(self) -> None:
         """Cancel everything that runs, and soon wait no longer for functions that do not end, as indexing a map."""
@@ -207,11 +206,9 @@ class Gate:
             worker.todo.put(None)
         self._idle.clear()
 
-    async def _wait(self, share: _Share, deadline: Deadline, ticket: Ticket) -> None:
-        loop = asyncio.get_running_loop()
-        one = ticket, loop.create_future()
+    async def _wait(self, share: _Share, ticket: Ticket) -> None:
+        one = ticket, asyncio.get_running_loop().create_future()
         share.waiting.append(one)
-        timer = _at(deadline, _fail, one[1], DeadlinePassedError())
         try:
             await one[1]
         except BaseException:
@@ -221,9 +218,6 @@ class Gate:
             elif not one[1].cancelled() and one[1].exception() is None:  # a slot came as the caller left
                 self._free(ticket.holder)
             raise
-        finally:
-            if timer is not None:
-                timer.cancel()
 
     def _start(self, function: Callable[[], T], deadline: Deadline, holder: Holder) -> asyncio.Future[T]:
         """Start a function in a thread, in the slot that its holder has."""
@@ -238,15 +232,13 @@ class Gate:
         run = _Run(holder, deadline, loop.create_future(), time.monotonic(), worker)
         self._runs.add(run)
         if self._most_long:
-            run.timers.append(loop.call_later(LONG_SECONDS, self._lower, run))
-        if not self._waits and (timer := _at(deadline, _fail, run.answer, DeadlinePassedError())) is not None:
-            run.timers.append(timer)
+            run.timer = loop.call_later(LONG_SECONDS, self._lower, run)
         worker.todo.put((function, lambda *outcome: loop.call_soon_threadsafe(self._finish, run, *outcome)))
         return run.answer
 
     def _finish(self, run: _Run, result: object, error: BaseException | None) -> None:
-        for timer in run.timers:
-            timer.cancel()
+        if run.timer is not None:
+            run.timer.cancel()
         self._runs.remove(run)
         if run.long or self._closed:  # a priority that was lowered cannot be raised again without rights
             run.worker.todo.put(None)
@@ -262,7 +254,7 @@ class Gate:
         """Have a long search go on behind short ones, and hand on its slot; later where too many do so."""
         share = self._shares[run.holder]
         if self._long >= self._most_long or not self._may_start(share):
-            run.timers.append(asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run))
+            run.timer = asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run)
             return
         run.long = True
         _go_behind(run.worker.native_id, LONG_NICE)
@@ -347,11 +339,16 @@ def _fail(waiter: asyncio.Future[Any], error: BaseException) -> None:
         waiter.set_exception(error)
 
 
-def _at(deadline: Deadline, call: Callable[..., None], *arguments: Any) -> asyncio.TimerHandle | None:
-    """Call when a deadline passes; None where it has no time."""
-    if deadline.at is None:
-        return None
-    return asyncio.get_running_loop().call_later(max(0.0, deadline.at - time.monotonic()), call, *arguments)
+async def _until(deadline: Deadline, wait: Awaitable[T]) -> T:
+    """Wait until a deadline passes, and no longer."""
+    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+    try:
+        async with asyncio.timeout(left) as limit:
+            return await wait
+    except TimeoutError:
+        if not limit.expired():
+            raise
+        raise DeadlinePassedError from None
 
 
 def _go_behind(thread: int | None, nice: int) -> None:

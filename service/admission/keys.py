@@ -141,7 +141,7 @@ class Keyring:
         self._file = file
         self._seen = None if file is None else state_of(file)
         self.grants = self._whole if file is None else read_keys(file) | self._whole
-        self._guarded = bool(keys) or file is not None
+        self.guarded = bool(keys) or file is not None
 
     def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
         """Return the permissions of a request; where the service has no keys, all, for the address it comes from.
@@ -153,7 +153,7 @@ class Keyring:
         UnknownKeyError
             When it carries one that is not known.
         """
-        if not self._guarded:
+        if not self.guarded:
             return Grant(address_of(client))
         sent = [value for name, value in headers if name == b"authorization"]
         scheme, _, key = (sent[0] if len(sent) == 1 else b"").partition(b" ")

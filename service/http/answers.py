@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from linefix.documents.checks import MapCheckAnswer
 from linefix.documents.found import FoundAnswer
@@ -12,6 +12,7 @@ from linefix.documents.replies import MapReference, PoseAnswer, ReferencedAnswer
 from linefix.documents.strict import Answer, Index, Milliseconds, Row4
 from linefix.documents.updates import NewMapAnswer
 
+from ..settings import Settings
 from .problems import KINDS
 
 
@@ -23,15 +24,21 @@ class Place(Answer):
 
 
 class Problem(Answer):
-    """An error, RFC 9457."""
+    """An error, RFC 9457.
+
+    Attributes
+    ----------
+    detail
+        the fault; with `errors` the pointer and message of the first
+    code
+        stable, for programs; later versions may add codes
+    """
 
     type: str
     title: str
     status: Annotated[int, Field(ge=400, le=599)]
-    detail: str = Field(description="the fault; with `errors` the pointer and message of the first")
-    code: Annotated[str, Field(json_schema_extra={"enum": list(KINDS)})] = Field(
-        description="stable, for programs; later versions may add codes"
-    )
+    detail: str
+    code: Annotated[str, Field(json_schema_extra={"enum": list(KINDS)})]
     request_id: str
     errors: Annotated[list[Place], Field(max_length=20)] = Field([])
 
@@ -64,13 +71,19 @@ class MapSummaryAnswer(Answer):
 
 
 class MapList(Answer):
-    """One page of maps, by id."""
+    """One page of maps, by id.
+
+    Attributes
+    ----------
+    corrupt
+        ids of damaged maps on this page; each is rejected until it is stored again with PUT
+    next
+        `cursor` of the next page
+    """
 
     maps: list[MapSummaryAnswer]
-    corrupt: list[str] = Field(
-        description="ids of damaged maps on this page; each is rejected until it is stored again with PUT"
-    )
-    next: str | None = Field(description="`cursor` of the next page")
+    corrupt: list[str]
+    next: str | None
 
 
 class Live(Answer):
@@ -87,30 +100,30 @@ class Version(Answer):
     api: str
 
 
-class Limits(Answer):
+class _FixedLimits(Answer):
     """Limits of requests; a request beyond one is rejected."""
 
-    max_body_bytes: int = Field(description="bytes of a request, uncompressed")
-    max_values: int = Field(description="numbers, strings, arrays and objects in a request")
-    max_bodies_bytes: int = Field(description="bytes of all requests that one worker reads at once")
-    max_answers_bytes: int = Field(description="bytes of large answers of one worker that wait to be read")
-    max_connections: int = Field(description="open at once")
-    request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
-    max_map_segments: int = Field(description="segments of one map")
-    max_scan_segments: int = Field(description="segments of one scan")
-    max_beams: int = Field(description="ranges or points of one scan, or view")
     max_views: int = Field(description="views of one scan")
     max_beams_together: int = Field(description="ranges or points of all views of one scan")
     max_segments_together: int = Field(description="segments of all views of one scan")
-    max_correspondences: int = Field(description="correspondences of one registration")
-    max_batch: int = Field(description="scans of one batch")
-    max_deadline_ms: float = Field(description="largest deadline, and the default, milliseconds")
-    searches: int = Field(description="searches that run at once")
-    queue: int = Field(description="requests that may wait for a search")
     max_magnitude: float = Field(description="magnitude of any number")
     min_segment_length: float = Field(description="metres")
     max_segment_length: float = Field(description="metres")
     max_map_extent: float = Field(description="metres")
+
+
+_NOT_OF_REQUESTS = ("max_stored_bytes", "max_import_bytes")
+LIMITS = (
+    *(name for name in Settings.model_fields if name.startswith("max_") and name not in _NOT_OF_REQUESTS),
+    *("request_timeout_s", "searches", "queue"),
+)
+"""The settings that are limits of requests."""
+_SET: dict[str, Any] = {
+    name: (field.annotation, Field(description=field.description))
+    for name, field in Settings.model_fields.items()
+    if name in LIMITS
+}
+Limits = create_model("Limits", __base__=_FixedLimits, __doc__=_FixedLimits.__doc__, **_SET)
 
 
 class NoteAnswer(Answer):
@@ -145,13 +158,21 @@ class ImportedMapAnswer(NewMapAnswer):
 
 
 class GridPictureAnswer(Answer):
-    """The grid that a map comes from, as a picture."""
+    """The grid that a map comes from, as a picture.
 
-    png: str = Field(
-        description="PNG in base64: occupied cells are black, free ones white; at most 2048 pixels each way"
-    )
-    pose: PoseAnswer = Field(description="of the lower left corner, in the frame of the map")
-    resolution: float = Field(description="edge of a pixel, metres")
+    Attributes
+    ----------
+    png
+        PNG in base64: occupied cells are black, free ones white; at most 2048 pixels each way
+    pose
+        of the lower left corner, in the frame of the map
+    resolution
+        edge of a pixel, metres
+    """
+
+    png: str
+    pose: PoseAnswer
+    resolution: float
 
 
 class ImportTimingAnswer(Answer):

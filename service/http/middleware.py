@@ -15,28 +15,27 @@ from typing import TYPE_CHECKING
 from unicodedata import category
 
 from starlette.requests import Request
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from linefix.documents.errors import RequestError
 
 from ..errors import ControlCharacterError, MissingKeyError, NotHttpError, ServiceError, ShareUsedError, UnknownKeyError
-from .bodies import Intake
-from .exchange import KEY, Exchange
-from .problems import RAISED, problem_of, problem_or_defect
+from .connection import Connection
+from .exchange import KEY, Exchange, HangUpError
+from .problems import RAISED, as_ours, problem_or_defect
 from .services import Services
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Span
 
 logger = logging.getLogger("linefix")
+CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would send again at once
 OTHER = "unmatched"
-STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
 CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
-ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
-CLOSE = (b"connection", b"close")
+TWO_LENGTHS = {b"transfer-encoding", b"content-length"}
 _HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
 _STORED = re.compile("^/v1/maps/[^/:]+")
@@ -57,73 +56,63 @@ class RequestMiddleware:
             return
         # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
-        intake = Intake(receive, scope["headers"])
-        request = Request(inner, intake.receive)
-        exchange = Exchange(self._services, request, asyncio.get_running_loop().time(), _id_of(scope["headers"]))
+        request_id = _id_of(scope["headers"])
+        connection = Connection(scope, receive, send, self._services.settings, request_id)
+        exchange = Exchange(
+            request_id=request_id,
+            services=self._services,
+            request=Request(inner, connection.receive),
+            arrived=asyncio.get_running_loop().time(),
+            noted=connection.noted,
+        )
         state = inner.setdefault("state", {})
         state[KEY] = exchange
         try:
-            await self._admit(exchange, intake, scope, send)
+            await self._admit(exchange, connection, scope)
         finally:
             del state[KEY]  # the exchange refers to the request: heads would wait for the garbage collector
 
-    async def _admit(self, exchange: Exchange, intake: Intake, scope: Scope, send: Send) -> None:
+    async def _admit(self, exchange: Exchange, connection: Connection, scope: Scope) -> None:
         try:
             _require_plain(scope)
             exchange.ticket = self._services.entrance.admit(scope)
         except (ServiceError, RequestError) as error:
-            await self._refuse(error, exchange, intake, scope, send)
+            await self._refuse(error, exchange, connection, scope)
             return
         traces = self._services.traces
         traced: AbstractContextManager[Span | None] = (
             nullcontext() if traces is None else traces.request(scope["headers"])
         )
         with traced as span:
-            await self._serve(exchange, intake, span, scope["method"], send)
+            await self._serve(exchange, connection, scope["method"], span)
 
-    async def _refuse(self, error: Exception, exchange: Exchange, intake: Intake, scope: Scope, send: Send) -> None:
+    async def _refuse(self, error: Exception, exchange: Exchange, connection: Connection, scope: Scope) -> None:
         """Answer in place of the application; counted, and logged once a second."""
         if isinstance(error, ShareUsedError):
             await asyncio.sleep(LATER)
         kind, route = RAISED[type(error)], _STORED.sub("/v1/maps/{map_id}", scope["path"])
         route = route if route in self._routes else OTHER
         self._services.refusals.count(route, scope["method"], kind.code, kind.status)
-        stranger = isinstance(error, STRANGERS)
-        most_bytes = STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes
-        ends = not await intake.drop_rest(most_bytes) or stranger
+        connection.is_strangers = isinstance(error, STRANGERS)
+        problem = problem_or_defect(error, exchange.request_id)
+        await problem.response(exchange.request_id)(scope, connection.receive, connection.send)
 
-        async def send_refusal(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                _add_headers(message, exchange.request_id, close=ends)
-            await send(message)
-
-        problem = problem_of(error)
-        assert problem is not None
-        await problem.response(exchange.request_id)(scope, intake.receive, send_refusal)
-
-    async def _serve(self, exchange: Exchange, intake: Intake, span: Span | None, method: str, send: Send) -> None:
-        started, status = time.perf_counter(), 0
-
-        async def send_with_id(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-                # The server would read on without end.
-                ends = not await intake.drop_rest(self._services.settings.max_body_bytes)
-                _add_headers(message, exchange.request_id, close=ends)
-            await send(message)
-
-        scope = exchange.request.scope
+    async def _serve(self, exchange: Exchange, connection: Connection, method: str, span: Span | None) -> None:
+        scope, started = exchange.request.scope, time.perf_counter()
         try:
-            await self._app(scope, intake.receive, send_with_id)
+            await self._app(scope, connection.receive, connection.send)
+        except HangUpError:
+            connection.status = CLIENT_CLOSED_REQUEST
         except Exception as error:
-            problem = problem_or_defect(error, exchange.request_id)
-            if status:
+            problem = problem_or_defect(as_ours(error, exchange.request), exchange.request_id)
+            if connection.status:
                 raise
-            await problem.response(exchange.request_id)(scope, intake.receive, send_with_id)
+            exchange.note(code=problem.kind.code)
+            await problem.response(exchange.request_id)(scope, connection.receive, connection.send)
         finally:
+            exchange.held.close()
             self._services.gate.leave(exchange.ticket)
-            self._report(exchange, method, status, time.perf_counter() - started, span)
+            self._report(exchange, method, connection.status, time.perf_counter() - started, span)
 
     def _report(self, exchange: Exchange, method: str, status: int, seconds: float, span: Span | None) -> None:
         """Count and log a request; status 0 is a client that hung up before it was answered."""
@@ -151,23 +140,11 @@ def _require_plain(scope: Scope) -> None:
     A router that looks for the end of a line takes ``/metrics%0A`` for ``/metrics``; the rule of a proxy for that path
     does not.
     """
-    hosts = [value for name, value in scope["headers"] if name == b"host"]
-    codings = [value.strip().lower() for name, value in scope["headers"] if name == b"transfer-encoding"]
-    has_length = any(name == b"content-length" for name, _ in scope["headers"])
-    if len(hosts) > 1 or (scope["http_version"] == "1.1" and not hosts):
-        raise NotHttpError
-    if codings not in ([], [b"chunked"]) or (codings and has_length):
-        raise NotHttpError
-    if hosts and not _HOST.fullmatch(hosts[0]):
+    fields = dict(scope["headers"])  # h11 has refused two hosts, none in HTTP/1.1, and codings other than chunked
+    if fields.keys() >= TWO_LENGTHS or not _HOST.fullmatch(fields.get(b"host", b"")):
         raise NotHttpError
     if not scope["path"].isprintable():
         for character in scope["path"]:
             if category(character) in CONTROL:
                 found = f"the path has the control character U+{ord(character):04X}"
                 raise ControlCharacterError(f"{found}; expected none; remove it")
-
-
-def _add_headers(message: Message, request_id: str, *, close: bool) -> None:
-    """Add the headers that all answers have."""
-    own = ((b"x-request-id", request_id.encode("ascii")), *ALWAYS, *((CLOSE,) if close else ()))
-    message["headers"] = [*message.get("headers", ()), *own]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import FastAPI
@@ -13,7 +14,7 @@ from linefix.documents.errors import Fault
 
 from ..admission.entrance import GUARDED
 from . import answers
-from .bodies import JSON
+from .exchange import JSON
 from .problems import KINDS, MEDIA_TYPE, Kind, Problem
 
 DESCRIPTION = """
@@ -58,15 +59,7 @@ def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
     }
 
 
-def searches(model: type[BaseModel], examples: dict[str, Any], *codes: str) -> dict[str, Any]:
-    """Return the documentation of a route that reads a body and searches; `codes` are of further errors."""
-    return {
-        "responses": problems(*EVERYWHERE, *SEARCHES, *codes, *READS_BODY),
-        "openapi_extra": takes(model, examples),
-    }
-
-
-def takes(model: type[BaseModel], examples: dict[str, Any]) -> dict[str, Any]:
+def takes(model: type[BaseModel], examples: Mapping[str, Any]) -> dict[str, Any]:
     """Return the documentation of a body that the route itself reads."""
     _TAKEN[model.__name__] = model
     return {

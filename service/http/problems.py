@@ -9,12 +9,12 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import NoReturn
 
 import orjson
-from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.routing import Match
 
@@ -35,8 +35,6 @@ from registration import InputError
 
 from .. import errors
 from .etags import etag
-from .exchange import exchange_of
-from .search_stage import HangUpError
 
 logger = logging.getLogger("linefix")
 MEDIA_TYPE = "application/problem+json"
@@ -44,7 +42,6 @@ MAX_MESSAGE = 200
 MAX_DETAIL = 400
 MAX_POINTER = 120
 NAMED_BY_CALLER = "/map_weights"  # an object whose fields are ids of maps
-CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 CLOSE = {"Connection": "close"}
 """Of an answer that is given before the body was read: its rest is of no use."""
 
@@ -157,25 +154,12 @@ def problem_or_defect(error: Exception, request_id: str) -> Problem:
     return problem or INTERNAL
 
 
-def handle_errors(app: FastAPI) -> None:
-    """Have an application answer with problems."""
-    for kind in (*RAISED, RequestValidationError, HTTPException, ClientDisconnect):
-        app.add_exception_handler(kind, _refuse)
-    app.add_exception_handler(HangUpError, _nobody)
+async def pass_on(request: Request, error: Exception) -> NoReturn:
+    """Leave an error of the framework to the middleware, which makes a problem of it as of any other."""
+    raise error
 
 
-async def _refuse(request: Request, error: Exception) -> Response:
-    exchange = exchange_of(request.scope)
-    problem = problem_or_defect(_own(request, error), exchange.request_id)
-    exchange.note(code=problem.kind.code)
-    return problem.response(exchange.request_id)
-
-
-async def _nobody(request: Request, error: Exception) -> Response:
-    return Response(status_code=CLIENT_CLOSED_REQUEST)
-
-
-def _own(request: Request, error: Exception) -> Exception:
+def as_ours(error: Exception, request: Request) -> Exception:
     """Return an exception of ours for what FastAPI and Starlette refuse by themselves."""
     match error:
         case RequestValidationError():
@@ -185,7 +169,8 @@ def _own(request: Request, error: Exception) -> Exception:
         case HTTPException(status_code=404):
             return errors.NotFoundError()
         case HTTPException(status_code=405):  # the framework names the methods of one route only
-            matching = (route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE)
+            routes = request.scope["app"].routes
+            matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
             methods = {method for route in matching for method in getattr(route, "methods", ())}
             return errors.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
         case HTTPException():

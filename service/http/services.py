@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..admission.budget import ByteBudget
-from ..admission.entrance import Entrance, Origins
+from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
 from ..importing.reader import Bounds
@@ -59,8 +59,9 @@ class Services:
             settings.max_map_segments,
         )
         self.keyring = Keyring(settings.keys, settings.keys_file)
-        origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
-        self.entrance = Entrance(self.gate, self.keyring, origins, settings.max_body_bytes)
+        self.entrance = Entrance(
+            self.gate, self.keyring, settings.max_body_bytes, settings.hosts, settings.cors_origins
+        )
         self.bodies = self._budget(settings.max_bodies_bytes)
         self.answers = self._budget(settings.max_answers_bytes)
         self.documents = self._budget(settings.max_answers_bytes)
@@ -69,7 +70,7 @@ class Services:
         self.readiness = Readiness(self.store)
         cache = IndexCache(settings.share(settings.cache_bytes), self.metrics)
         self.lookup = MapLookup(cache, self.store, self.parser)
-        self.associator = Associator(self.lookup, self.metrics)
+        self.associator = Associator(self.metrics)
         self.parse_threads, self.store_threads, self.key_threads = (
             Threads(count, name) for count, name in ((2, "parse"), (4, "store"), (1, "keys"))
         )

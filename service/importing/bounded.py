@@ -24,6 +24,7 @@ from ..parsing.child import Child, ChildBounds
 from .folders import own_folder
 from .reader import Bounds, read_form_apart
 
+REFUSALS = {kind.__name__: kind for kind in (FileTooLargeError, FormatsMissingError, NoRoomError, UnknownFormatError)}
 HEAD = 1_000  # bytes, more than a short answer takes where the bounds are small
 
 
@@ -110,14 +111,8 @@ def _require_report(told: dict[str, Any]) -> None:
     match told:
         case {"report": dict()}:
             return
-        case {"missing": _}:
-            raise FormatsMissingError
-        case {"no_room": _}:
-            raise NoRoomError
-        case {"unknown": str(why)}:
-            raise UnknownFormatError(why)
-        case {"too_large": str(why)}:
-            raise FileTooLargeError(why)
+        case {"refused": str(kind), "why": str(why)} if kind in REFUSALS:
+            raise REFUSALS[kind](why)
         case {"invalid": list(faults)}:
             raise InvalidRequestError([Fault(**fault) for fault in faults])
         case {"failed": str(kind)}:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from linefix.documents.errors import Fault, InvalidRequestError
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 Fields = Mapping[str, Sequence[str]]
 """Values as text; a field may be there several times."""
 
-Known = dict[str, tuple[Callable[[Sequence[str]], Any], dict[str, Any]]]
-"""The reader and the schema of each field; everything in a form is text."""
+Known = Mapping[str, Callable[[Sequence[str]], Any]]
+"""The reader of each field; everything in a form is text."""
 
 MAX_SCANS = 1000
 _TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
@@ -31,7 +31,7 @@ def options_of(fields: Fields) -> ImportOptions:
     """
     from formats import ImportOptions, InvalidOptionError
 
-    said = read_fields(fields, FIELDS)
+    said = read_fields(fields, MapForm.fields)
     try:
         return ImportOptions(**said)
     except InvalidOptionError as error:
@@ -53,7 +53,7 @@ def read_fields(fields: Fields, known: Known) -> dict[str, Any]:
     said = {}
     for name, values in fields.items():
         try:
-            said[name] = known[name][0](values)
+            said[name] = known[name](values)
         except ValueError as error:
             raise InvalidRequestError([Fault(f"/{name}", str(error))]) from None
     return said
@@ -116,59 +116,71 @@ def _count(values: Sequence[str]) -> int:
     return int(text)
 
 
-def _said(what: str, *choices: str) -> dict[str, Any]:
-    return {"enum": [*choices], "description": what} if choices else {"type": "string", "description": what}
+class MapForm:
+    """The map and the files that it names, such as a yaml and its picture; a part with a filename is a file.
 
+    Next to them there are fields, each with its reader.
 
-FIELDS: Known = {
-    "units": (_units, _said("of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit")),
-    "layers": (_patterns, _said("patterns such as *WALL*, comma separated")),
-    "point": (_places, _said("a free place, `x y` in metres; may be repeated")),
-    "drawn": (_text, _said("whether lines of a drawing are faces or centre lines of walls", "faces", "centres")),
-    "thickness": (_number, _said("of walls drawn as centre lines, metres")),
-    "oriented": (_truth, _said("whether free space lies on the left of the lines", "true", "false")),
-    "local_metres": (_truth, _said("whether a GeoJSON is in metres", "true", "false")),
-    "topic": (_text, _said("of the grid in a bag")),
-    "unknown": (
-        _unknown,
-        _said("of a grid: the grey value of unknown cells, 0 to 255, or none; left out: recognized"),
-    ),
-    "where": (
-        tuple,
-        _said("entities of a drawing to read, as property=value, the value a pattern; may be repeated"),
-    ),
-    "level": (_text, _said("floor of a drawing that has several levels")),
-    "surface": (
-        _number,
-        _said(
-            "of a grid: cells from the front of occupied cells to the surface of walls, 0 to 10; left out: found from "
-            "the grid"
-        ),
-    ),
-}
-SCANS_FIELDS: Known = {
-    "topic": (_text, _said("of the scans; left out: the one with most of them")),
-    "max_scans": (
-        _count,
-        _said("greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread"),
-    ),
-}
+    Attributes
+    ----------
+    units
+        of a drawing: mm, cm, dm, m, km, in, ft, yd, us-ft, or metres per unit
+    layers
+        patterns such as *WALL*, comma separated
+    point
+        a free place, `x y` in metres; may be repeated
+    drawn
+        whether lines of a drawing are faces or centre lines of walls
+    thickness
+        of walls drawn as centre lines, metres
+    oriented
+        whether free space lies on the left of the lines
+    local_metres
+        whether a GeoJSON is in metres
+    topic
+        of the grid in a bag
+    unknown
+        of a grid: the grey value of unknown cells, 0 to 255, or none; left out: recognized
+    where
+        entities of a drawing to read, as property=value, the value a pattern; may be repeated
+    level
+        floor of a drawing that has several levels
+    surface
+        of a grid: cells from the front of occupied cells to the surface of walls, 0 to 10; left out: found from the
+        grid
+    """
 
-
-def _form(files: str, fields: Known) -> dict[str, Any]:
-    """Return the schema of a form with files, which are described, and fields."""
-    content = {"type": "array", "minItems": 1, "items": {"type": "string", "format": "binary"}, "description": files}
-    return {
-        "type": "object",
-        "required": ["file"],
-        "additionalProperties": False,
-        "properties": {"file": content, **{name: schema for name, (_, schema) in fields.items()}},
+    fields: ClassVar[Known] = {
+        "units": _units,
+        "layers": _patterns,
+        "point": _places,
+        "drawn": _text,
+        "thickness": _number,
+        "oriented": _truth,
+        "local_metres": _truth,
+        "topic": _text,
+        "unknown": _unknown,
+        "where": tuple,
+        "level": _text,
+        "surface": _number,
     }
 
 
-MAP_FORM = _form(
-    "the map and the files that it names, such as a yaml and its picture; a part with a filename is a file", FIELDS
-)
-SCANS_FORM = _form(
-    "a log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file", SCANS_FIELDS
-)
+class ScansForm:
+    """A log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file.
+
+    Next to it there are fields, each with its reader.
+
+    Attributes
+    ----------
+    topic
+        of the scans; left out: the one with most of them
+    max_scans
+        greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread
+    """
+
+    fields: ClassVar[Known] = {"topic": _text, "max_scans": _count}
+
+
+CHOICES = {"drawn": ["faces", "centres"], "oriented": ["true", "false"], "local_metres": ["true", "false"]}
+"""Values of those fields that have few."""

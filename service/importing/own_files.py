@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from linefix.documents.errors import Fault, InvalidRequestError
 
-from .fields import FIELDS
+from ..errors import FileTooLargeError, UnknownFormatError
+from .fields import MapForm
 
 if TYPE_CHECKING:
     from formats import FormatError
@@ -78,7 +79,7 @@ def own_files(names: list[str], map_name: str, folder: Path) -> OwnFiles:
 def read_own(
     form: Form, folder: Path, read: Callable[[OwnFiles], Lines], suffixes: tuple[str, ...], kind: str, one: str
 ) -> Lines:
-    """Put the files of a form into a folder and read them; an error for which there is another status is the answer.
+    """Put the files of a form into a folder and read them.
 
     The file that is read first ends in one of `suffixes`; `kind` names it in messages, and `one` what is expected.
 
@@ -86,6 +87,8 @@ def read_own(
     ------
     InvalidRequestError
         When a file is wrong, or it is not clear which one is to be read.
+    FileTooLargeError, UnknownFormatError
+        When it is not read.
     """
     from formats import FormatError, TooLargeError, UnsupportedFormatError
 
@@ -97,9 +100,9 @@ def read_own(
         form.files.clear()
         return read(files)
     except TooLargeError as error:
-        return [{"too_large": error.message}]
+        raise FileTooLargeError(error.message) from None
     except UnsupportedFormatError as error:
-        return [{"unknown": error.message}]
+        raise UnknownFormatError(error.message) from None
     except FormatError as error:
         raise InvalidRequestError([fault_of(error, files)]) from None
 
@@ -128,9 +131,9 @@ def fault_of(error: FormatError, files: OwnFiles) -> Fault:
     from formats import IncompleteFileError
 
     pointer, number = f"/{error.argument}", files.number_of(error.argument)
-    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in FIELDS:
+    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in MapForm.fields:
         return Fault("/files", "the map names a file that was not sent, such as its picture; send it, too")
-    if pointer[1:] not in FIELDS:
+    if pointer[1:] not in MapForm.fields:
         pointer = "/files" if number is None else f"/files/{number}"
     elif error.index is not None:
         pointer += f"/{error.index}"

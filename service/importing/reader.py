@@ -18,7 +18,8 @@ import orjson
 
 from linefix.documents.errors import InvalidRequestError
 
-from .fields import SCANS_FIELDS, options_of, read_fields
+from ..errors import FileTooLargeError, FormatsMissingError, NoRoomError, ServiceError
+from .fields import ScansForm, options_of, read_fields
 from .own_files import Lines, OwnFiles, read_own
 
 if TYPE_CHECKING:
@@ -61,18 +62,26 @@ def read_form_apart(content: bytes, content_type: str, folder: str, bounds: Boun
             lines = read_files(content, content_type, Path(folder), bounds)
     except InvalidRequestError as error:
         lines = [{"invalid": [asdict(fault) for fault in error.faults]}]
+    except ServiceError as error:
+        lines = _refused(error)
     except ModuleNotFoundError:
-        lines = [{"missing": True}]
+        lines = _refused(FormatsMissingError())
     except (MemoryError, RecursionError):
-        lines = [{"too_large": "reading the file takes more memory than is allowed; simplify the file"}]
+        lines = _refused(FileTooLargeError("reading the file takes more memory than is allowed; simplify the file"))
     except Exception as error:  # a defect, or a full disk; only its kind is returned, nothing of the file
         full = isinstance(error, OSError) and error.errno in FULL
-        lines = [{"no_room": True} if full else {"failed": type(error).__name__}]
+        lines = _refused(NoRoomError()) if full else [{"failed": type(error).__name__}]
     printed = _printed(lines)
     if len(printed) > bounds.file_bytes:  # such a map could not be put either
         most = bounds.file_bytes
-        return _printed([{"too_large": f"expected an answer of at most {most} bytes, found more; send less"}])
+        return _printed(
+            _refused(FileTooLargeError(f"expected an answer of at most {most} bytes, found more; send less"))
+        )
     return printed
+
+
+def _refused(error: ServiceError) -> Lines:
+    return [{"refused": type(error).__name__, "why": str(error)}]
 
 
 def _printed(lines: Lines) -> bytes:
@@ -81,12 +90,12 @@ def _printed(lines: Lines) -> bytes:
 
 
 def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> Lines:
-    """Return a report and a map, or an error for which there is another status than 422.
+    """Return a report and a map.
 
     Raises
     ------
-    InvalidRequestError
-        When the form, an option or a file is wrong.
+    InvalidRequestError, ServiceError
+        When the form, an option or a file is wrong; when it is not read.
     """
     from formats import MAP_SUFFIXES, read_map
 
@@ -99,7 +108,7 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
         imported = read_map(files.map, options, files.paths)
         for name, found in (("segments", len(imported.map.segments)), ("points", len(imported.map.points))):
             if found > bounds.segments:
-                return [{"too_large": f"expected at most {bounds.segments} {name}, found {found}; simplify the file"}]
+                raise FileTooLargeError(f"expected at most {bounds.segments} {name}, found {found}; simplify the file")
         return _answer(imported, files)
 
     return read_own(form, folder, read, MAP_SUFFIXES, "map", "one map and the files that it names, such as a picture")
@@ -141,19 +150,19 @@ def picture_json(picture: GridPicture) -> dict[str, Any]:
 
 
 def read_scans(content: bytes, content_type: str, folder: Path) -> Lines:
-    """Return a report and scans, or an error for which there is another status than 422.
+    """Return a report and scans.
 
     Raises
     ------
-    InvalidRequestError
-        When the form, an option or a file is wrong.
+    InvalidRequestError, ServiceError
+        When the form, an option or a file is wrong; when it is not read.
     """
     from formats import LOG_SUFFIXES, LogOptions, read_log, scan_json, thinned
 
     from .form import read_form
 
     form = read_form(content, content_type)
-    options = read_fields(form.fields, SCANS_FIELDS)
+    options = read_fields(form.fields, ScansForm.fields)
 
     def read(files: OwnFiles) -> Lines:
         log = read_log(files.map, LogOptions(topic=options.get("topic")))

@@ -46,7 +46,7 @@ class IndexCache:
     def __init__(self, max_bytes: int, metrics: Metrics) -> None:
         self._max_bytes = max_bytes
         self._metrics = metrics
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._ready: OrderedDict[Hashable, CachedMap] = OrderedDict()
         self._building: dict[Hashable, Future[CachedMap]] = {}
         self.bytes = 0
@@ -59,6 +59,15 @@ class IndexCache:
         with self._lock:
             return key in self._ready
 
+    def find(self, key: Hashable) -> CachedMap | None:
+        """Return a map, or maps; None where they are not there."""
+        with self._lock:
+            found = self._ready.get(key)
+            if found is not None:
+                self._ready.move_to_end(key)
+                self._metrics.cache_hits.inc()
+            return found
+
     def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
         """Return the map, or the maps, of a key, built by this caller or by the first one that requested it.
 
@@ -68,10 +77,8 @@ class IndexCache:
             When the deadline passes, or is cancelled, while the first caller still builds it.
         """
         with self._lock:
-            found = self._ready.get(key)
+            found = self.find(key)
             if found is not None:
-                self._ready.move_to_end(key)
-                self._metrics.cache_hits.inc()
                 return found
             promise = self._building.get(key)
             if promise is None:

@@ -20,8 +20,7 @@ from .store import MapStore
 from .tables import MapOutline, MapRecord
 
 OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
-LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
-LONG_BYTES = 100_000  # of the document of one
+LONG_SEGMENTS = 2_000  # of a map in a request, whose content is not compared with those of others in the event loop
 MOST_TOGETHER = 200_000  # segments of several maps, and points, as of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
@@ -78,14 +77,12 @@ class MapLookup:
         """Return whether maps are indexed already; `oriented` None: as each map states."""
         return self._cache.has(_key(found, oriented))
 
-    def takes_long(self, found: FoundMaps, *, oriented: bool | None) -> bool:
-        """Return whether it may take long until maps are ready to be searched."""
+    def cached(self, found: FoundMaps, *, oriented: bool | None) -> CachedMap | None:
+        """Return maps that are indexed already; None where they are not, or finding that out takes a while."""
         single = found.maps.get(None)
-        if single is None:
-            return not self.is_cached(found, oriented=oriented)
-        if isinstance(single, InlineMap):
-            return len(single.segments) + len(single.points) > LONG_SEGMENTS
-        return found.document is not None and len(found.document) > LONG_BYTES
+        if isinstance(single, InlineMap) and len(single.segments) + len(single.points) > LONG_SEGMENTS:
+            return None
+        return self._cache.find(_key(found, oriented))
 
     def indexed(self, found: FoundMaps, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
         """Return maps ready to be searched, several by one index; runs off the event loop.

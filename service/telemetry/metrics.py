@@ -68,11 +68,9 @@ class Metrics:
         for gauge, read in self._watched:
             gauge.set(read())
 
-    async def refresh_now_and_then(self) -> None:
-        """Read the watched values, for requests that reach another worker."""
-        while True:
-            self.refresh()
-            await asyncio.sleep(REFRESH_SECONDS)
+    async def refreshed(self) -> None:
+        """Read the watched values, in the event loop."""
+        self.refresh()
 
     def observe_request(self, route: str, method: str, status: int, seconds: float) -> None:
         """Count one request; status 0 is a client that hung up before it was answered."""

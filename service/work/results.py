@@ -18,11 +18,10 @@ from linefix.operations import Json, Stopwatch, Target, find
 from map_quality import check_map
 
 from ..importing.bounded import ReadFiles
-from ..maps import CachedMap
-from ..maps.lookup import FoundMaps, MapLookup, outline_of
+from ..maps.lookup import MapLookup, outline_of
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
-from .job import Done, Job
+from .job import Job
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,32 +46,17 @@ class Associator:
 
     Attributes
     ----------
-    lookup : MapLookup
     metrics : Metrics
         Counts verdicts, and the work of the searches.
     """
 
-    lookup: MapLookup
     metrics: Metrics
 
-    def answer(self, asked: AssociateRequest, source: FoundMaps, job: Job, ready: CachedMap | None = None) -> Done:
-        """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
-        target = self.target(asked, source, job.deadline, ready)
+    def answer(self, asked: AssociateRequest, target: Target, job: Job) -> bytes:
+        """Find one scan in one map, or on several; raises as `find`."""
         found = self.find(target, asked, asked.options, job.deadline, job.watch)
         noted = {"map": found["map"], "verdict": found["status"], "usable": found["usable"]}
-        return job.done({**found, "client_ref": asked.client_ref}, **noted)
-
-    def target(
-        self,
-        asked: AssociateRequest | BatchRequest,
-        source: FoundMaps,
-        deadline: Deadline,
-        ready: CachedMap | None = None,
-    ) -> Target:
-        """Return a map, or several, indexed unless ready; raises as `MapLookup.indexed`."""
-        with stage("index"):
-            cached = ready or self.lookup.indexed(source, oriented=asked.options.oriented, deadline=deadline)
-        return Target(cached.maps, cached.frames, source.references, asked.map_weights)
+        return job.encoded({**found, "client_ref": asked.client_ref}, **noted)
 
     def find(
         self,
@@ -104,13 +88,13 @@ class Associator:
         return BatchResult(found["status"], encode({"index": index, "status_code": 200, "result": found}))
 
 
-def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResult], job: Job) -> Done:
+def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResult], job: Job) -> bytes:
     """Return the answer of a batch, given its items."""
     noted = dict(Counter(result.verdict for result in results))
     items = [orjson.Fragment(result.body) for result in results]
     reference = target.references.get(None)
     answer = {"results": items, "map": reference, "client_ref": asked.client_ref}
-    return job.done(answer, map=reference, verdicts=noted)
+    return job.encoded(answer, map=reference, verdicts=noted)
 
 
 def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> MapIndex:
@@ -132,7 +116,7 @@ def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> 
         raise CancelledError if deadline.cancelled else DeadlinePassedError from None
 
 
-def answer_import(index: MapIndex, line_map: InlineMap, read: ReadFiles, job: Job) -> Done:
+def answer_import(index: MapIndex, line_map: InlineMap, read: ReadFiles, job: Job) -> bytes:
     """Return a map that could be put as it is, the report of its import, and its doubtful parts.
 
     Raises
@@ -149,11 +133,11 @@ def answer_import(index: MapIndex, line_map: InlineMap, read: ReadFiles, job: Jo
         "picture": read.head["picture"],
         "check": check_json(found),
     }
-    return job.done(answer, format=report["format"], findings=[one.code for one in found.findings])
+    return job.encoded(answer, format=report["format"], findings=[one.code for one in found.findings])
 
 
-def answer_scans(read: ReadFiles, job: Job) -> Done:
+def answer_scans(read: ReadFiles, job: Job) -> bytes:
     """Return scans that may be sent as they are, and the report of reading them."""
     job.watch.lap("read")
     scans, report = orjson.Fragment(read.content.removeprefix(b'{"scans":').removesuffix(b"}\n")), read.head["report"]
-    return job.done({"scans": scans, "count": int(read.head["count"]), "report": report}, format=report["format"])
+    return job.encoded({"scans": scans, "count": int(read.head["count"]), "report": report}, format=report["format"])

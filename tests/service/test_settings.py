@@ -10,7 +10,7 @@ import pytest
 
 from service.database_location import database_url
 from service.serving import unknown_settings
-from service.settings import Settings, SettingsError, read_settings
+from service.settings import SettingsError, read_settings
 
 
 @pytest.fixture(autouse=True)
@@ -88,14 +88,6 @@ def test_limits_are_the_settings_of_the_same_kind() -> None:
     limits = read_settings([*said.split(), "--max-batch", "6"]).limits()
     assert (limits.values, limits.map_segments, limits.scan_segments) == (1001, 2, 3)
     assert (limits.beams, limits.pairs, limits.batch) == (4, 5, 6)
-
-
-def test_another_process_reads_the_same_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "environ", {**os.environ, "linefix_port": "81", "LINEFIX_KEYS": "sesame, two"})
-    settings = read_settings(["--port", "82", "--hosts", "a.example,b.example", "--allow-anonymous"])
-    settings.export()
-    assert Settings() == settings
-    assert settings.port == 82
 
 
 def test_keys_that_are_set_to_nothing_are_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -158,27 +158,27 @@ class Limits(TypedDict):
     Limits of requests; a request beyond one is rejected.
     """
 
+    max_views: int
+    max_beams_together: int
+    max_segments_together: int
+    max_magnitude: float
+    min_segment_length: float
+    max_segment_length: float
+    max_map_extent: float
+    searches: int
+    queue: int
     max_body_bytes: int
     max_values: int
     max_bodies_bytes: int
     max_answers_bytes: int
     max_connections: int
-    request_timeout_s: float
     max_map_segments: int
     max_scan_segments: int
     max_beams: int
-    max_views: int
-    max_beams_together: int
-    max_segments_together: int
     max_correspondences: int
     max_batch: int
     max_deadline_ms: float
-    searches: int
-    queue: int
-    max_magnitude: float
-    min_segment_length: float
-    max_segment_length: float
-    max_map_extent: float
+    request_timeout_s: float
 
 
 class Live(TypedDict):

@@ -11,79 +11,85 @@ from fastapi import APIRouter, Response
 from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap
 from linefix.documents.reading import read_model
+from linefix.documents.strict import descriptions_of
 
 from ...errors import ImportTooLateError
 from ...importing.bounded import ReadFiles, read_apart
-from ...importing.fields import MAP_FORM, SCANS_FORM
-from ...work.job import Done, Job
+from ...importing.fields import CHOICES, MapForm, ScansForm
 from ...work.results import answer_import, answer_scans, index_import
 from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM, parse, receive
 from ..exchange import Exchange, Searching
 from ..openapi import EVERYWHERE, READS_BODY, SEARCHES, problems
-from ..search_stage import in_search_slot
-from ..sending import answer
+from ..stages import in_search_slot
 
 router = APIRouter(tags=["maps"])
 _PROBLEMS = problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES)
 
 
-def _takes(schema: dict[str, Any]) -> dict[str, Any]:
+def _takes(form: type[MapForm | ScansForm]) -> dict[str, Any]:
+    """Return the documentation of a form with files and fields, which its docstring describes."""
+    files = (form.__doc__ or "").partition(".\n")[0]
+    content = {"type": "array", "minItems": 1, "items": {"type": "string", "format": "binary"}, "description": files}
+    fields = {
+        name: ({"enum": CHOICES[name]} if name in CHOICES else {"type": "string"}) | {"description": text}
+        for name, text in descriptions_of(form).items()
+    }
+    schema = {
+        "type": "object",
+        "required": ["file"],
+        "additionalProperties": False,
+        "properties": {"file": content, **fields},
+    }
     description = "A form with files. May be gzip (Content-Encoding)."
     return {"requestBody": {"required": True, "description": description, "content": {FORM: {"schema": schema}}}}
 
 
-@router.post(
-    "/v1/maps:import",
-    response_model=ImportAnswer,
-    responses=_PROBLEMS,
-    openapi_extra=_takes(MAP_FORM),
-    summary="Read the map of another tool",
-)
+@router.post("/v1/maps:import", response_model=ImportAnswer, responses=_PROBLEMS, openapi_extra=_takes(MapForm))
 async def import_map(exchange: Searching) -> Response:
-    """Convert files of another tool to a map, and report conversions and findings; nothing is stored."""
+    """Read the map of another tool.
 
-    async def work(read: ReadFiles, job: Job) -> Done:
+    Convert files of another tool to a map, and report conversions and findings; nothing is stored.
+    """
+
+    async def work(read: ReadFiles) -> bytes:
         """Index the map in a slot of its own, and check it in one of a search; searches go before both."""
-        job.watch.lap("read")
-        services, deadline = exchange.services, job.deadline
-        line_map = await parse(exchange, partial(read_model, InlineMap), read.content, deadline)
+        exchange.watch.lap("read")
+        services, deadline = exchange.services, exchange.deadline
+        line_map = await parse(exchange, partial(read_model, InlineMap), read.content)
         indexing = partial(index_import, services.lookup, line_map, deadline)
         index = await services.indexing.run(indexing, deadline, exchange.ticket)
-        return await in_search_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
+        return await in_search_slot(exchange, partial(answer_import, index, line_map, read, exchange))
 
     return await _import(exchange, work)
 
 
-@router.post(
-    "/v1/scans:import",
-    response_model=ScansAnswer,
-    responses=_PROBLEMS,
-    openapi_extra=_takes(SCANS_FORM),
-    summary="Read scans of a log",
-)
+@router.post("/v1/scans:import", response_model=ScansAnswer, responses=_PROBLEMS, openapi_extra=_takes(ScansForm))
 async def import_scans(exchange: Searching) -> Response:
-    """Read some scans of a bag or another log, evenly spread; nothing is stored."""
+    """Read scans of a log.
 
-    async def work(read: ReadFiles, job: Job) -> Done:
-        return await in_search_slot(exchange, partial(answer_scans, read, job), job.deadline)
+    Read some scans of a bag or another log, evenly spread; nothing is stored.
+    """
+
+    async def work(read: ReadFiles) -> bytes:
+        return await in_search_slot(exchange, partial(answer_scans, read, exchange))
 
     return await _import(exchange, work, scans=True)
 
 
 async def _import(
-    exchange: Exchange, work: Callable[[ReadFiles, Job], Awaitable[Done]], *, scans: bool = False
+    exchange: Exchange, work: Callable[[ReadFiles], Awaitable[bytes]], *, scans: bool = False
 ) -> Response:
     """Have a form read in a slot of imports, and answer with what `work` makes of its files."""
     services = exchange.services
     async with receive(exchange, form=True) as content:
-        job, kind = exchange.job(), exchange.request.headers.get("content-type", "")
-        reading = partial(read_apart, content, kind, services.import_bounds, job.deadline, scans=scans)
+        deadline, kind = exchange.deadline, exchange.request.headers.get("content-type", "")
+        reading = partial(read_apart, content, kind, services.import_bounds, deadline, scans=scans)
 
-        async def whole() -> Done:
-            return await work(await services.importing.run(reading, job.deadline, exchange.ticket), job)
+        async def whole() -> bytes:
+            return await work(await services.importing.run(reading, deadline, exchange.ticket))
 
         try:
-            return await answer(exchange, whole(), job.deadline)
+            return await exchange.respond(whole())
         except DeadlinePassedError:  # it is no search that has not begun
             raise ImportTooLateError from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Query, Response
 
 from linefix.documents import examples
 from linefix.documents.encoding import encode
@@ -17,14 +17,11 @@ from ..answers import MapList, MapSummaryAnswer
 from ..bodies import read
 from ..etags import demands_of, etag, is_unchanged
 from ..exchange import Admitted
-from ..map_stage import ask_store
 from ..openapi import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
-from ..sending import json_response
+from ..searching import MapIdPath
+from ..stages import ask_store
 
 router = APIRouter(tags=["maps"])
-MapIdPath = Annotated[
-    str, Path(pattern="^[A-Za-z0-9._-]+$", min_length=1, max_length=128, examples=["hq-3"], description="the map's id")
-]
 STORE = ("overloaded", "read_only", "not_ready")
 ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
 
@@ -52,10 +49,12 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
         **takes(MapDocument, {"a room": examples.MAP}),
         "parameters": _conditional("If-Match", "If-None-Match"),
     },
-    summary="Store a map",
 )
 async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
-    """Store a map durably: after the answer it survives the loss of process and power."""
+    """Store a map.
+
+    Store a map durably: after the answer it survives the loss of process and power.
+    """
     demands = demands_of(exchange.request)
     services = exchange.services
     asked, document = await read(exchange, read_map)
@@ -65,7 +64,7 @@ async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
     answer = encode(outline.as_json(map_id, revision))
-    return json_response(answer, 201 if created else 200, {"ETag": etag(revision)})
+    return exchange.json(answer, 201 if created else 200, {"ETag": etag(revision)})
 
 
 @router.get(
@@ -77,24 +76,25 @@ async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
         **problems(*EVERYWHERE, *STORE, "unknown_map", "map_corrupt", "invalid_request"),
     },
     openapi_extra={"parameters": _conditional("If-None-Match")},
-    summary="Get a map",
 )
 async def get_map(exchange: Admitted, map_id: MapIdPath) -> Response:
-    """Return a map as it was stored."""
+    """Get a map.
+
+    Return a map as it was stored.
+    """
     services = exchange.services
     if "if-none-match" in exchange.request.headers:
         record = await ask_store(services, partial(services.store.record, map_id))
         if is_unchanged(exchange.request, record.revision):
             return Response(status_code=304, headers={"ETag": etag(record.revision)})
     stored = await ask_store(services, partial(services.store.load, map_id))
-    return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
+    return exchange.json(stored.document, headers={"ETag": etag(stored.record.revision)})
 
 
 @router.get(
     "/v1/maps",
     response_model=MapList,
     responses=problems(*EVERYWHERE, *STORE, "map_corrupt", "invalid_request"),
-    summary="List the maps",
 )
 async def list_maps(
     exchange: Admitted,
@@ -103,11 +103,14 @@ async def list_maps(
         str, Query(max_length=128, pattern="^[A-Za-z0-9._-]*$", description="`next` of the page before")
     ] = "",
 ) -> Response:
-    """List the stored maps, by id."""
+    """List the maps.
+
+    List the stored maps, by id.
+    """
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
     items = [record.as_json() for record in page.maps]
-    return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
+    return exchange.json(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 
 @router.delete(
@@ -118,7 +121,6 @@ async def list_maps(
         *EVERYWHERE, *STORE, "unknown_map", "revision_conflict", "invalid_request", "storage_full", "map_corrupt"
     ),
     openapi_extra={"parameters": _conditional("If-Match")},
-    summary="Delete a map",
 )
 async def delete_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Delete a map."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -13,17 +14,9 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
 from ...errors import NotFoundError
-from ..bodies import JSON
-from ..exchange import Admitted
-from ..sending import PiecewiseResponse
+from ..exchange import JSON, Admitted
 
 router = APIRouter(include_in_schema=False)
-ASSETS = {
-    "swagger-ui-bundle.js": "text/javascript; charset=utf-8",
-    "swagger-ui.css": "text/css; charset=utf-8",
-    "favicon.png": "image/png",
-}
-
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _POLICY = (
     "default-src 'none'; script-src 'self' {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
@@ -34,26 +27,40 @@ _PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_PARTS = {"page.js": "text/javascript; charset=utf-8", "page.css": "text/css; charset=utf-8"}
 _REVALIDATED = "no-cache"  # a newer service has a newer page
 _OWN = "service.page"
-_EXAMPLE = re.compile(r"[a-z]{1,40}\.json")
+_KINDS = {
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".png": "image/png",
+    ".json": JSON,
+}
+_NAME = re.compile(r"[a-z-]{1,40}(\.[a-z]{1,5})")
 
 
 @cache
-def _content(package: str, *names: str) -> bytes:
+def _content(package: str, folder: str, name: str) -> bytes:
     """Return a file of a package; once for all who read it, however slowly."""
-    found = files(package).joinpath(*names)
+    found = files(package).joinpath(folder, name)
     if not found.is_file():
         raise NotFoundError("no file of the page has this name; load the page again")
     return found.read_bytes()
 
 
-def _file(kind: str | None, cached: str, package: str, *names: str) -> Response:
-    """Return a file; of `kind` None there is none."""
-    if kind is None:
-        raise NotFoundError("no file of the page has this name; load the page again")
-    return PiecewiseResponse(_content(package, *names), media_type=kind, headers={"Cache-Control": cached})
+def _give(path: str, package: str, folder: str, cached: str, suffixes: Sequence[str]) -> None:
+    """Add a route for those files of a folder that end so; any other name is that of no file."""
+
+    @router.get(path + "/{name}")
+    async def file(name: str) -> Response:
+        found = _NAME.fullmatch(name)
+        suffix = found[1] if found and found[1] in suffixes else ""
+        content = _content(package, folder, name if suffix else "")
+        return Response(content, media_type=_KINDS[suffix], headers={"Cache-Control": cached})
+
+
+_give("/page/examples", _OWN, "examples", _REVALIDATED, [".json"])
+_give("/page", _OWN, "built", _REVALIDATED, [".js", ".css"])
+_give("/docs/assets", "fastapi_offline", "static", "public, max-age=86400", [".js", ".css", ".png"])
 
 
 @router.get("/", response_class=HTMLResponse)
@@ -62,23 +69,11 @@ async def start() -> HTMLResponse:
     return _page(_content(_OWN, "built", "index.html").decode(), _PAGE_POLICY)
 
 
-@router.get("/page/{name}")
-async def part_of_page(name: str) -> Response:
-    """Give a script or a style of the page."""
-    return _file(_PARTS.get(name), _REVALIDATED, _OWN, "built", name)
-
-
-@router.get("/page/examples/{name}")
-async def example(name: str) -> Response:
-    """Give one of the page's examples."""
-    return _file(JSON if _EXAMPLE.fullmatch(name) else None, _REVALIDATED, _OWN, "examples", name)
-
-
 @router.get("/openapi.json")
 async def contract(request: Request, exchange: Admitted) -> Response:
     """Give the contract; from bytes that all who read it share, however slowly."""
     document = await exchange.services.parse_threads.run(request.app.state.contract)
-    return PiecewiseResponse(document, media_type=JSON)
+    return Response(document, media_type=JSON)
 
 
 @router.get("/docs", response_class=HTMLResponse)
@@ -102,9 +97,3 @@ def _page(text: str, policy: str) -> HTMLResponse:
     """Return a page that runs nothing but its own, and stands in no other."""
     headers = {"Content-Security-Policy": policy, "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
     return HTMLResponse(text, headers={**headers, "Cross-Origin-Opener-Policy": "same-origin"})
-
-
-@router.get("/docs/assets/{name}")
-async def asset(name: str) -> Response:
-    """Give one of the files of Swagger UI."""
-    return _file(ASSETS.get(name), "public, max-age=86400", "fastapi_offline", "static", name)

@@ -12,7 +12,7 @@ import pytest
 
 from association import Deadline
 from linefix.documents import examples
-from service.http.search_stage import WATCH_AFTER, HangUpError, unless_hung_up
+from service.http.exchange import WATCH_AFTER, HangUpError, unless_hung_up
 from tests.running import RunningService, asked_again, client_of, until
 from tests.service.conftest import empty_database
 from tests.service.lines import Line
@@ -106,10 +106,10 @@ def test_the_work_for_a_client_that_hung_up_ends(ends: tuple[str, ...]) -> None:
 
         loop.call_later(2.0 * WATCH_AFTER, lambda: [futures[name].set_result("done") for name in ends])
         if "result" in ends:
-            assert await unless_hung_up(receive, work(), deadline) == "done"
+            assert await unless_hung_up(receive, work(), deadline.cancel) == "done"
         else:
             with pytest.raises(HangUpError):
-                await unless_hung_up(receive, work(), deadline)
+                await unless_hung_up(receive, work(), deadline.cancel)
             assert (deadline.cancelled, ended) == (True, ["ended"])
         await asyncio.sleep(0)  # and this task goes on
 

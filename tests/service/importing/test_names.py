@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from linefix.documents.errors import InvalidRequestError
+from service.errors import ServiceError
 from service.importing.reader import Bounds, read_files
 from tests.formats.bags import GRID, Robots
 
@@ -54,14 +55,14 @@ class Place:
 
     def refused(self, files: dict[str, bytes]) -> str:
         """Return the error of files that are not read; it contains no temporary path."""
-        try:
-            (told,) = self.answer(files)
-            said = next(iter(told.values()))
-        except InvalidRequestError as error:
-            said = str([(one.pointer, one.message) for one in error.faults])
+        with pytest.raises((InvalidRequestError, ServiceError)) as caught:
+            self.answer(files)
+        error = caught.value
+        faults = error.faults if isinstance(error, InvalidRequestError) else ()
+        said = str([(one.pointer, one.message) for one in faults]) + str(error)
         assert "linefix-" not in said
         assert str(self._folder) not in said
-        return str(said)
+        return said
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from PIL import Image
 from formats import GridPicture
 from linefix.documents.errors import InvalidRequestError
 from registration import RigidTransform
+from service.errors import FileTooLargeError, UnknownFormatError
 from service.importing.fields import options_of
 from service.importing.form import MOST_PARTS, read_form
 from service.importing.reader import MOST_PIXELS, Bounds, picture_json, read_files, read_scans
@@ -127,10 +128,10 @@ def test_a_form_becomes_a_report_and_a_map(tmp_path: Path) -> None:
 
 def test_what_is_no_fault_of_the_form_is_reported(tmp_path: Path) -> None:
     """More segments than a map may have, and a map in the place of a log."""
-    (told,) = read_files(with_fields(), TYPE, tmp_path, replace(BOUNDS, segments=3))
-    assert told["too_large"].startswith("expected at most 3 segments, found 4")
-    (told,) = read_scans(bytes(form({"plan.dxf": b"0"})), TYPE, tmp_path)
-    assert told["unknown"].startswith("found no log; expected a file that ends in one of .bag")
+    with pytest.raises(FileTooLargeError, match=r"^expected at most 3 segments, found 4"):
+        read_files(with_fields(), TYPE, tmp_path, replace(BOUNDS, segments=3))
+    with pytest.raises(UnknownFormatError, match=r"^found no log; expected a file that ends in one of \.bag"):
+        read_scans(bytes(form({"plan.dxf": b"0"})), TYPE, tmp_path)
 
 
 def test_a_large_picture_is_reduced_and_stays_in_its_place() -> None:

@@ -89,8 +89,8 @@ def test_a_search_is_told_with_its_stages_below_the_callers_span(
     inside = [span for span in collector.spans if span.parent_span_id == request.span_id]
     assert [span.name for span in sorted(inside, key=lambda span: span.start_time_unix_nano)] == [
         "parse",
-        "queue",
         "index",
+        "queue",
         "search",
     ]
     for before, after in pairwise(inside):

@@ -11,11 +11,11 @@ import pytest
 from association import CancelledError, Deadline, MapIndex
 from linefix.documents.analysis import AnalyzeRequest
 from linefix.documents.errors import DeadlinePassedError
-from linefix.operations import analysis_steps
+from linefix.operations import Json, Steps, analysis_steps
 from service.app import create_app
 from service.settings import Settings
 from service.work import job
-from service.work.job import Work
+from service.work.job import take_turn
 from service.work.results import index_import
 from simulation import rectangle_room
 from tests.service.maps.stores import Lookup, inline
@@ -30,24 +30,23 @@ def short_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job, "TURN_SECONDS", 0.0)
 
 
-def analysis(deadline: Deadline) -> Work:
+def analysis(deadline: Deadline) -> Steps:
     """Analyze a room in which no drive helps, and with a box that does."""
     index = MapIndex.build(rectangle_room().segments, 0.0)
-    return Work(analysis_steps(index, ASKED, deadline), deadline)
+    return analysis_steps(index, ASKED, deadline)
 
 
-def places(found: dict[str, Any] | None) -> list[dict[str, Any]]:
-    assert found is not None
+def places(found: Json) -> list[dict[str, Any]]:
     assert found["complete"]
     return found["places"]
 
 
 @pytest.mark.usefixtures("short_turns")
 def test_others_have_their_turn_within_a_drive() -> None:
-    work, turns = analysis(Deadline()), 1
-    while work.take_turn():
+    steps, turns = analysis(Deadline()), 1
+    while (found := take_turn(steps, Deadline())) is None:
         turns += 1
-    free = places(work.answer)
+    free = places(found)
     assert len(free) > 2
     assert turns > 4 * len(free)
     assert any(one["with_landmark"] is not None and one["with_landmark"]["usable"] for one in free)
@@ -57,22 +56,21 @@ def test_turns_do_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None
     answers = []
     for seconds in (0.0, 600.0):
         monkeypatch.setattr(job, "TURN_SECONDS", seconds)
-        work = analysis(Deadline())
-        while work.take_turn():
+        steps = analysis(Deadline())
+        while (found := take_turn(steps, Deadline())) is None:
             pass
-        answers.append(places(work.answer))
+        answers.append(places(found))
     assert answers[0] == answers[1]
 
 
 @pytest.mark.usefixtures("short_turns")
 def test_who_hangs_up_within_a_drive_ends_it() -> None:
     deadline = Deadline()
-    work = analysis(deadline)
-    assert work.take_turn()
+    steps = analysis(deadline)
+    assert take_turn(steps, deadline) is None
     deadline.cancel()
     with pytest.raises(CancelledError):
-        work.take_turn()
-    assert work.answer is None
+        take_turn(steps, deadline)
 
 
 def test_an_import_is_indexed_until_its_deadline_or_its_client_is_gone(lookup: Lookup) -> None:
