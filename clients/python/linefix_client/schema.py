@@ -308,8 +308,8 @@ class Problem(TypedDict):
         "deadline_exceeded",
         "storage_full",
     ]
-    request_id: str
     errors: NotRequired[list[Place]]
+    request_id: str
 
 
 class ReasonAnswer(TypedDict):
@@ -1071,8 +1071,8 @@ class MapAnalyzeRequest(TypedDict):
     landmark: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
-    client_ref: NotRequired[Any]
     map: InlineMap | StoredMap
+    client_ref: NotRequired[Any]
 
 
 class PointView(TypedDict):
