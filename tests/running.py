@@ -185,6 +185,36 @@ def asked_again(count: int, ask: Callable[[], object]) -> Iterator[None]:
         one.result()
 
 
+@contextmanager
+def sending(*answers: bytes, piece: bytes = b"") -> Iterator[tuple[str, list[bytes]]]:
+    """Answer requests one after the other as these bytes say, the last again and again; give the URL and the requests.
+
+    After an answer pieces are sent until the other side closes.
+    """
+    ended, asked = threading.Event(), list[bytes]()
+
+    def serve(listener: socket.socket) -> None:
+        with suppress(OSError):
+            while not ended.is_set():
+                connection, _ = listener.accept()
+                with connection, suppress(OSError):
+                    asked.append(connection.recv(65_536))
+                    connection.sendall(answers[min(len(asked), len(answers)) - 1])
+                    while piece and not ended.is_set():
+                        connection.sendall(piece)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        thread = threading.Thread(target=serve, args=(listener,))
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}", asked
+        finally:
+            ended.set()
+            with suppress(OSError):
+                listener.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
 def children_of(pid: int) -> set[int]:
     tasks = Path(f"/proc/{pid}/task").iterdir()
     return {int(child) for task in tasks for child in (task / "children").read_text().split()}

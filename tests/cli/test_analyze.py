@@ -12,7 +12,7 @@ from PIL import Image
 from tests.batch.logs import ROOM
 from tests.running import RunningService
 
-from .running import Linefix, refused
+from .running import Linefix
 
 BOX = [[1, 1, 1, 2], [1, 2, 2, 2], [2, 2, 2, 1], [2, 1, 1, 1]]
 TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
@@ -29,24 +29,12 @@ def folder(tmp_path: Path) -> Path:
 @pytest.mark.long
 def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService, linefix: Linefix) -> None:
     """Enough places for several processes."""
-    asked = [
-        "analyze",
-        "two.json",
-        "--spacing",
-        "0.9",
-        "--beams",
-        "180",
-        "--drive",
-        "1",
-        "--landmark",
-        "box.json",
-        "--json",
-    ]
-    here = linefix(*asked, LINEFIX_SEARCHES="2")
+    asked = "analyze two.json --spacing 0.9 --beams 180 --drive 1 --landmark box.json --json"
+    here = linefix(*asked.split(), LINEFIX_SEARCHES="2")
     assert (here.code, here.err) == (0, "")
     answer = here.answer
     assert len(answer["places"]) == answer["summary"]["similar_pose"] > 30
-    there = linefix.done(*asked, "--server", service.url).answer
+    there = linefix.done(*asked.split(), "--server", service.url).answer
     for name in ("places", "summary", "complete", "spacing", "map"):
         assert answer[name] == there[name]
     assert answer["summary"]["resolved_within"] == 0
@@ -72,19 +60,3 @@ def test_files_of_it(folder: Path, linefix: Linefix) -> None:
 
 def test_little_time(folder: Path, linefix: Linefix) -> None:
     assert linefix.done("analyze", "two.json", "--deadline-ms", "1", "--json").answer["complete"] is False
-
-
-@pytest.mark.parametrize(
-    ("more", "code", "said"),
-    [
-        (("--fov", "360"), 3, "--fov: expected radians"),
-        (("--point", "100", "0"), 3, "--point: expected a place"),
-        (("--drive", "31"), 3, "--drive: expected at most 30"),
-        (("--deadline-ms", "nan"), 3, "--deadline-ms: expected"),
-        (("--landmark", "none.json"), 2, "none.json"),
-        (("--out", "a.txt"), 2, "--out"),
-    ],
-    ids=["degrees", "nowhere", "far", "no time", "nothing", "no format"],
-)
-def test_what_is_not_done(folder: Path, more: tuple[str, ...], code: int, said: str, linefix: Linefix) -> None:
-    assert said in refused(linefix("analyze", "room.json", *more), code)

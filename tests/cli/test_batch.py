@@ -13,7 +13,7 @@ import pytest
 
 from tests.batch.logs import rows, write_log, write_room
 
-from .running import Linefix, refused
+from .running import Linefix
 
 
 def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, linefix: Linefix) -> None:
@@ -56,22 +56,3 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> No
     assert (told["scans"], told["taken_over"] >= 5) == (400, True)
     assert [row["index"] for row in rows(tmp_path / "poses.parquet")] == list(range(400))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (("a.parquet", "--maps", "room.json"), 2, "--out"),
-        (("gone.parquet", "--maps", "room.json", "--out", "o.parquet"), 3, "gone.parquet"),
-        (("a.parquet", "--maps", "nowhere", "--out", "o.parquet"), 3, "nowhere: holds no map"),
-        (("room.json", "--maps", "room.json", "--out", "o.parquet", "--ray", "--workers", "2"), 2, "--workers"),
-        (("a.parquet", "--maps", "room.json", "--out", "."), 2, "found the folder"),
-    ],
-    ids=["no output", "no log", "no map", "workers on Ray", "folder"],
-)
-def test_what_is_not_done_is_told_in_one_line(
-    tmp_path: Path, arguments: tuple[str, ...], code: int, said: str, linefix: Linefix
-) -> None:
-    write_log(tmp_path / "a.parquet", 1)
-    write_room(tmp_path)
-    assert said in refused(linefix("batch", *arguments), code)

@@ -12,7 +12,6 @@ import pytest
 
 import cli
 from cli.printing import print_lines, table
-from formats import thinned
 from tests.map_quality.check.drawn import faces
 
 from .drives import write_log
@@ -36,12 +35,6 @@ def test_lines_are_printed_as_they_are_without_control_characters(capsys: pytest
 def test_numbers_stand_on_the_right_of_their_column() -> None:
     lines = table(("name", "scans", "of"), [("a", 5, None), ("hall", 1.25, "x")])
     assert list(lines) == ["name  scans  of", "a         5  -", "hall  1.250  x"]
-
-
-def test_some_of_many_are_spread_evenly_and_of_none_none() -> None:
-    assert thinned([], 3) == ([], 0)
-    assert thinned([1, 2], 3) == ([1, 2], 2)
-    assert thinned(list(range(10)), 5) == ([0, 2, 4, 6, 8], 10)
 
 
 def test_help_imports_nothing_that_computes_and_a_replay_no_service(folder: Path) -> None:

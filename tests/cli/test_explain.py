@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from .running import Linefix, refused
+from .running import Linefix
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "explanation" / "verdict.md"
 FILES = re.compile(r"^`(\w+\.json)`.*?\n\n```json\n(.*?)```", re.MULTILINE | re.DOTALL)
@@ -85,5 +85,3 @@ def test_it_takes_what_locate_takes(linefix: Linefix) -> None:
     found = explained(linefix, "room.json", "scan.json", *near)
     assert {**found["answer"], "request_id": 0, "timing_ms": 0} == {**located, "request_id": 0, "timing_ms": 0}
     assert "better_elsewhere" in [veto["name"] for veto in found["verdict"]["vetoes"] if veto["applies"]]
-    assert "--help" in refused(linefix("explain", "room.json"), 2)
-    assert "nowhere.json" in refused(linefix("explain", "room.json", "nowhere.json"), 2)

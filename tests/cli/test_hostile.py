@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -16,6 +12,7 @@ from linefix_client import asking as requests
 from cli import asking
 from tests.batch.logs import ROOM, SEEN
 from tests.formats.bags import BEGUN, Recording
+from tests.running import sending
 
 from .running import Linefix, refused
 
@@ -26,35 +23,6 @@ MARK = b"\xef\xbb\xbf"
 def _files(folder: Path) -> None:
     (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
     (folder / "scan.json").write_text(json.dumps({"segments": SEEN}))
-
-
-@contextmanager
-def sending(head: bytes, piece: bytes) -> Iterator[str]:
-    """Answer each request with a head, and pieces until the other side closes; give the URL."""
-    ended = threading.Event()
-
-    def serve(listener: socket.socket) -> None:
-        while not ended.is_set():
-            try:
-                connection, _ = listener.accept()
-            except OSError:
-                return
-            with connection, suppress(OSError):
-                connection.recv(65536)
-                connection.sendall(head)
-                while piece and not ended.is_set():
-                    connection.sendall(piece)
-
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        thread = threading.Thread(target=serve, args=(listener,))
-        thread.start()
-        try:
-            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
-        finally:
-            ended.set()
-            with suppress(OSError):
-                listener.shutdown(socket.SHUT_RDWR)
-            thread.join()
 
 
 ENDLESS = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n"
@@ -70,7 +38,7 @@ def test_an_answer_without_end_is_refused(
     linefix: Linefix, monkeypatch: pytest.MonkeyPatch, head: bytes, piece: bytes
 ) -> None:
     monkeypatch.setattr(requests, "MAX_ANSWER_BYTES", 2**20)
-    with sending(head, piece) as url:
+    with sending(head, piece=piece) as (url, _):
         line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
         assert "the answer is longer than 1 MB; check the URL" in line
         with Client(url, retries=0) as client, pytest.raises(UnreachableError, match="longer than 1 MB"):
@@ -79,7 +47,7 @@ def test_an_answer_without_end_is_refused(
 
 def test_an_answer_that_takes_for_ever_is_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asking, "SECONDS", 0.2)
-    with sending(ENDLESS, b" ") as url:
+    with sending(ENDLESS, piece=b" ") as (url, _):
         line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
         assert "the answer has not ended after 0.2 s; check the URL" in line
         with Client(url, timeout=0.2) as client, pytest.raises(UnreachableError, match=r"not ended after 0.2 s"):
@@ -88,7 +56,7 @@ def test_an_answer_that_takes_for_ever_is_refused(linefix: Linefix, monkeypatch:
 
 @pytest.mark.parametrize("body", [b"<html>", b"[" * 100_000])
 def test_what_is_no_json_is_no_linefix(linefix: Linefix, body: bytes) -> None:
-    with sending(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
+    with sending(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(body) + body) as (url, _):
         assert "is no Linefix" in refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
         with Client(url) as client, pytest.raises(UnreachableError, match="is no Linefix"):
             client.version()
@@ -114,7 +82,7 @@ def test_an_answer_of_another_shape_is_named(
     (folder / "points.json").write_text(json.dumps({"points": [[0.1 * k, -1.0] for k in range(20)]}))
     (folder / "room.csv").write_text("x1,y1,x2,y2\n0,0,6,0\n6,0,6,4\n")
     head = b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
-    with sending(head % len(body) + body, b"") as url:
+    with sending(head % len(body) + body) as (url, _):
         line = refused(linefix(*command, "--server", url), 4)
         assert f"the answer of {url} does not match this version of Linefix: /" in line
         assert "check the URL" in line
@@ -123,14 +91,14 @@ def test_an_answer_of_another_shape_is_named(
 @pytest.mark.parametrize("body", [b"{}", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b'{"detail": []}'])
 def test_a_refusal_of_another_shape_ends_a_command(linefix: Linefix, body: bytes) -> None:
     head = b"HTTP/1.1 422 No\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
-    with sending(head % len(body) + body, b"") as url:
+    with sending(head % len(body) + body) as (url, _):
         refused(linefix("locate", "hall", "scan.json", "--server", url), 3)
 
 
 @pytest.mark.parametrize("body", [b"[]", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b"<html>"])
 def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
     head = b"HTTP/1.1 429 No\r\nRetry-After: \xb2\r\nContent-Length: %d\r\n\r\n"
-    with sending(head % len(body) + body, b"") as url, Client(url, retries=0) as client:
+    with sending(head % len(body) + body) as (url, _), Client(url, retries=0) as client:
         with pytest.raises(ProblemError) as told:
             client.version()
         assert told.value.status == 429
@@ -174,25 +142,3 @@ def test_all_misspelt_names_are_listed_with_the_names_that_are_meant(linefix: Li
         "a similar name is sigma",
     ):
         assert named in line
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("locate", "room.json", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
-        (("locate", "room.json", "bad.json", "scan.json"), "bad.json: /segments/0: expected 4 numbers"),
-        (("register", "room.json", "scan.json", "--correspondences", "pairs.json"), "pairs.json: /0"),
-        (("map", "check", "room.json", "--scan", "scan.json", "--scan", "bad.json"), "bad.json: /segments/0"),
-        (("map", "check", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
-        (("map", "put", "bad", "bad.json"), "bad.json: /segments/0: expected 4 numbers"),
-        (("vectorize", "points.json"), "points.json: /points/0: expected"),
-        (("locate", "room.json", "scan.json", "--deadline-ms", "-5"), "--deadline-ms: expected"),
-    ],
-)
-def test_what_is_wrong_is_named_by_its_file_or_option(
-    linefix: Linefix, folder: Path, arguments: tuple[str, ...], said: str
-) -> None:
-    (folder / "bad.json").write_text('{"segments": [[1, 2, 3]]}')
-    (folder / "pairs.json").write_text("[[0, -1]]")
-    (folder / "points.json").write_text('{"points": [[1, 2, 3]]}')
-    assert f"linefix: {said}" in refused(linefix(*arguments), 3)

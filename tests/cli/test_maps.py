@@ -53,24 +53,6 @@ def test_what_a_drawing_does_not_say_is_said_by_options(linefix: Linefix) -> Non
     assert answer["check"]["size"]["length"] == pytest.approx(14 * 0.3048)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (("nowhere.yaml",), 2, "nowhere.yaml: there is no such file"),
-        (("plan.csv", "--units", "parsec"), 3, "--units: expected one of mm"),
-        (("plan.csv", "--point", "99", "99"), 3, "--point: lies on a line or outside"),
-        (("plan.csv", "--out", "plan.dwg"), 3, "plan.dwg: expected a name"),
-        (("broken.svg", "--units", "m"), 3, "broken.svg: is not XML"),
-    ],
-    ids=["file", "units", "point", "out", "content"],
-)
-def test_what_is_wrong_is_told_in_one_line(
-    linefix: Linefix, folder: Path, arguments: tuple[str, ...], code: int, said: str
-) -> None:
-    (folder / "broken.svg").write_text("<svg")
-    assert said in refused(linefix("map", "import", *arguments), code)
-
-
 def test_a_server_names_the_file_and_the_option(linefix: Linefix, folder: Path, patient: RunningService) -> None:
     (folder / "plan.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><rect width="4" height="3"/></svg>')
     asked = ("map", "import", "plan.svg", "--server", patient.url)
@@ -132,12 +114,6 @@ def test_a_finding_says_where(linefix: Linefix, folder: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["drive.log", "maps"])
-def test_a_log_is_no_scan(linefix: Linefix, folder: Path, name: str) -> None:
-    write_log(folder / "drive.log", 1)
-    assert "expected one scan; linefix replay LOG --map MAP" in refused(linefix("locate", "floor.json", name), 2)
-
-
 def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:
     write_log(folder / "drive.log", 5)
     walls = [{"type": "LineString", "coordinates": [line[:2], line[2:]]} for line in centre_lines().tolist()]
@@ -148,13 +124,11 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     assert float(answer["map"]["meta"]["thickness"]) == pytest.approx(THICK, abs=0.02)
     assert [note["code"] for note in answer["report"]["assumed"]] == ["thickness_found"]
     assert "from scans of drive.log" in answer["report"]["assumed"][0]["message"]
-    told = linefix(
-        *asked, "--thickness", str(2 * THICK)
-    ).out  # who says how thick they are is not contradicted, but told
+    # Who says how thick they are is not contradicted, but told.
+    told = linefix(*asked, "--thickness", str(2 * THICK), **PATIENT).out
     assert "finding  mirrored" not in told  # though scans that fit badly fit a little better so
     assert re.search("finding  thickness: The scans fit better if walls are (19|20) cm thinner", told)
     assert "of 5 usable" in told
-    assert "omit --server" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
 
 
 def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:
@@ -171,12 +145,3 @@ def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Pat
     told = linefix("map", "import", "thick.yaml", "--log", "drive.log", "--surface", "0").out
     assert "0.00 cells" in told
     assert "as an option states" in told
-
-
-def test_a_server_checks_stored_maps_alone(linefix: Linefix) -> None:
-    server = "--server http://127.0.0.1:9"
-    assert f"map put ID FILE {server}," in refused(linefix("map", "check", "floor.json", *server.split()), 2)
-
-
-def test_an_id_is_one(linefix: Linefix) -> None:
-    assert "the id is not valid" in refused(linefix("map", "put", "a/b", "floor.json"), 2)

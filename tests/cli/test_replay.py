@@ -15,11 +15,11 @@ import linefix
 from cli.logs import LOST, Tracker
 from formats import LoggedScan
 from registration import RigidTransform
+from tests.association.scenes import known
 from tests.map_quality.check.drawn import faces
-from tests.running import RunningService
 
 from .drives import ODOM_FROM_MAP, write_log
-from .running import Linefix, refused
+from .running import Linefix
 
 SCANS = 12
 
@@ -37,10 +37,6 @@ def assert_right(found: list[dict[str, Any]], truth: list[RigidTransform]) -> No
             assert abs(line["pose"]["theta"] - pose.theta) < 0.02
 
 
-def lasting(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{name: value for name, value in line.items() if name != "timing_ms"} for line in found]
-
-
 @pytest.mark.parametrize("mode", ["global", "track"])
 def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str) -> None:
     ended = linefix.done("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
@@ -53,15 +49,6 @@ def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str)
     assert sum(line["usable"] for line in found) >= SCANS // 2
     assert_right(found, truth)
     assert "ROBOTLASER1" in ended.err  # which of the topics was taken
-
-
-def test_a_server_answers_as_the_process_does(
-    linefix: Linefix, folder: Path, truth: list[RigidTransform], service: RunningService
-) -> None:
-    asked = ("replay", "drive.log", "--map", "floor.json", "--every", "4", "--json")
-    here, there = linefix.done(*asked).lines, linefix.done(*asked, "--server", service.url).lines
-    assert len(here) == SCANS // 4
-    assert lasting(here) == lasting(there)
 
 
 def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, truth: list[RigidTransform]) -> None:
@@ -77,27 +64,6 @@ def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, tr
         assert math.hypot(x - by_stamp[stamp].x, y - by_stamp[stamp].y) < 0.1
     with Image.open(folder / "poses.png") as picture:
         assert (0, 158, 115) in {colour for _, colour in picture.getcolors(1000) or []}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (("nowhere.log", "--map", "floor.json"), 2, "nowhere.log: there is no such file"),
-        (("empty.log", "--map", "floor.json"), 3, "empty.log: has no scan"),
-        (("drive.log", "--map", "floor.json", "--topic", "FLASER"), 3, "no FLASER; it has 12 ROBOTLASER1"),
-        (("drive.log", "--map", "hall"), 3, "hall: no such file, and no map is stored"),
-        (("drive.txt", "--map", "floor.json"), 3, "ends in one of .bag"),
-        (("drive.log",), 2, "--map"),
-        (("drive.log", "--map", "floor.json", "--mode", "both"), 2, "--mode"),
-    ],
-    ids=["no log", "no scans", "no topic", "no map", "no format", "map left out", "mode"],
-)
-def test_what_cannot_be_replayed(
-    linefix: Linefix, folder: Path, truth: list[RigidTransform], arguments: tuple[str, ...], code: int, said: str
-) -> None:
-    (folder / "empty.log").write_text("# nothing\n")
-    (folder / "drive.txt").write_text("")
-    assert said in refused(linefix("replay", *arguments), code)
 
 
 def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> dict[str, Any]:
@@ -129,12 +95,10 @@ def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
     tracker.learn(answer(at, usable=False), before)
     assert tracker.prior(before) is None
     tracker.learn(answer(at), before)
-    prior = tracker.prior(after)
-    assert prior is not None
+    prior = known(tracker.prior(after))
     assert [round(value, 9) for value in (prior["x"], prior["y"], prior["theta"])] == [3.0, 1.2, 0.9]
     tracker.learn(answer(at, usable=False), after)
-    again = tracker.prior(after)
-    assert again is not None
+    again = known(tracker.prior(after))
     np.testing.assert_allclose(again["covariance"], prior["covariance"])
     tracker.learn(answer(at, warning="prior_contradicted"), after)
     assert tracker.prior(after) is None
@@ -161,8 +125,7 @@ def test_what_odometry_does_not_know_widens_the_prior_and_another_part_ends_it()
     assert tracker.prior(scan_at(None)) is None
     sigmas = []
     for unknown_s in (0.0, 1.0, 3.0):
-        prior = tracker.prior(scan_at(here, unknown_s=unknown_s))
-        assert prior is not None
+        prior = known(tracker.prior(scan_at(here, unknown_s=unknown_s)))
         sigmas.append(math.sqrt(prior["covariance"][0][0]))
     assert sigmas[1] > sigmas[0] + 0.9
     assert sigmas[2] > sigmas[1] + 1.8

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from registration import RigidTransform, Segments
-from simulation import Scanner, scan
 from tests.formats.bags import SECOND, Laser, Robots
+from tests.linefix.moving import moving_ranges
 from tests.running import RunningService
 from vectorization import Motion
 
@@ -29,13 +29,9 @@ COUNT = 4
 
 def swept(walls: list[list[float]], robot: RigidTransform, mount: RigidTransform, *, moving: bool, seed: int) -> Any:
     """Return the ranges of a scanner on a robot that moves at `TWIST`, or stands."""
-    way = Motion(SECONDS / BEAMS, *(TWIST if moving else (0.0, 0.0, 0.0))).places(BEAMS)
+    motion = Motion(SECONDS / BEAMS, *(TWIST if moving else (0.0, 0.0, 0.0)))
     map_walls, rng = Segments.from_array(np.array(walls, dtype=float)), np.random.default_rng(seed)
-    found = []
-    for k, (x, y, theta) in enumerate(way):
-        beam = Scanner(beams=1, angle_min=-math.pi + k * STEP, angle_increment=STEP, sigma=0.01)
-        found += list(scan(map_walls, robot.compose(RigidTransform(x, y, theta)).compose(mount), beam, rng).ranges)
-    return np.array(found, dtype=np.float32)
+    return moving_ranges(map_walls, robot, mount, STEP * np.arange(BEAMS) - math.pi, motion, rng).astype(np.float32)
 
 
 def put_scan(bag: Robots, ns: int, ranges: Any, frame: str = "laser", *, moving: bool = False) -> None:
@@ -114,36 +110,6 @@ def test_a_server_answers_the_same(linefix: Linefix, folder: Path, service: Runn
     for one in (*here, *there):
         one.pop("timing_ms")
     assert here == there
-
-
-TWINS: list[list[float]] = [
-    *([x, 0, x + 5, 0] for x in (0.0, 12.0)),
-    *([x + 5, 0, x + 5, 4] for x in (0.0, 12.0)),
-    *([x + 5, 4, x + 2, 4] for x in (0.0, 12.0)),
-    *([x + 2, 4, x + 2, 3] for x in (0.0, 12.0)),
-    *([x + 2, 3, x, 3] for x in (0.0, 12.0)),
-    *([x, 3, x, 0] for x in (0.0, 12.0)),
-    [-1, -1, -1, -9],
-    [-1, -9, 9, -9],
-]
-STOOL = [[4.0, 1.0, 4.4, 1.0], [4.4, 1.0, 4.4, 0.6], [4.4, 0.6, 4.0, 0.6], [4.0, 0.6, 4.0, 1.0]]
-
-
-@pytest.mark.parametrize("frames", ["static", "repeated"])
-def test_a_frame_that_stands_leads_no_scan_to_the_room_before(linefix: Linefix, folder: Path, frames: str) -> None:
-    """Two equal rooms but for a stool; the robot is carried from one to the other, and the stool is moved."""
-    (folder / "twins.json").write_text(json.dumps({"segments": [*TWINS, *STOOL]}))
-    bag = Robots("mcap", folder)
-    bag.transform("/tf_static", 0, "base_link", "laser")
-    for k, x in enumerate((1.5, 1.5, 13.5, 13.5)):
-        begun = (k + 1) * SECOND
-        bag.transform("/tf" if frames == "repeated" else "/tf_static", begun, "odom", "base_link", (4.0, 4.0, 0.0))
-        seen = swept([*TWINS, *STOOL], RigidTransform(x, 1.2, 0.7), RigidTransform(0, 0, 0), moving=False, seed=k)
-        put_scan(bag, begun, seen)
-    bag.done()
-    for mode in ("track", "global"):
-        found = linefix.done("replay", "robot_mcap", "--map", "twins.json", "--json", "--mode", mode).lines
-        assert all(line["pose"]["x"] > 12.0 for line in found[2:] if line["usable"])
 
 
 def test_an_upright_scanner_is_refused_with_its_frame(linefix: Linefix, folder: Path) -> None:

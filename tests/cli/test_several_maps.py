@@ -17,7 +17,7 @@ from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
 from .drives import write_log
-from .running import Linefix, refused
+from .running import Linefix
 
 HALL = [[0.0, 0.0, 9.0, 0.0], [9.0, 0.0, 9.0, 4.5], [9.0, 4.5, 0.0, 4.5], [0.0, 4.5, 0.0, 0.0]]
 
@@ -80,15 +80,6 @@ def test_weights_and_the_map_of_a_window_are_taken(linefix: Linefix, files: Path
         assert weighed["map"]["map_id"] == name
         near = linefix.done("locate", *both, "--near", "1", "0.5", "1.57", "--near-map", name).answer
         assert near["map"]["map_id"] == name
-    assert "MAP_ID=PROBABILITY" in refused(linefix("locate", *both, "--weight", "room"), 2)
-    assert "--weight roof: " in refused(linefix("locate", *both, "--weight", "roof=0.5"), 3)
-    assert "--near-map: " in refused(linefix("locate", *both, "--near", "1", "0.5", "1.57"), 3)
-
-
-def test_the_map_of_a_window_needs_a_window_and_several_maps(linefix: Linefix, files: Path) -> None:
-    one, both = ("floors/room.json", "scan.json"), ("floors/room.json", "floors/hall.json", "scan.json")
-    assert "--near-map: " in refused(linefix("locate", *one, "--near", "1", "0.5", "1.57", "--near-map", "room"), 3)
-    assert "--near" in refused(linefix("locate", *both, "--near-map", "room"), 2)
 
 
 def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None:
@@ -107,11 +98,6 @@ def test_the_folder_of_a_bag_is_one_map(linefix: Linefix, files: Path) -> None:
         writer.write(maps, 0, grid_bytes(cells))
     answer = linefix.done("locate", "bag", "floors/hall.json", "scan.json", "--json").answer
     assert {one["map_id"] for one in answer["maps"]} == {"bag", "hall"}
-
-
-def test_an_empty_folder_is_told(linefix: Linefix, files: Path) -> None:
-    (files.parent / "empty").mkdir()
-    assert "no map file" in refused(linefix("locate", "empty", "scan.json"), 2)
 
 
 @pytest.mark.parametrize("mode", ["global", "track"])

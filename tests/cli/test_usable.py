@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 from pathlib import Path
 from typing import Any
@@ -11,14 +10,13 @@ import pytest
 
 from association import AssociationOptions
 from cli.options import UsableOptions
-from cli.ros2 import ros2 as ros2_command
 from tests.batch.logs import ROOM, SEEN, rows
 from tests.batch.logs import write_log as write_table
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
 from .drives import write_log
-from .running import Linefix, refused
+from .running import Linefix
 
 HALF, SURE = ("--on-map", "0.5"), ("--on-map", "1")
 
@@ -78,22 +76,3 @@ def test_a_server_gets_them(linefix: Linefix, service: RunningService, command: 
         here, there = command(linefix, *options), command(linefix, *options, "--server", service.url)
         assert (here["usable"], here["probability"]) == (there["usable"], there["probability"])
         assert here["usable"] is (SURE[1] in options)
-
-
-@pytest.mark.parametrize(
-    ("command", "option", "value"),
-    [
-        ("locate room.json scan.json", "--on-map", "0.4"),
-        ("explain room.json scan.json", "--on-map", "1.1"),
-        ("replay drive.log --map floor.json", "--usable-from", "1"),
-        ("batch scans.parquet --maps room.json --out o.parquet", "--usable-from", "0.4"),
-        ("ros2 --map room.json", "--on-map", "0"),
-    ],
-)
-def test_what_is_out_of_range_is_refused(linefix: Linefix, command: str, option: str, value: str) -> None:
-    assert option in refused(linefix(*command.split(), option, value), 2)
-
-
-def test_ros2_has_them_by_name() -> None:
-    names = inspect.signature(ros2_command).parameters
-    assert {"on_map", "usable_from"} <= set(names)

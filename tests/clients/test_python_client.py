@@ -5,10 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any
 
 import httpx
@@ -32,7 +28,7 @@ from linefix_client import (
 from examples.running import free_port
 from linefix.documents import examples
 from registration import RigidTransform
-from tests.running import RunningService
+from tests.running import RunningService, sending
 
 ROOM: Any = examples.MAP
 QUESTION: Any = examples.ASSOCIATE
@@ -106,33 +102,10 @@ def test_both_clients_have_every_method() -> None:
     assert names == [name for name in vars(AsyncClient) if not name.startswith("_")]
 
 
-@contextmanager
-def answering(*answers: tuple[int, dict[str, str], Any]) -> Iterator[tuple[str, list[str]]]:
-    """Serve the answers one after the other; give the URL and what was asked."""
-    asked: list[str] = []
-    left = list(answers)
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            asked.append(self.path)
-            status, headers, body = left.pop(0)
-            self.send_response(status)
-            for name, value in headers.items():
-                self.send_header(name, value)
-            self.end_headers()
-            self.wfile.write(json.dumps(body).encode())
-
-        def log_message(self, *args: Any) -> None:
-            pass
-
-    with HTTPServer(("127.0.0.1", 0), Handler) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            yield f"http://127.0.0.1:{server.server_port}", asked
-        finally:
-            server.shutdown()
-            thread.join()
+def answer(status: int, body: Any) -> bytes:
+    content = json.dumps(body).encode()
+    head = b"HTTP/1.1 %d X\r\nConnection: close\r\nRetry-After: 0\r\nContent-Length: %d\r\n\r\n"
+    return head % (status, len(content)) + content
 
 
 BUSY = {"code": "overloaded", "detail": "too much to do"}
@@ -140,21 +113,21 @@ BUSY = {"code": "overloaded", "detail": "too much to do"}
 
 @pytest.mark.parametrize("status", [429, 503])
 def test_a_busy_service_is_asked_again_when_it_says(status: int) -> None:
-    with answering((status, {"Retry-After": "0"}, BUSY), (200, {}, {"version": "1"})) as (url, asked):
+    with sending(answer(status, BUSY), answer(200, {"version": "1"})) as (url, asked):
         with Client(url) as client:
             assert client.version() == {"version": "1"}
         assert len(asked) == 2
 
 
 def test_a_service_that_stays_busy_is_told() -> None:
-    with answering(*[(503, {"Retry-After": "0"}, BUSY)] * 3) as (url, asked):
+    with sending(answer(503, BUSY)) as (url, asked):
         with Client(url, retries=2) as client, pytest.raises(BusyError, match="overloaded"):
             client.version()
         assert len(asked) == 3
 
 
 def test_other_refusals_are_not_sent_again() -> None:
-    with answering((500, {"Retry-After": "0"}, ["no problem document"])) as (url, asked):
+    with sending(answer(500, ["no problem document"])) as (url, asked):
         with Client(url) as client, pytest.raises(ProblemError, match="500 unknown"):
             client.version()
         assert len(asked) == 1

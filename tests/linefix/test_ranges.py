@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ import pytest
 import linefix
 from formats import LoggedScan
 from linefix import RigidTransform
+from tests.association.scenes import known
+from tests.linefix.moving import moving_ranges
 
 ROOM = np.array([[0, 0, 7, 0], [7, 0, 7, 3], [7, 3, 4, 3], [4, 3, 4, 6], [4, 6, 0, 6], [0, 6, 0, 0]], dtype=float)
 WALLS = linefix.Segments.from_array(ROOM)
 BEAMS = 500
 STEP = math.tau / BEAMS
+ANGLES = np.linspace(-math.pi, math.pi, BEAMS, endpoint=False)
 MOUNT = RigidTransform(0.25, -0.15, 1.1)
 ROBOT = RigidTransform(2.2, 1.7, 0.6)
 HERE = RigidTransform(0.0, 0.0, 0.0)
@@ -25,16 +29,11 @@ BOUND = 3.3 * math.sqrt(6.0 / RUNS)  # of the mean of chi-squares with three deg
 
 
 def seen(
-    mount: RigidTransform, *, seconds: float = 0.0, twist: tuple[float, float, float] = (0.0, 0.0, 0.0), seed: int = 3
+    mount: RigidTransform, *, seconds: float = 0.0, twist: tuple[float, ...] = (0.0, 0.0, 0.0), seed: Any = 3
 ) -> np.ndarray:
     """Return ranges of a scanner on a robot that moves at a twist, the first beam from `ROBOT`."""
-    way = linefix.Motion(seconds / BEAMS, *twist).places(BEAMS)
-    found = []
-    for k, (x, y, theta) in enumerate(way):
-        beam = linefix.simulation.Scanner(beams=1, angle_min=-math.pi + k * STEP, angle_increment=STEP, sigma=0.01)
-        pose = ROBOT.compose(RigidTransform(x, y, theta)).compose(mount)
-        found.append(linefix.simulation.scan(WALLS, pose, beam, np.random.default_rng(seed * BEAMS + k)).ranges[0])
-    return np.array(found)
+    motion = linefix.Motion(seconds / BEAMS, *twist)
+    return moving_ranges(WALLS, ROBOT, mount, ANGLES, motion, np.random.default_rng(seed))
 
 
 def logged(
@@ -56,8 +55,7 @@ def logged(
 
 def off(answer: linefix.AssociationResult, truth: RigidTransform) -> tuple[float, float]:
     """Return by how much a pose is wrong, metres and radians."""
-    assert answer.pose is not None
-    step = truth.inverse().compose(answer.pose)
+    step = truth.inverse().compose(known(answer.pose))
     return math.hypot(step.x, step.y), abs(step.theta)
 
 
@@ -66,6 +64,7 @@ def off(answer: linefix.AssociationResult, truth: RigidTransform) -> tuple[float
 def test_the_loop_over_a_log_gives_poses_of_the_robot(mount: RigidTransform | None, flipped: bool) -> None:
     answer = linefix.locate(linefix.index_map(ROOM), logged(seen(MOUNT), mount=mount, flipped=flipped))
     assert answer.usable
+    assert math.sqrt(known(answer.covariance)[2, 2]) < 0.005  # of a moment: nothing widens it
     metres, radians = off(answer, ROBOT.compose(HERE if mount else MOUNT))
     assert metres < 0.02
     assert radians < 0.005
@@ -97,18 +96,11 @@ def test_the_motion_of_the_sensor_counts(flipped: bool) -> None:
 @pytest.mark.parametrize("twist", [(0.0, 0.0, 1.0), (0.5, 0.0, -1.0), (0.6, 0.0, 0.0), (0.0, 0.0, 0.0)])
 def test_a_motion_that_is_not_known_widens_the_covariance(twist: tuple[float, float, float]) -> None:
     answer = linefix.locate(ROOM, logged(seen(MOUNT, seconds=0.1, twist=twist), seconds=0.1))
-    assert answer.covariance is not None
     metres, radians = off(answer, ROBOT)
-    sigma = np.sqrt(np.diag(answer.covariance))
+    sigma = np.sqrt(np.diag(known(answer.covariance)))
     assert radians < 2.0 * sigma[2]
     assert metres < 2.0 * math.hypot(sigma[0], sigma[1])
     assert sigma[2] == pytest.approx(0.05, rel=0.05)
-
-
-def test_a_scan_of_a_moment_has_nothing_to_widen() -> None:
-    answer = linefix.locate(ROOM, logged(seen(MOUNT)))
-    assert answer.covariance is not None
-    assert math.sqrt(answer.covariance[2, 2]) < 0.005
 
 
 def test_two_scanners_are_one_scan() -> None:
@@ -118,24 +110,6 @@ def test_two_scanners_are_one_scan() -> None:
     answer = linefix.locate(ROOM, together)
     assert answer.usable
     assert off(answer, ROBOT)[0] < 0.02
-
-
-def moving_ranges(mount: RigidTransform, twist: np.ndarray, seconds: float, rng: np.random.Generator) -> np.ndarray:
-    """Return ranges all around from a robot that moves at a twist, the first beam from `ROBOT`."""
-    places = linefix.Motion(seconds / BEAMS, *twist.tolist()).places(BEAMS)
-    poses = [ROBOT.compose(RigidTransform(*place)).compose(mount) for place in places.tolist()]
-    x, y, heading = np.array([(pose.x, pose.y, pose.theta) for pose in poses]).T
-    angle = heading - math.pi + STEP * np.arange(BEAMS)
-    along = np.array([np.cos(angle), np.sin(angle)])
-    begin, way = ROOM[:, None, :2], (ROOM[:, 2:] - ROOM[:, :2])[:, None]
-    away = begin - np.array([x, y]).T
-    across = along[0] * way[..., 1] - along[1] * way[..., 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (away[..., 0] * way[..., 1] - away[..., 1] * way[..., 0]) / across
-        place = (away[..., 0] * along[1] - away[..., 1] * along[0]) / across
-    met = (distance > 0.0) & (place >= 0.0) & (place <= 1.0)
-    ranges: np.ndarray = np.where(met, distance, math.inf).min(axis=0) + rng.normal(0.0, 0.01, BEAMS)
-    return ranges
 
 
 @pytest.mark.parametrize(
@@ -148,16 +122,16 @@ def test_scanners_of_one_robot_share_its_unknown_motion(seconds: tuple[float, ..
     rng, index = np.random.default_rng(8), linefix.index_map(ROOM)
     squares = []
     for _ in range(RUNS):
-        twist = rng.normal(0.0, (0.5, 0.5, 1.0))
+        twist = tuple(rng.normal(0.0, (0.5, 0.5, 1.0)).tolist())
         views = [
-            linefix.view_of(logged(moving_ranges(mount, twist, time, rng), mount=mount, seconds=time))
+            linefix.view_of(logged(seen(mount, seconds=time, twist=twist, seed=rng), mount=mount, seconds=time))
             for mount, time in zip(MOUNTS, seconds, strict=True)
         ]
         answer = linefix.locate(index, linefix.assemble(views), prior=linefix.HardPrior(ROBOT, 0.5, 0.5))
-        assert answer.pose is not None
-        assert answer.covariance is not None
-        error = np.array([answer.pose.x - ROBOT.x, answer.pose.y - ROBOT.y, answer.pose.theta - ROBOT.theta])
-        squares.append(float(error @ np.linalg.solve(answer.covariance, error)))
+        error = np.array(
+            [known(answer.pose).x - ROBOT.x, known(answer.pose).y - ROBOT.y, known(answer.pose).theta - ROBOT.theta]
+        )
+        squares.append(float(error @ np.linalg.solve(known(answer.covariance), error)))
     assert least < np.mean(squares) < 3.0 + BOUND
 
 

@@ -15,6 +15,7 @@ from playwright.sync_api import FilePayload, Page, expect
 
 from registration import RigidTransform, Segments
 from simulation import scan
+from tests.cli.drives import carmen, numbers
 from tests.map_quality.update.hall import PILLAR, PLACES, RACK, SCANNER, box, segments
 
 from .plan import Plan, shown
@@ -42,13 +43,8 @@ def visit(name: str, seed: int) -> dict[str, Any]:
 
 def log(seed: int) -> bytes:
     """Return a visit as a CARMEN log."""
-    lines = ["# a log"]
-    for k, (at, ranges) in enumerate(ranges_of(TODAY, seed)):
-        pose = f"{at.x:.6f} {at.y:.6f} {at.theta:.6f}"
-        head = f"ROBOTLASER1 0 {SCANNER.angle_min:.6f} {math.tau:.6f} {SCANNER.angle_increment:.9f} 20.0 0.01 0"
-        told = " ".join(map(str, ranges))
-        lines.append(f"{head} {len(ranges)} {told} 0 {pose} {pose} 0 0 0 0 0 {100 + k} host {100 + k}")
-    return ("\n".join(lines) + "\n").encode()
+    scans = enumerate(ranges_of(TODAY, seed))
+    return "".join(carmen(100 + k, ranges, SCANNER, numbers(at), numbers(at)) for k, (at, ranges) in scans).encode()
 
 
 def payload(name: str, content: Any) -> FilePayload:
