@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,6 +20,7 @@ import numpy as np
 
 import linefix
 from ros2 import Maps, Node, NodeOptions, messages
+from ros2.clock import time_of
 from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 ROOT = Path(__file__).parent.parent.parent
@@ -35,7 +36,8 @@ ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 
 UPSTAIRS = np.array(
     [[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 3, 5], [3, 5, 3, 2.6], [3, 2.6, 0, 2.6], [0, 2.6, 0, 0]], dtype=float
 )
-FLOORS = {"hq-1": linefix.Segments.from_array(ROOM), "hq-2": linefix.Segments.from_array(UPSTAIRS)}
+WALLS = linefix.Segments.from_array(ROOM)
+FLOORS = {"hq-1": WALLS, "hq-2": linefix.Segments.from_array(UPSTAIRS)}
 MAP_FROM_BASE = linefix.RigidTransform(1.0, 1.5, 0.4)
 BASE_FROM_LASER = linefix.RigidTransform(0.3, -0.1, 2.0)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
@@ -52,16 +54,46 @@ def mount(child: str = "laser") -> messages.TFMessage:
     return messages.TFMessage([messages.TransformStamped(messages.Header(frame_id="base_link"), child, place)])
 
 
+def at_second(second: float) -> messages.Time:
+    return time_of(round(1e9 * second))
+
+
+def laser_scan(
+    ranges: Any, second: float, frame: str = "laser", scanner: linefix.simulation.Scanner = SCANNER, **more: Any
+) -> messages.LaserScan:
+    """Return the message of ranges."""
+    first, step = scanner.angle_min, scanner.angle_increment
+    limits = {"range_min": 0.05, "range_max": 30.0, "ranges": np.asarray(ranges).tolist(), **more}
+    last = first + (len(ranges) - 1) * step
+    return messages.LaserScan(messages.Header(at_second(second), frame), first, last, step, **limits)
+
+
+def scan_from(
+    base: linefix.RigidTransform,
+    second: float,
+    frame: str = "laser",
+    walls: linefix.Segments = WALLS,
+    mounted: linefix.RigidTransform = BASE_FROM_LASER,
+    scanner: linefix.simulation.Scanner = SCANNER,
+) -> messages.LaserScan:
+    """Return what a robot scans from a pose, map_from_base."""
+    rng = np.random.default_rng(int(1e3 * second))
+    ranges = linefix.simulation.scan(walls, base.compose(mounted), scanner, rng).ranges
+    return laser_scan(ranges, second, frame, scanner)
+
+
 def scan(second: int, *, seen: bool = True) -> messages.LaserScan:
     """Return what the robot sees; `seen` False: nothing within its range."""
-    truth = MAP_FROM_BASE.compose(BASE_FROM_LASER)
-    walls = linefix.Segments.from_array(ROOM)
-    ranges = linefix.simulation.scan(walls, truth, SCANNER, np.random.default_rng(second)).ranges
-    return messages.LaserScan(
-        messages.Header(messages.Time(second, 5), "laser"),
-        SCANNER.angle_min, SCANNER.angle_min + 719 * SCANNER.angle_increment, SCANNER.angle_increment,
-        range_min=0.05, range_max=30.0, ranges=ranges.tolist() if seen else [math.inf] * 720,
-    )  # fmt: skip
+    found = scan_from(MAP_FROM_BASE, second + 5e-9)
+    return found if seen else replace(found, ranges=[math.inf] * 720)
+
+
+def odometry_at(
+    second: float, at: linefix.RigidTransform, frame: str = "odom", child: str = "base_link"
+) -> messages.Odometry:
+    message = messages.Odometry(messages.Header(at_second(second), frame), child)
+    message.pose.pose = messages.Pose(messages.Point(at.x, at.y), quaternion(at.theta))
+    return message
 
 
 def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:

@@ -11,6 +11,7 @@ from registration import RigidTransform
 from ros2.agreement import Event, Observation
 from ros2.deciding import InitialPose, MapToOdom
 from ros2.reporting import at_least
+from tests.association.scenes import known
 
 SECOND = 1_000_000_000
 TRUE = RigidTransform(3.0, -2.0, 0.7)  # map_from_odom
@@ -35,30 +36,8 @@ def test_it_is_published_once_at_the_start_and_on_request() -> None:
     assert decide(initial, Event.CONFIRMED, 21.0) == "agreed"
 
 
-def test_without_a_subscriber_it_stays_wanted() -> None:
-    initial = InitialPose()
-    assert initial.decide(Event.AGREED, localizer_agrees=None, lost=False, now=0.0) == "agreed"
-    initial.published(subscribed=False, now=0.0)
-    assert decide(initial, Event.CONFIRMED, 1.0) == "agreed"
-    assert decide(initial, Event.CONFIRMED, 2.0) is None
-
-
-def test_after_a_restart_a_localizer_that_has_the_pose_is_left_alone() -> None:
-    initial = InitialPose()
-    assert decide(initial, Event.AGREED, 0.0, agrees=True) is None
-    assert decide(initial, Event.CONFIRMED, 1.0, agrees=True) is None
-    assert initial.decide(Event.CONFIRMED, localizer_agrees=None, lost=False, now=0.0) is None
-
-
 def test_a_localizer_with_another_pose_is_set_at_the_start() -> None:
     assert decide(InitialPose(), Event.AGREED, 0.0, agrees=False) == "agreed"
-
-
-def test_what_was_published_and_is_contradicted_is_corrected() -> None:
-    initial = InitialPose()
-    assert decide(initial, Event.AGREED, 0.0) == "agreed"
-    assert decide(initial, Event.CONTRADICTED, 1.0) is None
-    assert decide(initial, Event.AGREED, 2.0) == "corrected"
 
 
 @pytest.mark.parametrize(("when", "expected"), [("start", None), ("lost", "lost"), ("always", "lost")])
@@ -98,8 +77,7 @@ def test_the_transform_follows_in_small_steps() -> None:
     places = [one.compose(far).x for one in (before, half, whole)]
     assert np.subtract(places, places[0]) == pytest.approx([0.0, 0.05, 0.1], abs=1e-9)  # 0.2 m/s
     correction.take(Event.AGREED, confirmed(3 * SECOND, far, off=5.0))
-    jumped = correction.advance(3 * SECOND, far)
-    assert jumped is not None
+    jumped = known(correction.advance(3 * SECOND, far))
     assert jumped.compose(far).x == pytest.approx(places[0] + 5.0)
 
 

@@ -10,24 +10,25 @@ import numpy as np
 import pytest
 
 import linefix
-from ros2 import Maps, NodeOptions, messages
+from registration import IDENTITY
+from ros2 import NodeOptions, messages
 from ros2.agreement import Agreement, Observation
 from ros2.clock import Clock
 from ros2.deciding import MapToOdom
 from ros2.frames import matrix_in_space, planar
 from ros2.lag import Lag
 from ros2.odometry import OdometryHistory
+from tests.association.scenes import known
 
-from .robot import ROOM, grid_of_room, is_at_truth, mount, quaternion, running, scan, wait_until
-from .test_agreement import STRAIGHT, drive, first_agreed
+from .robot import at_second, grid_of_room, is_at_truth, mount, odometry_at, quaternion, running, scan, wait_until
 from .test_fleet import Fleet, moved
 
 TENTH = 100_000_000
 
 
 def told(stamp: int, x: float, frame: str = "odom") -> messages.Odometry:
-    message = messages.Odometry(messages.Header(messages.Time(*divmod(stamp, 10 * TENTH)), frame), "base_link")
-    message.pose.pose = messages.Pose(messages.Point(x), quaternion(0.0))
+    message = odometry_at(stamp / (10 * TENTH), IDENTITY, frame)
+    message.pose.pose.position.x = x
     return message
 
 
@@ -121,7 +122,7 @@ def test_two_sources_of_odometry_are_named(
                 robot.odometry.publish(told(tick[0] * TENTH, 0.0, other))
                 return
             moves = messages.Transform(messages.Vector3(at.x + 2.0, at.y), quaternion(at.theta))
-            header = messages.Header(messages.Time(int(second), int(1e9 * (second % 1.0))), "odom")
+            header = messages.Header(at_second(second), "odom")
             robot.tf.publish(messages.TFMessage([messages.TransformStamped(header, "base_link", moves)]))
 
         def named(status: messages.DiagnosticStatus) -> bool:
@@ -129,26 +130,6 @@ def test_two_sources_of_odometry_are_named(
 
         assert robot.until(robot.status, play, named).level > 0
         wait_until(lambda: any(line.startswith(expected) for line in logged), lambda: logged)
-
-
-def test_a_slow_robot_without_odometry_does_not_rest() -> None:
-    slow = [linefix.RigidTransform(0.02 * k, 0.0, 0.0) for k in range(100)]  # 0.05 m/s
-    assert first_agreed(drive(slow, odometry=False)) is None
-
-
-def test_scans_of_different_parts_of_odometry_do_not_agree() -> None:
-    assert first_agreed([replace(one, part=(k,)) for k, one in enumerate(drive(STRAIGHT))]) is None
-
-
-def test_a_map_with_few_changes_keeps_the_pose(room: linefix.MapIndex) -> None:
-    before = Maps(room, {"": "map"})
-    walls = ROOM.tolist()
-    added = linefix.index_map(np.array([*walls, [1.0, 1.0, 1.5, 1.0]]))
-    assert 0.8 < Maps(added, {"": "map"}).similarity(before) < 1.0
-    assert Maps(room, {"": "map"}).similarity(before) == 1.0
-    assert Maps(room, {"": "floor"}).similarity(before) == 0.0
-    assert Maps(linefix.index_map(ROOM + 0.5), {"": "map"}).similarity(before) < 0.8
-    assert Maps(room, {"": "map"}).similarity(None) == 0.0
 
 
 def test_a_map_that_changes_keeps_the_agreed_pose(domain: int) -> None:
@@ -185,8 +166,7 @@ def test_a_pose_without_scans_is_stale_and_its_transform_ends(
 
         def blind() -> None:
             second[0] += 0.05
-            still = told(round(1e9 * second[0]), moved(1.0).x + 1.0)
-            still.pose.pose.position.y = moved(1.0).y
+            still = odometry_at(second[0], linefix.RigidTransform(moved(1.0).x + 1.0, moved(1.0).y, 0.0))
             robot.odometry.publish(still)
             if seen is not None:
                 empty = scan(1, seen=seen)
@@ -253,9 +233,7 @@ def test_scans_of_another_clock_do_not_turn_the_pose(late: float) -> None:
     lag, transforms, doubts = Lag(odometry), [], set()
     for tick in range(1000, 1250):
         clock.take(messages.Clock(messages.Time(*divmod(tick * TENTH // 2, 10 * TENTH))))
-        message = told(tick * TENTH // 2, at(tick).x)
-        message.pose.pose.orientation = quaternion(at(tick).theta)
-        odometry.take(message)
+        odometry.take(odometry_at(0.05 * tick, at(tick)))
         received = (tick - 12) * TENTH // 2
         stamp = received + round(late * 10 * TENTH)
         scan = Observation(stamp, at(tick - 12), np.diag([1e-5, 1e-5, 4e-6]), True)
@@ -263,12 +241,11 @@ def test_scans_of_another_clock_do_not_turn_the_pose(late: float) -> None:
         shift = lag.shift(stamp, received)
         if shift:
             doubts.add(odometry.clocks(shift).partition(" on ")[0])
-        known = odometry.known(stamp + shift, received)
-        if known is not None:
-            scan = replace(scan, odometry=planar(known.matrix), part=known.part)
+        fix = odometry.known(stamp + shift, received)
+        if fix is not None:
+            scan = replace(scan, odometry=planar(fix.matrix), part=fix.part)
         correction.take(agreement.take(scan), scan)
-        newest = odometry.newest
-        assert newest is not None
+        newest = known(odometry.newest)
         transforms.append(correction.advance(newest[0], newest[1], newest[2].part))
     turned = [abs(one.theta) for one in transforms if one is not None]
     assert len(turned) > 50

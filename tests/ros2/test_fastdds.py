@@ -179,15 +179,6 @@ def test_a_grid_is_received(domain: int, program: Path) -> None:
     assert float(found[4]) == pytest.approx(1.0, abs=0.05)
 
 
-def test_stamps_that_jump_back_and_stamps_of_zero(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
-        robot.mount()
-        robot.until("initialpose", Way(robot, 1000.0))
-        robot.until("pose", Way(robot, 10.0), lambda words: float(words[1]) < 1000.0)
-        robot.until("diagnostics linefix: localization: the pose is agreed", Way(robot, 20.0))
-        robot.until("pose 0 0", lambda: robot.drive(linefix.RigidTransform(0.8, 1.0, 0.1), 0.0))
-
-
 def silent_for_five_scans(robot: Peer, way: Way) -> None:
     """Rest until five scans in succession are without an initialpose; the first may come again with odometry."""
     found: list[str] = []

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -18,32 +20,18 @@ from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 from .robot import (
     BASE_FROM_LASER,
     MAP_FROM_BASE,
-    ROOM,
-    SCANNER,
+    WALLS,
     Robot,
+    at_second,
     deliver,
     is_at_truth,
     mount,
+    odometry_at,
     quaternion,
     running,
+    scan_from,
     wait_until,
 )
-
-WALLS = linefix.Segments.from_array(ROOM)
-
-
-def scan_from(
-    base: linefix.RigidTransform, second: float, frame: str = "laser", walls: linefix.Segments = WALLS
-) -> messages.LaserScan:
-    """Return what a robot scans from a pose, map_from_base."""
-    rng = np.random.default_rng(int(1e3 * second))
-    ranges = linefix.simulation.scan(walls, base.compose(BASE_FROM_LASER), SCANNER, rng).ranges
-    stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
-    return messages.LaserScan(
-        messages.Header(stamp, frame),
-        SCANNER.angle_min, SCANNER.angle_min + 719 * SCANNER.angle_increment, SCANNER.angle_increment,
-        range_min=0.05, range_max=30.0, ranges=ranges.tolist(),
-    )  # fmt: skip
 
 
 class Fleet(Robot):
@@ -62,11 +50,18 @@ class Fleet(Robot):
 
     def drive(self, at: linefix.RigidTransform, second: float, walls: linefix.Segments = WALLS) -> None:
         """Publish odometry and a scan; the odometry frame is where the map is, 1 m aside."""
-        stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
-        message = messages.Odometry(messages.Header(stamp, f"{self.prefix}odom"), f"{self.prefix}base_link")
-        message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
-        self.odometry.publish(message)
+        there = linefix.RigidTransform(at.x + 1.0, at.y, at.theta)
+        self.odometry.publish(odometry_at(second, there, f"{self.prefix}odom", f"{self.prefix}base_link"))
         self.scans.publish(scan_from(at, second, f"{self.prefix}laser", walls))
+
+
+@contextmanager
+def fleet(domain: int, room: linefix.MapIndex, namespace: str = "", **options: Any) -> Iterator[Fleet]:
+    """Run a bridge, and a robot whose mount is known."""
+    with running(NodeOptions(domain=domain, namespace=namespace, **options), room):
+        robot = Fleet(domain, namespace)
+        robot.mounts.publish(mount())
+        yield robot
 
 
 def moved(second: float, speed: float = 0.3) -> linefix.RigidTransform:
@@ -94,9 +89,7 @@ def stamp_of(message: messages.PoseWithCovarianceStamped) -> float:
 
 
 def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(domain=domain), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room) as robot:
         usable, second = drive_until(robot, robot.poses)
         assert robot.initial.take() == []
         initial, _ = drive_until(robot, robot.initial, second)
@@ -112,9 +105,7 @@ def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapInde
 
 def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room: linefix.MapIndex) -> None:
     """The robot is carried to the other end of the room, which odometry does not notice."""
-    with running(NodeOptions(domain=domain), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room) as robot:
         _, second = drive_until(robot, robot.initial)
         robot.status.take()
         there = linefix.RigidTransform(2.0, 4.0, -1.0)
@@ -122,11 +113,7 @@ def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room
 
         def play() -> None:
             clock[0] += 0.5
-            stamp = messages.Time(int(clock[0]), int(1e9 * (clock[0] % 1.0)))
-            message = messages.Odometry(messages.Header(stamp, "odom"), "base_link")
-            at = moved(second)
-            message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
-            robot.odometry.publish(message)
+            robot.odometry.publish(odometry_at(clock[0], moved(second)))
             robot.scans.publish(scan_from(there, clock[0]))
 
         contradicted = robot.until(robot.status, play, lambda one: one.level == 2)
@@ -148,9 +135,7 @@ def test_the_result_of_a_scan_waits_for_its_odometry(
 
     monkeypatch.setattr("ros2.node.ODOMETRY_SECONDS", 3600.0)
     monkeypatch.setattr(OdometryHistory, "awaited", awaited)
-    with running(NodeOptions(domain=domain, agree=1), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room, agree=1) as robot:
         robot.until(robot.initial, lambda: robot.drive(moved(1.0), 1.0))
         robot.until(robot.agreed, lambda: robot.drive(moved(1.1), 1.1), lambda one: stamp_of(one) > 1.05)
         robot.initial.take()
@@ -195,10 +180,9 @@ def test_a_subscriber_receives_the_pose_once(domain: int, room: linefix.MapIndex
 
 def amcl_at(pose: linefix.RigidTransform, second: float) -> messages.PoseWithCovarianceStamped:
     place = messages.Pose(messages.Point(pose.x, pose.y), quaternion(pose.theta))
-    stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
     covariance = np.diag([0.01, 0.01, 0.0, 0.0, 0.0, 0.01]).ravel().tolist()
     return messages.PoseWithCovarianceStamped(
-        messages.Header(stamp, "map"), messages.PoseWithCovariance(place, covariance)
+        messages.Header(at_second(second), "map"), messages.PoseWithCovariance(place, covariance)
     )
 
 
@@ -227,9 +211,7 @@ def drive_on(robot: Fleet, play: Any, heard: Subscription[Any]) -> None:
 def test_a_bridge_that_starts_again_leaves_a_localizer_alone_that_has_the_pose(
     domain: int, room: linefix.MapIndex
 ) -> None:
-    with running(NodeOptions(domain=domain), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room) as robot:
         play = localized(robot, 0.05)
         drive_on(robot, play, robot.agreed)
         assert robot.initial.take() == []
@@ -237,9 +219,7 @@ def test_a_bridge_that_starts_again_leaves_a_localizer_alone_that_has_the_pose(
 
 @pytest.mark.parametrize("when", ["start", "lost"])
 def test_a_localizer_that_is_lost_is_reported(domain: int, room: linefix.MapIndex, when: Any) -> None:
-    with running(NodeOptions(domain=domain, when=when), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room, when=when) as robot:
         right = localized(robot, 0.0)
         robot.until(robot.agreed, right)
         wrong = localized(robot, 1.5, 5.0)
@@ -252,62 +232,39 @@ def test_a_localizer_that_is_lost_is_reported(domain: int, room: linefix.MapInde
             assert robot.initial.take() == []
 
 
-def test_two_robots_with_namespaces_do_not_hear_each_other(domain: int, room: linefix.MapIndex) -> None:
-    first, second = (NodeOptions(domain=domain, namespace=f"/robot{k}") for k in (1, 2))
+@pytest.mark.parametrize("prefixed", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_two_robots_do_not_hear_each_other(domain: int, room: linefix.MapIndex, prefixed: bool) -> None:
+    """With prefixes they share the topics of transforms."""
+    named = [(f"/robot{k}", f"robot{k}/" if prefixed else "") for k in (1, 2)]
+    first, second = (NodeOptions(domain=domain, namespace=name, frame_prefix=prefix) for name, prefix in named)
     with running(first, room), running(second, room):
-        one, other = Fleet(domain, "/robot1"), Fleet(domain, "/robot2")
-        one.mounts.publish(mount())
-        turned = mount()
-        turned.transforms[0].transform.translation.x += 1.0
-        other.mounts.publish(turned)
+        one, other = (Fleet(domain, name, prefix) for name, prefix in named)
+        for robot, aside in ((one, 0.0), (other, 1.0)):
+            message = mount(f"{robot.prefix}laser")
+            message.transforms[0].header.frame_id = f"{robot.prefix}base_link"
+            message.transforms[0].transform.translation.x += aside
+            (robot.global_mounts if prefixed else robot.mounts).publish(message)
         initial, _ = drive_until(one, one.initial)
         assert off(initial, stamp_of(initial)) < 0.03
         assert other.poses.take() == other.initial.take() == []
 
 
-@pytest.mark.long
-def test_two_robots_with_prefixes_share_the_topics_of_transforms(domain: int, room: linefix.MapIndex) -> None:
-    prefixes = "robot1/", "robot2/"
-    first, second = (NodeOptions(domain=domain, namespace=f"/{p[:-1]}", frame_prefix=p) for p in prefixes)
-    with running(first, room), running(second, room):
-        one, other = (Fleet(domain, f"/{p[:-1]}", p) for p in prefixes)
-        for robot, aside in ((one, 0.0), (other, 1.0)):
-            message = mount(f"{robot.prefix}laser")
-            message.transforms[0].header.frame_id = f"{robot.prefix}base_link"
-            message.transforms[0].transform.translation.x += aside
-            robot.global_mounts.publish(message)
-        initial, _ = drive_until(one, one.initial)
-        assert off(initial, stamp_of(initial)) < 0.03
-        assert other.poses.take() == []
-
-
-def test_the_transform_from_the_map_is_published_where_that_is_wanted(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(domain=domain, publish_tf=True), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
-        found, _ = drive_until(robot, robot.transforms)
-    one = found.transforms[0]
-    assert (one.header.frame_id, one.child_frame_id) == ("map", "odom")
-    assert one.transform.translation.x == pytest.approx(-1.0, abs=0.05)
-    assert one.transform.translation.y == pytest.approx(0.0, abs=0.05)
-
-
 def test_a_new_subscriber_gets_the_pose_from_a_node_that_publishes_the_transform(
     domain: int, room: linefix.MapIndex
 ) -> None:
-    with running(NodeOptions(domain=domain, publish_tf=True), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room, publish_tf=True) as robot:
         _, second = drive_until(robot, robot.initial)
-        _, second = drive_until(robot, robot.transforms, second)
+        found, second = drive_until(robot, robot.transforms, second)
+        one = found.transforms[0]
+        assert (one.header.frame_id, one.child_frame_id) == ("map", "odom")
+        place = one.transform.translation
+        assert (place.x, place.y) == pytest.approx((-1.0, 0.0), abs=0.05)
         late = Subscription(robot.net, "/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
         drive_until(robot, late, second)
 
 
 def test_a_transform_from_before_the_clock_was_set_back_is_not_published(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(domain=domain, publish_tf=True), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room, publish_tf=True) as robot:
         _, second = drive_until(robot, robot.transforms, 50.0)
         drive_until(robot, robot.status, second, lambda one: one.message == "the pose is agreed")
         clock = [1.0]
@@ -336,10 +293,7 @@ def test_odometry_may_be_of_another_frame_than_the_base(domain: int, room: linef
             clock[0] += 0.5
             at = moved(min(clock[0], 9.0))
             wheels = at.compose(base_in_wheels.inverse())
-            stamp = messages.Time(int(clock[0]), int(1e9 * (clock[0] % 1.0)))
-            message = messages.Odometry(messages.Header(stamp, "odom"), "wheels")
-            message.pose.pose = messages.Pose(messages.Point(wheels.x, wheels.y), quaternion(wheels.theta))
-            robot.odometry.publish(message)
+            robot.odometry.publish(odometry_at(clock[0], wheels, child="wheels"))
             robot.scans.publish(scan_from(at, clock[0]))
 
         initial = robot.until(robot.initial, play)
@@ -356,8 +310,7 @@ def test_a_mount_that_moves_is_followed(domain: int, room: linefix.MapIndex) -> 
             for k, turn in enumerate((0.0, 0.4)):  # where it looked before does not count
                 message = mount()
                 transform = message.transforms[0]
-                second = seconds[0] - 0.2 + 0.2 * k
-                transform.header.stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
+                transform.header.stamp = at_second(seconds[0] - 0.2 + 0.2 * k)
                 transform.transform.rotation = quaternion(BASE_FROM_LASER.theta + turn - 0.4)
                 robot.tf.publish(message)
             robot.scans.publish(scan_from(MAP_FROM_BASE, seconds[0]))
@@ -375,13 +328,13 @@ def test_a_request_with_an_id_is_answered(domain: int, room: linefix.MapIndex) -
         requests.publish(messages.String("job 7"))
         found, _ = drive_until(robot, results, 2.0)
     assert (found.name, found.level) == ("job 7", 0)
-    assert {one.key for one in found.values} >= {"x", "y", "qz", "qw", "stamp", "frame_id"}
+    told = {one.key: one.value for one in found.values}
+    assert told.keys() >= {"x", "y", "qz", "qw", "stamp", "frame_id"}
+    assert told["map_id"] == "room"
 
 
 def test_scans_without_a_time_are_taken(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(domain=domain, agree=1), room):
-        robot = Fleet(domain)
-        robot.mounts.publish(mount())
+    with fleet(domain, room, agree=1) as robot:
         unstamped = replace(scan_from(MAP_FROM_BASE, 1.0), header=messages.Header(frame_id="laser"))
         found = robot.until(robot.initial, lambda: robot.scans.publish(unstamped))
     assert found.header.stamp == messages.Time()

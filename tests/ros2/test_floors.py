@@ -16,7 +16,7 @@ import linefix
 from ros2 import NodeOptions, messages
 from ros2.topics import LATCHED, RELIABLE, Publisher, Subscription
 
-from .robot import FLOORS, MAP_FROM_BASE, bridge, deliver, floors, mount, running
+from .robot import FLOORS, bridge, deliver, floors, mount, running
 from .test_fleet import Fleet, amcl_at, moved, stamp_of
 
 
@@ -122,36 +122,6 @@ def test_poses_have_the_frame_of_their_map(domain: int) -> None:
             assert len(markers.markers[0].points) == 2 * len(FLOORS[floor])
 
 
-@pytest.mark.long
-def test_two_robots_on_two_floors_have_maps_of_their_own(domain: int) -> None:
-    """One takes the lift; its topic is remapped."""
-    first = NodeOptions(domain=domain, namespace="/robot1", remappings={"linefix/map_id": "/floor_of_robot1"})
-    second = NodeOptions(domain=domain, namespace="/robot2")
-    with running(first, floors()), running(second, floors()):
-        one, other = Rider(domain, "/robot1", "/floor_of_robot1"), Rider(domain, "/robot2")
-        one.until_on("hq-1")
-        other.until_on("hq-2")
-        one.until_on("hq-2")
-        one.until(one.initial, one.play)
-        for _ in range(5):
-            other.until(other.agreed, other.play)
-        assert other.map_ids.take() == []
-        status = other.until(other.status, other.play, lambda one: one.level == 0)
-        assert (status.name, values(status)["map_id"]) == ("robot2/linefix: localization", "hq-2")
-
-
-@pytest.mark.long
-def test_a_request_is_answered_with_the_map(domain: int) -> None:
-    with running(NodeOptions(domain=domain, namespace="/request", agree=1), floors()):
-        robot = Rider(domain, "/request")
-        requests = Publisher(robot.net, "/request/linefix/locate_request", messages.String, RELIABLE)
-        results = Subscription(robot.net, "/request/linefix/locate_result", messages.DiagnosticStatus, LATCHED)
-        robot.until_on("hq-2")
-        requests.publish(messages.String("job 7"))
-        found: Any = robot.until(results, robot.play)
-    assert (found.name, values(found)["map_id"]) == ("job 7", "hq-2")
-
-
 def test_a_file_of_parameters_names_the_maps(domain: int, tmp_path: Path) -> None:
     for name, walls in FLOORS.items():
         linefix.write_map(linefix.LineMap(walls), tmp_path / f"{name}.json")
@@ -165,12 +135,3 @@ def test_a_file_of_parameters_names_the_maps(domain: int, tmp_path: Path) -> Non
             robot.until_on(floor)
             robot.until(robot.initial, robot.play)
         assert b"the map changed from hq-1 to hq-2" in started.logged
-
-
-@pytest.mark.long
-def test_a_single_map_is_named_too(domain: int, map_file: str) -> None:
-    with bridge("--namespace", "single", "--map", map_file, "--agree", "1") as started:
-        assert b"; map room; " in started.logged
-        robot = Rider(domain, "/single")
-        found = robot.until(robot.map_ids, lambda: robot.drive(MAP_FROM_BASE, 2.0))
-    assert found.data == "room"

@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from tests.association.scenes import known
+
 FILE = Path(__file__).parents[2] / "examples" / "nav2" / "map_switcher.py"
 SUCCESS, NO_FILE = 0, 1
 
@@ -86,11 +88,9 @@ def switcher(monkeypatch: pytest.MonkeyPatch) -> Any:
         module = ModuleType(name)
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
-    spec = importlib.util.spec_from_file_location("map_switcher", FILE)
-    assert spec is not None
-    assert spec.loader is not None
+    spec = known(importlib.util.spec_from_file_location("map_switcher", FILE))
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    known(spec.loader).exec_module(module)
     return module.MapSwitcher()
 
 

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.association.scenes import known
+
 SPEAKER = Path(__file__).parent / "speaker.py"
 ROOT = Path(__file__).parent.parent.parent
 MANY = 20  # messages
@@ -74,9 +76,8 @@ class Speakers:
 
     def until(self, *wanted: str) -> None:
         """Read which names each receives until that is enough of those that are wanted."""
-        assert self._process.stdout is not None
         while any(self.heard[line] < MANY for line in wanted):
-            line = self._process.stdout.readline()
+            line = known(self._process.stdout).readline()
             assert line, "they have ended"
             self.heard[line.strip()] += 1
 
@@ -89,11 +90,9 @@ def speakers(machine: Machine, **variables: dict[str, str]) -> Iterator[Speakers
         machine.command(sys.executable, str(SPEAKER), json.dumps(variables)), env=environment | {"PYTHONPATH": paths},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
-        assert process.stdin is not None
-        assert process.stdout is not None
         yield Speakers(process)
-        process.stdin.close()
-        process.stdout.read()  # until all have ended
+        known(process.stdin).close()
+        known(process.stdout).read()  # until all have ended
 
 
 ONLY, RANGE = {"ROS_LOCALHOST_ONLY": "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

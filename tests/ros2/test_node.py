@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 import linefix
 from cli.entry import run
 from ros2 import NodeOptions, messages
+from ros2.topics import LATCHED, RELIABLE, Publisher
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, grid_of_room, is_at_truth, mount, running, scan
 
@@ -72,11 +73,16 @@ def test_it_is_silent_until_asked_again(domain: int, room: linefix.MapIndex) -> 
         assert {one.markers[0].ns for one in robot.walls.take()} == {"linefix/map"}
 
 
-def test_the_map_may_come_as_a_grid(domain: int) -> None:
+@pytest.mark.parametrize(
+    "quality", [LATCHED, pytest.param(RELIABLE, marks=pytest.mark.long)], ids=["latched", "volatile"]
+)
+def test_the_map_may_come_as_a_grid(domain: int, quality: Any) -> None:
     """And a scanner that has the robot's own frame needs no mount."""
     with running(NodeOptions(domain=domain, agree=1, base="laser", map_topic="map"), None):
         robot = Robot(domain)
-        robot.maps.publish(grid_of_room("floor"))
+        maps = Publisher(robot.net, "/map", messages.OccupancyGrid, quality)
+        robot.until(robot.diagnostics, lambda: robot.scans.publish(scan(1)))
+        maps.publish(grid_of_room("floor"))
         found = robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
     truth = MAP_FROM_BASE.compose(BASE_FROM_LASER)
     assert found.header.frame_id == "floor"

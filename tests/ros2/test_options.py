@@ -31,12 +31,6 @@ def test_a_relative_name_is_in_the_namespace(name: str, expected: str) -> None:
     assert absolute_name(name, "/r1") == expected
 
 
-@pytest.mark.parametrize("name", ["", "/", "a//b", "scan/", "1scan", "a b", "rt/ü", "a" * 300, "scan\n", "{node}/x"])
-def test_what_is_no_name_is_refused(name: str) -> None:
-    with pytest.raises(OptionError, match="expected a name"):
-        absolute_name(name, "")
-
-
 def test_remappings_hold_for_relative_and_absolute_names() -> None:
     rules = dict(map(remapping_of, ["scan:=/front", "/tf:=tf", "initialpose:=pose_in"]))
     options = NodeOptions(namespace="/r1", remappings=rules)
@@ -89,18 +83,8 @@ def test_a_file_of_parameters_is_that_of_ros(tmp_path: Path) -> None:
             parameters_of(file)
 
 
-def test_maps_are_a_list_and_a_later_section_replaces_them(tmp_path: Path) -> None:
-    file = tmp_path / "linefix.yaml"
-    file.write_text(
-        "/**:\n  ros__parameters: {maps: [hq-1.yaml, hq-2.yaml]}\n"
-        "/robot1/linefix:\n  ros__parameters: {map: hall.yaml}\n"
-    )
-    assert parameters_of(file, "/robot2", ("on",)) == {"on": ["hq-1.yaml", "hq-2.yaml"]}
-    assert parameters_of(file, "/robot1", ("on",)) == {"on": ["hall.yaml"]}
-
-
 FLEET = (
-    "linefix:\n  ros__parameters: {agree: 4}\n"
+    "linefix:\n  ros__parameters: {agree: 4, maps: [hq-1.yaml, hq-2.yaml]}\n"
     "/robot1/linefix:\n  ros__parameters: {map: one.yaml}\n"
     "/robot2/linefix:\n  ros__parameters: {map: two.yaml, agree: 5}\n"
 )
@@ -111,87 +95,66 @@ def test_a_file_may_have_the_parameters_of_several_robots(tmp_path: Path) -> Non
     file.write_text(FLEET)
     assert parameters_of(file, "/robot1") == {"agree": 4, "on": ["one.yaml"]}
     assert parameters_of(file, "robot2/") == {"agree": 5, "on": ["two.yaml"]}
-    assert parameters_of(file, "robot3") == parameters_of(file) == {"agree": 4}
+    assert parameters_of(file, "robot3") == parameters_of(file) == {"agree": 4, "on": ["hq-1.yaml", "hq-2.yaml"]}
     file.write_text("/robot1/linefix:\n  ros__parameters: {agree: 4}\n")
     with pytest.raises(WrongUseError, match=r"of /robot1, expected those of /robot2"):
         parameters_of(file, "robot2")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (["--params-file", "FILE", "--namespace", "robot2"], "two.yaml"),
-        (["--namespace", "robot1", "--params-file", "FILE"], "one.yaml"),
-        (["--ros-args", "-r", "__ns:=/robot2", "--params-file", "FILE"], "two.yaml"),
-        (["--ros-args", "--params-file", "FILE", "-r", "__ns:=/robot1"], "one.yaml"),
-        (["--params-file", "FILE"], "found parameters of /robot1, /robot2, expected one; add --namespace"),
-    ],
+def of_node(parameters: str) -> str:
+    return f"linefix:\n  ros__parameters: {{{parameters}}}\n"
+
+
+# A file that other nodes share has parameters that this one does not.
+SHARED = (
+    "/**:\n  ros__parameters: {use_sim_time: true, robot_radius: 0.3}\n"
+    "amcl:\n  ros__parameters: {agrees: 9}\nlinefix:\n  ros__parameters: {map: two.yaml}\n"
 )
-def test_the_namespace_chooses_the_parameters_of_a_robot(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], expected: str
+NOBODY = "{}.yaml: there is no such file"
+# The text of FILE, arguments, and what the error says; where all is right, a map is looked for that is not there.
+ENDED_WITH_2: list[tuple[str, str, str]] = [
+    (FLEET, "--params-file FILE --namespace robot2", "two.yaml"),
+    (FLEET, "--namespace robot1 --params-file FILE", "one.yaml"),
+    (FLEET, "--ros-args -r __ns:=/robot2 --params-file FILE", "two.yaml"),
+    (FLEET, "--ros-args --params-file FILE -r __ns:=/robot1", "one.yaml"),
+    (FLEET, "--params-file FILE", "found parameters of /robot1, /robot2, expected one; add --namespace"),
+    (of_node("agrees: 3"), "--params-file FILE", "found the parameter agrees, expected one of"),
+    (of_node("agree: many"), "--params-file FILE", "agree"),
+    (of_node("agree: 0"), "--params-file FILE", "agree"),
+    (of_node("when: never"), "--params-file FILE", "when"),
+    (of_node("map: nowhere.yaml"), "--params-file FILE", NOBODY.format("nowhere")),
+    (of_node("maps: [nowhere.yaml]"), "--params-file FILE", NOBODY.format("nowhere")),
+    (of_node("map: [hq-1.yaml]"), "--params-file FILE", "found [['hq-1.yaml']], expected map: NAME, or maps: "),
+    (of_node("maps: [7]"), "--params-file FILE", "found [7], expected map: NAME, or maps: [NAME, ...]"),
+    (SHARED, "--ros-args -p map:=one.yaml --params-file FILE", NOBODY.format("one")),
+    (SHARED, "--ros-args --params-file FILE -p linefix:map:=one.yaml", NOBODY.format("one")),
+    (SHARED, "--ros-args -p use_sim_time:=true --log-level linefix:=debug --params-file FILE", "two.yaml"),
+    (SHARED, "--ros-args --disable-rosout-logs --params-file FILE", "two.yaml"),
+    (SHARED, "--ros-args -p agrees:=3 --params-file FILE", "-p: found the parameter agrees, expected one of agree, "),
+    (SHARED, "--ros-args -p agree=3 --params-file FILE", "-p: found 'agree=3', expected NAME:=VALUE"),
+    (SHARED, "--ros-args -p agree:=many --params-file FILE", "agree"),
+    *(("", arguments, "expected")
+      for arguments in ("-r scan", "--namespace 1", "--map-topic //", "--odom rt/\u00fc", "--scan {node}/x")),
+    *(("", f"--scan {name}", "expected a name") for name in ("/", "a//b", "scan/", "1scan", "a" * 300)),
+]  # fmt: skip
+
+
+@pytest.mark.usefixtures("domain")
+@pytest.mark.parametrize(("text", "arguments", "expected"), ENDED_WITH_2, ids=range(len(ENDED_WITH_2)))
+def test_a_wrong_option_or_parameter_ends_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, arguments: str, expected: str
 ) -> None:
-    """The map of the chosen robot is looked for."""
-    file = tmp_path / "fleet.yaml"
-    file.write_text(FLEET)
-    assert run(["ros2", *(str(file) if one == "FILE" else one for one in arguments)]) == 2
-    assert expected in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("agrees: 3", "found the parameter agrees, expected one of"),
-        ("agree: many", "agree"),
-        ("agree: 0", "agree"),
-        ("when: never", "when"),
-        ("map: nowhere.yaml", "nowhere.yaml: there is no such file"),
-        ("maps: [nowhere.yaml]", "nowhere.yaml: there is no such file"),
-        ("map: [hq-1.yaml]", "found [['hq-1.yaml']], expected map: NAME, or maps: [NAME, ...]"),
-        ("maps: [7]", "found [7], expected map: NAME, or maps: [NAME, ...]"),
-    ],
-)
-def test_a_wrong_parameter_ends_with_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, expected: str
-) -> None:
-    file = tmp_path / "linefix.yaml"
-    file.write_text(f"linefix:\n  ros__parameters:\n    {text}\n")
-    assert run(["ros2", "--params-file", str(file)]) == 2
-    assert expected in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (["-p", "map:=one.yaml"], "one.yaml: there is no such file"),
-        (["--params-file", "FILE", "-p", "linefix:map:=one.yaml"], "one.yaml: there is no such file"),
-        (["-p", "use_sim_time:=true", "--log-level", "linefix:=debug", "--disable-rosout-logs"], "two.yaml"),
-        (["-p", "agrees:=3"], "-p: found the parameter agrees, expected one of agree, base,"),
-        (["-p", "agree=3"], "-p: found 'agree=3', expected NAME:=VALUE"),
-        (["-p", "agree:=many"], "agree"),
-    ],
-)
-def test_arguments_of_ros_are_taken(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], expected: str
-) -> None:
-    """A file that other nodes share has parameters that this one does not."""
-    file = tmp_path / "shared.yaml"
-    file.write_text(
-        "/**:\n  ros__parameters: {use_sim_time: true, robot_radius: 0.3}\n"
-        "amcl:\n  ros__parameters: {agrees: 9}\nlinefix:\n  ros__parameters: {map: two.yaml}\n"
-    )
-    arguments = [str(file) if one == "FILE" else one for one in arguments]
-    files = [] if "--params-file" in arguments else ["--params-file", str(file)]
-    assert run(["ros2", "--ros-args", *arguments, *files]) == 2
+    file = tmp_path / "parameters.yaml"
+    file.write_text(text)
+    assert run(["ros2", *arguments.replace("FILE", str(file)).split()]) == 2
     assert expected in (said := capsys.readouterr().err)
     assert " on," not in said
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--scan", "a b"], ["-r", "scan"], ["--namespace", "1"], ["--map-topic", "//"], ["--odom", ""]]
-)
-def test_a_wrong_name_ends_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str], domain: int) -> None:
-    assert run(["ros2", *arguments]) == 2
-    assert "expected" in capsys.readouterr().err
+@pytest.mark.parametrize("name", ["", "a b", "scan\n"])
+def test_what_is_no_name_is_refused(name: str) -> None:
+    with pytest.raises(OptionError, match="expected a name"):
+        absolute_name(name, "")
 
 
 @pytest.mark.parametrize(

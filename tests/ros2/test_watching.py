@@ -15,15 +15,15 @@ from ros2.deciding import Watch
 from ros2.frames import FrameError, Frames
 from ros2.odometry import OdometryHistory
 
-from .robot import quaternion
+from .robot import at_second, odometry_at, quaternion
 
 SECOND = 1_000_000_000
 MAP_FROM_ODOM = RigidTransform(2.0, 1.0, 0.5)
 NAMES = "map", "odom"
 
 
-def stamped(second: float, frame: str = "map") -> messages.Header:
-    return messages.Header(messages.Time(*divmod(round(second * SECOND), SECOND)), frame)
+def stamped(second: float) -> messages.Header:
+    return messages.Header(at_second(second), "map")
 
 
 def amcl(second: float, pose: RigidTransform, sigma: float = 0.1) -> messages.PoseWithCovarianceStamped:
@@ -35,10 +35,7 @@ def amcl(second: float, pose: RigidTransform, sigma: float = 0.1) -> messages.Po
 def history() -> OdometryHistory:
     odometry = OdometryHistory()
     for k in range(51):
-        second = k / 5.0
-        message = messages.Odometry(stamped(second, "odom"), "base_link")
-        message.pose.pose = messages.Pose(messages.Point(0.3 * second), quaternion(0.0))
-        odometry.take(message)
+        odometry.take(odometry_at(0.2 * k, RigidTransform(0.06 * k, 0.0, 0.0)))
     return odometry
 
 
