@@ -7,6 +7,7 @@ from pathlib import Path
 
 import linefix
 from formats import ImportedMap, ImportOptions
+from tests.association.scenes import known
 from tests.map_quality.check.drawn import centre_lines, sampled
 
 SCANS = 12
@@ -18,8 +19,7 @@ def usable(map: ImportedMap) -> int:
     for truth, scan in sampled(SCANS):
         answer = linefix.locate(index, scan)
         if answer.usable:
-            assert answer.pose is not None
-            assert math.hypot(answer.pose.x - truth.x, answer.pose.y - truth.y) < 0.1
+            assert math.hypot(known(answer.pose).x - truth.x, known(answer.pose).y - truth.y) < 0.1
             count += 1
     return count
 

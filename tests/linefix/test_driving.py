@@ -34,6 +34,7 @@ from linefix.driving import (
     search_drive,
 )
 from registration import Beams, MeasuredSegments, RigidTransform, Segments
+from tests.association.scenes import known
 
 CORNERS = np.array([[0, 0], [9, 0], [9, 4], [5, 4], [5, 7], [2, 7], [2, 5.5], [0, 5.5]])
 ROOM = np.hstack([CORNERS, np.roll(CORNERS, -1, axis=0)])
@@ -118,33 +119,24 @@ def counting(searched: list[Scan]) -> Callable[[Scan], AssociationResult]:
 @pytest.mark.usefixtures("_judged")
 def test_the_last_view_answers_for_a_drive_that_is_not_usable() -> None:
     assert (DRIVE.usable, ALONE.usable) == (False, True)
-    for found in (
-        linefix.locate(INDEX, WHOLE),
-        linefix.associate(INDEX, WHOLE),
-        linefix.explain(INDEX, WHOLE).result,
-    ):
+    pose = known(ALONE.pose)
+    for answer in (linefix.locate, linefix.associate, lambda *asked: linefix.explain(*asked).result):
+        found = answer(INDEX, WHOLE)
         assert (found.status, found.usable, found.reasons) == (ALONE.status, True, ())
         assert found.probability == pytest.approx(ALONE.probability, abs=1e-9)
-        assert found.pose is not None
-        assert ALONE.pose is not None
-        assert (found.pose.x, found.pose.y) == pytest.approx((ALONE.pose.x, ALONE.pose.y), abs=1e-9)
+        assert (known(found.pose).x, known(found.pose).y) == pytest.approx((pose.x, pose.y), abs=1e-9)
         assert codes(found)[-1] == LAST_VIEW_ONLY.code
     assert LAST_VIEW_ONLY.code not in codes(ALONE)
-
-
-@pytest.mark.usefixtures("_judged")
-def test_both_verdicts_are_explained() -> None:
     explained = linefix.explain(INDEX, WHOLE)
-    assert explained.last_view is not None
-    assert explained.verdict != explained.last_view
+    assert explained.verdict != known(explained.last_view)
     assert linefix.explain(INDEX, FIRST).last_view is None
 
 
 @pytest.mark.usefixtures("_judged")
 def test_on_several_maps_too() -> None:
     maps = linefix.index_maps({"room": ROOM, "hall": ROOM[:4] * [2.0, 3.0, 2.0, 3.0]})
-    for known in (KnownOfMaps(), KnownOfMaps(HardPrior(INSIDE, 0.5, 0.5), "room")):
-        found = search(maps, WHOLE, known)
+    for beforehand in (KnownOfMaps(), KnownOfMaps(HardPrior(INSIDE, 0.5, 0.5), "room")):
+        found = search(maps, WHOLE, beforehand)
         assert (found.usable, found.map_id, codes(found)[-1]) == (True, "room", LAST_VIEW_ONLY.code)
     assert codes(linefix.locate(maps, WHOLE))[-1] == LAST_VIEW_ONLY.code
 
@@ -168,29 +160,16 @@ def test_its_indices_are_those_of_the_drive() -> None:
 
 
 def test_a_critical_wall_has_the_indices_of_the_drive() -> None:
-    assert ALONE.diagnostics is not None
     wall = association.CriticalWall((0, 2), (5,), (1.0, 0.0), 0.2)
-    alone = replace(ALONE, diagnostics=replace(ALONE.diagnostics, critical_wall=wall))
+    alone = replace(ALONE, diagnostics=replace(known(ALONE.diagnostics), critical_wall=wall))
     whole, before = latest_last()
     found = search_drive(lambda scan: DRIVE if scan is whole else alone, whole)
-    assert found.diagnostics is not None
-    assert found.diagnostics.critical_wall == replace(wall, scan=(before, before + 2))
+    assert known(found.diagnostics).critical_wall == replace(wall, scan=(before, before + 2))
 
 
-def test_a_drive_that_is_usable_is_searched_once() -> None:
-    usable = replace(DRIVE, usable=True)
-    assert answered(drive=usable) is usable
-
-
-@pytest.mark.parametrize(("part", "agreed"), [(0.95, True), (1.1, False)])
-def test_a_drive_whose_best_pose_is_elsewhere_is_not_answered(part: float, agreed: bool) -> None:
-    at = ALONE.pose
-    assert at is not None
-    for moved in (
-        RigidTransform(at.x + part * AGREED_DISTANCE, at.y, at.theta),
-        RigidTransform(at.x, at.y, at.theta - part * AGREED_ANGLE),
-    ):
-        assert answered(drive=replace(DRIVE, pose=moved)).usable is agreed
+def moved(distance: float = 0.0, angle: float = 0.0) -> RigidTransform:
+    at = known(ALONE.pose)
+    return RigidTransform(at.x + distance * AGREED_DISTANCE, at.y, at.theta - angle * AGREED_ANGLE)
 
 
 @pytest.mark.parametrize(
@@ -200,19 +179,22 @@ def test_a_drive_whose_best_pose_is_elsewhere_is_not_answered(part: float, agree
         ({"probability": AGREED_PROBABILITY - 1e-9}, False),
         ({"probability": None}, False),
         ({"pose": None}, False),
+        *(({"pose": moved(**{by: part})}, agreed)
+          for by in ("distance", "angle") for part, agreed in ((0.95, True), (1.1, False))),
         ({"map_id": "another"}, False),
         ({"reasons": (Reason("prior_contradicted", ""),)}, False),
         ({"reasons": (Reason("map_mismatch", ""),)}, True),
     ],
-    ids=["likely", "unlikely", "degenerate", "no match", "another map", "prior", "mismatch"],
-)
+    ids=str,
+)  # fmt: skip
 def test_a_drive_that_is_evidence_against_the_pose_is_not_answered(changes: dict[str, Any], usable: bool) -> None:
     assert answered(drive=replace(DRIVE, **changes)).usable is usable
 
 
-def test_what_is_not_usable_alone_is_not_usable_as_a_drive() -> None:
-    found = answered(alone=replace(ALONE, usable=False))
-    assert found is DRIVE
+def test_a_drive_that_is_usable_is_searched_once_and_one_of_no_usable_view_stays_as_it_is() -> None:
+    usable = replace(DRIVE, usable=True)
+    assert answered(drive=usable) is usable
+    assert answered(alone=replace(ALONE, usable=False)) is DRIVE
 
 
 @pytest.mark.usefixtures("_judged")
@@ -278,8 +260,7 @@ def test_several_sensors_at_the_last_place_are_one_view(with_beams: bool) -> Non
     mounts = (RigidTransform(0.3, 0.2, 0.8), RigidTransform(-0.3, -0.1, -2.0))
     here = [View(look(at, with_beams=with_beams), at) for at in mounts]
     before = [replace(one, relative_to=None) for one in drive(with_beams=with_beams)[1:]]
-    found = last_view(assemble([here[0], *before, here[1]]))
-    assert found is not None
+    found = known(last_view(assemble([here[0], *before, here[1]])))
     assert found.scan.views is not None
     assert (len(found.scan.views), found.scan.views.uncertain) == (2, False)
     counts = [len(one.scan.measured) for one in (here[0], *before, here[1])]

@@ -11,7 +11,7 @@ from linefix.documents import examples
 from linefix.documents.errors import InvalidRequestError, NotJsonError, TooManyError
 from linefix.documents.limits import Limits
 from linefix.documents.parts import MapDocument
-from linefix.documents.reading import parse, read_batch, read_map, read_model, read_stored
+from linefix.documents.reading import parse, read_batch, read_model, read_stored
 from linefix.documents.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
 
 LIMITS = Limits(values=2_000_000, map_segments=200_000, scan_segments=2_000, beams=20_000, pairs=200_000, batch=256)
@@ -48,6 +48,7 @@ def test_a_body_of_few_bytes_cannot_hold_too_many_values() -> None:
 
 
 ROW = [0.0, 0.0, 1.0, 0.0]
+SCAN = {"segments": [ROW], "centroids": [[0.0, 0.0]], "spreads": [1.0]}
 COUNTED = [
     ("map_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "map": {"segments": [ROW] * n}}),
     ("map_segments", MapDocument, lambda n: {"segments": [ROW] * n}),
@@ -55,13 +56,13 @@ COUNTED = [
     ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {"segments": [ROW] * n}}),
     ("scan_segments", RegisterRequest, lambda n: {**examples.REGISTER, "scan": {"segments": [ROW] * n}}),
     ("beams", VectorizeRequest, lambda n: {"points": [[0.0, 1.0]] * n}),
-    (
-        "beams",
-        VectorizeRequest,
-        lambda n: {"laser": {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0] * n}},
-    ),
+    ("beams", VectorizeRequest, lambda n: {"laser": {"angle_min": 0, "angle_increment": 0.1, "ranges": [1.0] * n}}),
     ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "correspondences": [[0, 0]] * n}),
     ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "weights": [1.0] * n}),
+    # What comes with each segment has the limit of the segments.
+    ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "point_counts": [1.0] * n}}),
+    ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "sigma": [1.0] * n}}),
+    ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "spreads": [1.0] * n}}),
 ]
 
 
@@ -73,15 +74,6 @@ def test_every_count_has_its_limit(name: str, model: type, body: object) -> None
     with pytest.raises(TooManyError) as caught:
         read_model(model, data, replace(LIMITS, **{name: 11}))
     assert caught.value.limit == 11
-
-
-@pytest.mark.parametrize("name", ["point_counts", "sigma", "spreads"])
-def test_what_comes_with_each_segment_has_the_limit_of_the_segments(name: str) -> None:
-    scan = {"segments": [ROW], "centroids": [[0.0, 0.0]], "spreads": [1.0], name: [1.0] * 12}
-    data = orjson.dumps({**examples.ASSOCIATE, "scan": scan})
-    read_model(AssociateRequest, data, replace(LIMITS, scan_segments=12))
-    with pytest.raises(TooManyError):
-        read_model(AssociateRequest, data, replace(LIMITS, scan_segments=11))
 
 
 @pytest.mark.parametrize(
@@ -109,14 +101,6 @@ def test_a_batch_is_read_scan_by_scan() -> None:
     with pytest.raises(TooManyError) as caught:
         read_batch(body, replace(limits, batch=3))
     assert (caught.value.pointer, caught.value.limit) == ("/scans", 3)
-
-
-def test_of_a_map_what_was_sent_is_kept_and_no_more() -> None:
-    asked, document = read_map(orjson.dumps({"segments": [ROW], "meta": [1]}), LIMITS)
-    assert orjson.loads(document) == {"segments": [ROW], "meta": [1]}
-    assert (asked.sigma, asked.frame_id) == (None, "map")
-    full = {"segments": [ROW], "sigma": 0.1, "oriented": False, "frame_id": "f", "meta": None}
-    assert orjson.loads(read_map(orjson.dumps(full), LIMITS)[1]) == full
 
 
 def test_what_was_stored_is_held_to_no_limit() -> None:
