@@ -20,39 +20,23 @@ from tests.service.lines import Line
 
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")
 
-# As deploy/replicas/nginx.conf has it, without root.
-CONF = """
-daemon off;
-worker_processes 1;
-pid {folder}/nginx.pid;
-error_log {folder}/error.log warn;
-events {{ worker_connections 512; }}
-http {{
-  access_log {folder}/access.log;
-  client_body_temp_path {folder}/body;
-  proxy_temp_path {folder}/proxy;
-  fastcgi_temp_path {folder}/fastcgi;
-  uwsgi_temp_path {folder}/uwsgi;
-  scgi_temp_path {folder}/scgi;
-  upstream linefix {{
-    {servers}
-    keepalive 16;
-  }}
-  server {{
-    listen 127.0.0.1:{port};
-    client_max_body_size 32m;
-    location / {{
-      proxy_pass http://linefix;
-      proxy_http_version 1.1;
-      proxy_set_header Connection "";
-      proxy_set_header Host $host;
-      proxy_connect_timeout 1s;
-      proxy_next_upstream error timeout http_503;
-      proxy_next_upstream_tries 2;
-    }}
-  }}
-}}
-"""
+DEPLOY = Path(__file__).parents[2] / "deploy"
+
+
+def changed(path: Path, folder: Path, changes: dict[str, str]) -> Path:
+    """Write a file that is deployed into a folder, with the ports and files of a test."""
+    text = path.read_text()
+    for before, after in changes.items():
+        assert before in text
+        text = text.replace(before, after)
+    (folder / path.name).write_text(text)
+    return folder / path.name
+
+
+def temporary(folder: Path) -> str:
+    """Return where nginx has its files, without root."""
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    return "access_log off;\n" + "".join(f"{kind}_temp_path {folder}/{kind};\n" for kind in kinds)
 
 
 @dataclass
@@ -104,8 +88,15 @@ def _proxy(folder: Path, services: list[RunningService]) -> Iterator[str]:
     port = free_port()
     # No replica is ever left out: if all answer 503, clients get this 503, not a 502.
     servers = " ".join(f"server 127.0.0.1:{one.port} max_fails=0;" for one in services)
-    conf = folder / "nginx.conf"
-    conf.write_text(CONF.format(folder=folder, servers=servers, port=port))
+    changes = {
+        "worker_processes auto;": "daemon off;",
+        "pid /tmp": f"pid {folder}",
+        "access_log off;": temporary(folder),
+        "resolver 127.0.0.11 valid=2s;": "",
+        "server linefix:8000 resolve max_fails=0;": servers,
+        "listen 80": f"listen 127.0.0.1:{port}",
+    }
+    conf = changed(DEPLOY / "replicas" / "nginx.conf", folder, changes)
     process = subprocess.Popen([str(NGINX), "-c", str(conf), "-p", str(folder), "-e", str(folder / "error.log")])
     try:
         url = f"http://127.0.0.1:{port}"

@@ -22,11 +22,11 @@ from examples.running import free_port
 from linefix.documents import examples
 from service.database_location import database_url
 from service.settings import Settings
+from tests.deploy.replicas import DEPLOY, changed, temporary
 from tests.issuing import key_lines
 from tests.running import JSON, RunningService, answers, until
 
-ROOT = Path(__file__).parents[2]
-DEPLOY = ROOT / "deploy"
+ROOT = DEPLOY.parent
 SETTING = re.compile(r"LINEFIX_([A-Z_]+)")
 
 
@@ -109,15 +109,14 @@ def nginx(service_port: int, port: int, folder: Path) -> list[str]:
     (folder / "tls.crt").write_bytes(b"".join(blob.bytes() for blob in made.cert_chain_pems))
     made.private_key_pem.write_to_path(str(folder / "tls.key"))
     user = "user root;\n" if os.geteuid() == 0 else ""  # its usual one cannot read the test's folder
-    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     changes = {
         "127.0.0.1:8000": f"127.0.0.1:{service_port}",
         "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
         "/etc/linefix": str(folder),
         "events {": f"{user}daemon off;\npid {folder}/pid;\nerror_log {folder}/error.log;\nevents {{",
-        "http {": "http {\naccess_log off;\n" + "".join(f"{kind}_temp_path {folder}/{kind};\n" for kind in kinds),
+        "http {": f"http {{\n{temporary(folder)}",
     }
-    written = _changed(DEPLOY / "nginx.conf", folder, changes)
+    written = changed(DEPLOY / "nginx.conf", folder, changes)
     return ["nginx", "-e", str(folder / "error.log"), "-c", str(written)]
 
 
@@ -127,7 +126,7 @@ def caddy(service_port: int, port: int, folder: Path) -> list[str]:
         "127.0.0.1:8000": f"127.0.0.1:{service_port}",
         "linefix.example {": f"{{\nadmin off\nskip_install_trust\n}}\nhttps://127.0.0.1:{port} {{\ntls internal",
     }
-    written = _changed(DEPLOY / "Caddyfile", folder, changes)
+    written = changed(DEPLOY / "Caddyfile", folder, changes)
     data = ["env", f"XDG_DATA_HOME={folder}", f"XDG_CONFIG_HOME={folder}", f"HOME={folder}"]
     return [*data, "caddy", "run", "--adapter", "caddyfile", "--config", str(written)]
 
@@ -219,12 +218,3 @@ def test_no_way_of_writing_a_path_passes_its_rule(proxy: Proxy, service: Running
             answer = client.get("/", extensions={"target": path.encode()})  # as it stands there
             assert answer.status_code in (400, 403, 404), path
             assert "linefix_" not in answer.text, path
-
-
-def _changed(path: Path, folder: Path, changes: dict[str, str]) -> Path:
-    text = path.read_text()
-    for before, after in changes.items():
-        assert before in text
-        text = text.replace(before, after)
-    (folder / path.name).write_text(text)
-    return folder / path.name

@@ -13,7 +13,6 @@ import yaml
 
 from service.serving import GRACE
 from service.settings import Settings
-from tests.deploy.replicas import CONF
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 KUBERNETES = DEPLOY / "kubernetes"
@@ -136,16 +135,3 @@ def test_compose_file_is_valid() -> None:
     mounted = [volume.split(":")[0] for service in services.values() for volume in service.get("volumes", [])]
     there = {*compose()["volumes"], "../../secrets/keys"}  # the latter is made by who runs it
     assert [one for one in mounted if one not in there and not (REPLICAS / one).exists()] == []
-
-
-@pytest.mark.parametrize(
-    "line", ["max_fails=0;", "proxy_next_upstream ", "proxy_next_upstream_tries", "proxy_connect_timeout"]
-)
-def test_the_proxy_does_what_was_tested(line: str) -> None:
-    """By tests/deploy/test_replicas.py, with a file of its own."""
-    deployed = [text for text in (REPLICAS / "nginx.conf").read_text().splitlines() if line in text]
-    tested = [text for text in CONF.splitlines() if line in text]
-    if line == "max_fails=0;":
-        assert "max_fails=0;" in deployed[0]
-    else:
-        assert [text.strip() for text in deployed] == [text.strip() for text in tested]

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from linefix.documents import examples
 from service.database_location import database_url
 from service.errors import CorruptMapError, StoreAwayError, StoreError, UnknownMapError
 from service.maps import MapOutline, MapStore
@@ -103,29 +102,3 @@ def test_a_flipped_bit_changes_no_map(tmp_path: Path, flips: int) -> None:
     print(f"\n{flips} flips in {len(good)} bytes, {dict(total)}")
     assert total["named"] > 0
     assert total["healed"] > total["not healed"]
-
-
-@pytest.mark.long
-def test_a_flipped_bit_in_a_large_map(start_service: Callable[..., Any], tmp_path: Path) -> None:
-    running = start_service()
-    client = running.client
-    large = {"segments": examples.WALLS * 3000, "meta": "needle"}
-    for name in ("large", "whole"):
-        assert client.put(f"/v1/maps/{name}", json=large).status_code == 201
-    path = tmp_path / "maps.sqlite3"
-    data = bytearray(path.read_bytes())
-    data[data.index(b"needle")] ^= 1
-    path.write_bytes(data)
-    # From a process that has no page of it in memory.
-    other = start_service(database_url=f"sqlite:///{path}")
-    damaged = [name for name in ("large", "whole") if other.client.get(f"/v1/maps/{name}").status_code != 200]
-    assert len(damaged) == 1
-    url = f"/v1/maps/{damaged[0]}"
-    assert other.client.get(url).json()["code"] == "map_corrupt"
-    body = {"map": {"map_id": damaged[0]}, "scan": {"segments": examples.SEEN}}
-    for each in (other.client, client):
-        answer = each.post("/v1/associate", json=body)
-        assert (answer.status_code, answer.json()["code"]) == (409, "map_corrupt")
-    assert client.put(url, json=large).status_code == 200
-    assert other.client.get(url).json() == large
-    assert other.client.get("/v1/maps").json()["corrupt"] == []
