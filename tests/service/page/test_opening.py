@@ -11,7 +11,6 @@ import pytest
 from playwright.sync_api import Page, Response, Route, expect
 
 from examples.sample import OfficePlan, offices, way_through, with_furniture, write_drive, write_grid
-from tests.running import RunningService, running
 from tests.service.http.test_maps_searched import MAP, SCAN
 from tests.service.importing.forms import SQUARE, room_grid
 
@@ -28,17 +27,6 @@ def test_it_opens_with_an_example(page: Page) -> None:
     verdict(page, "ambiguous")
     expect(page.get_by_label("Example")).to_have_value("rooms")
     expect(page.locator("#hint")).to_be_hidden()
-
-
-def test_a_service_that_compiles_says_so(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A real one, whose kernels are not there yet."""
-    monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path / "kernels"))
-    with running(tmp_path, probe="/livez") as service:
-        page.goto(service.url)
-        verdict(page, "waiting")
-        expect(page.locator("#verdict-title")).to_have_text("The service is starting")
-        expect(page.locator("#message")).to_contain_text("the kernels are being")
-        page.goto("about:blank")
 
 
 def test_it_searches_as_soon_as_the_service_is_ready(page: Page) -> None:
@@ -100,16 +88,16 @@ def bounds_of(answer: Response) -> np.ndarray:
 
 
 def test_a_folder_is_dropped(page: Page, tmp_path: Path) -> None:
-    """A grid in a folder inside of it, a scan, and a hidden file that no program reads."""
+    """A grid in a folder inside of it, and a hidden file that no program reads; next to it a scan."""
     (tmp_path / "site" / "map").mkdir(parents=True)
     for name, content in room_grid().items():
         (tmp_path / "site" / "map" / name).write_bytes(content)
-    (tmp_path / "site" / "scan.json").write_text(json.dumps(SCAN))
+    (tmp_path / "scan.json").write_text(json.dumps(SCAN))
     (tmp_path / "site" / ".DS_Store").write_bytes(b"0")
     shown(page, "flat", "usable")
     is_scan = lambda asked: asked.url.endswith("/associate") and asked.post_data_json["scan"] == SCAN  # noqa: E731
     with page.expect_request(is_scan, timeout=60_000):
-        drop(page, tmp_path / "site")
+        drop(page, tmp_path / "site", tmp_path / "scan.json")
     expect(page.locator("#about")).to_contain_text("walls from room.yaml", timeout=60_000)
     expect(page.locator("#reading")).to_be_empty()
 
@@ -179,22 +167,6 @@ def test_a_bag_is_opened_and_its_scans_are_searched(page: Page, sample: Path) ->
     assert page.locator("#filter option").all_inner_texts()[:3] == first
     expect(page.locator("#numbers")).to_contain_text("correspondences")
     expect(page.locator("#legend")).to_contain_text("usable")
-
-
-@pytest.mark.long
-def test_a_bag_is_dropped(page: Page, sample: Path, service: RunningService) -> None:
-    """On the page, as from a file manager."""
-    shown(page, "rooms", "ambiguous")
-    content = list((sample / "drive.mcap").read_bytes())
-    data = page.evaluate_handle(
-        """content => { const data = new DataTransfer();
-           data.items.add(new File([new Uint8Array(content)], "drive.mcap")); return data; }""",
-        content,
-    )
-    page.dispatch_event("#plan", "drop", {"dataTransfer": data})
-    expect(page.locator("#scan-of-log")).to_contain_text("Scan 1 of 12", timeout=60_000)
-    expect(page.locator("#about")).to_have_text("Now open the map of the log.")
-    expect(page.locator("#message")).to_have_text("There is a scan and no map yet. Open its map.")
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from linefix.documents import examples
 from tests.issuing import ADMIN
@@ -133,31 +133,34 @@ def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
     expect(page.locator("#reading code")).to_have_text("formats")
 
 
-def test_a_refusal_and_a_lost_connection(page: Page) -> None:
+NO_ROLE = "the key lacks the role `associate`; send a key that has it"
+REFUSALS: list[tuple[dict[str, object] | None, str | re.Pattern[str]]] = [
+    (PROBLEM, "The service is busy. Try again in some seconds."),
+    (
+        {**PROBLEM, "status": 403, "detail": NO_ROLE, "code": "forbidden"},
+        f"{NO_ROLE} (see Key below).".replace("`", ""),
+    ),
+    (None, re.compile("does not respond")),
+]
+
+
+def test_refusals_and_a_lost_connection(page: Page) -> None:
     shown(page, "flat", "usable")
-    page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=PROBLEM))
-    page.get_by_role("button", name="Search").click()
-    verdict(page, "problem")
-    expect(page.locator("#message")).to_have_text("The service is busy. Try again in some seconds.")
-    page.unroute("**/v1/associate")
-    page.route("**/v1/associate", lambda route: route.abort())
-    page.get_by_role("button", name="Search").click()
-    expect(page.locator("#message")).to_contain_text("does not respond")
+    current = REFUSALS[:1]
+
+    def answer(route: Route) -> None:
+        ((problem, _),) = current
+        route.abort() if problem is None else route.fulfill(status=int(str(problem["status"])), json=problem)
+
+    page.route("**/v1/associate", answer)
+    for problem, said in REFUSALS:
+        current[:] = [(problem, said)]
+        page.get_by_role("button", name="Search").click()
+        expect(page.locator("#message")).to_have_text(said)
+        verdict(page, "problem")
     page.unroute("**/v1/associate")
     page.get_by_role("button", name="Search").click()
     verdict(page, "usable")
-
-
-def test_a_key_without_a_role(page: Page) -> None:
-    shown(page, "flat", "usable")
-    detail = "the key lacks the role `associate`; send a key that has it"
-    page.route(
-        "**/v1/associate",
-        lambda route: route.fulfill(status=403, json={**PROBLEM, "status": 403, "detail": detail, "code": "forbidden"}),
-    )
-    page.get_by_role("button", name="Search").click()
-    verdict(page, "problem")
-    expect(page.locator("#message")).to_have_text(f"{detail} (see Key below).".replace("`", ""))
 
 
 def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
