@@ -66,18 +66,6 @@ def searching(running: RunningService) -> Iterator[None]:
         assert running.count("linefix_searches_running") >= 1.0
 
 
-def searched_a_while() -> bytes:
-    """A request that takes some 150 ms of a processor, however long it waits: by far more than to send it takes."""
-    rng = np.random.default_rng(1)
-    begins, angles = rng.uniform(0.0, 50.0, (1000, 2)), rng.uniform(0.0, np.pi, 1000)
-    walls = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
-    rng = np.random.default_rng(2)
-    begins, angles = rng.uniform(-5.0, 5.0, (40, 2)), rng.uniform(0.0, np.pi, 40)
-    seen = np.hstack([begins, begins + np.stack([np.cos(angles), np.sin(angles)], axis=1)])
-    body = {"map": {"segments": walls, "sigma": 0.02}, "scan": {"segments": seen}}
-    return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
 def searched_briefly() -> bytes:
     """A request that takes some ten milliseconds: nothing in the scan is on the map."""
     rng = np.random.default_rng(1)

@@ -19,13 +19,6 @@ def _no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name)
 
 
-def test_the_command_line_beats_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LINEFIX_PORT", "81")
-    monkeypatch.setenv("LINEFIX_QUEUE", "3")
-    settings = read_settings(["--port", "82"])
-    assert (settings.host, settings.port, settings.queue) == ("127.0.0.1", 82, 3)
-
-
 def test_without_keys_only_loopback(monkeypatch: pytest.MonkeyPatch) -> None:
     for host in ("127.0.0.1", "::1", "localhost"):
         read_settings(["--host", host])

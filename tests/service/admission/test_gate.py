@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import sys
-import threading
 import time
 import weakref
 from contextlib import suppress
+from functools import partial
 
 import pytest
 
@@ -17,33 +17,21 @@ from linefix.documents.errors import DeadlinePassedError
 from service.admission.gate import HEARING_SECONDS, LONG_SECONDS, Gate, Ticket
 from service.errors import QueueFullError, ShareUsedError
 
-from .gates import PATIENCE, A, B, gate_of, in_loop, until, within
+from .gates import A, B, gate_of, in_loop, until, within
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="threads have no priority of their own elsewhere")
 
 
 @in_loop
-async def test_never_more_at_once_than_slots_and_the_rest_in_order() -> None:
-    async with gate_of(2) as gate:
-        running, most, order = 0, 0, []
-        lock, both = threading.Lock(), threading.Barrier(2)
-
-        def work(number: int) -> int:
-            nonlocal running, most
-            with lock:
-                running += 1
-                most = max(most, running)
-                order.append(number)
-            both.wait(PATIENCE)
-            with lock:
-                running -= 1
-            return number
-
-        answers = await asyncio.gather(*(gate.ask(lambda n=n: work(n)) for n in range(10)))  # type: ignore[misc]
-        assert answers == list(range(10))
-        assert most == 2
-        # The system decides which of two threads is the first to start.
-        assert [sorted(order[i : i + 2]) for i in range(0, 10, 2)] == [[i, i + 1] for i in range(0, 10, 2)]
+async def test_searches_of_one_caller_have_their_slot_in_order() -> None:
+    async with gate_of(1) as gate:
+        order: list[int] = []
+        first = await gate.block()
+        calls = [gate.ask(partial(order.append, number)) for number in range(5)]
+        await until(lambda: gate.waiting == 5)
+        gate.release.set()
+        await asyncio.gather(first, *calls)
+        assert order == [*range(5)]
 
 
 @in_loop
@@ -73,21 +61,6 @@ async def test_full_places_are_shared_between_keys() -> None:
         await until(lambda: sum(asked.done() for asked in gate.asked) == 5)
         gate.release.set()
         assert await third == "third"
-
-
-@in_loop
-async def test_who_was_let_in_by_its_head_and_finds_no_place_is_refused() -> None:
-    async with gate_of(1, 1) as gate:
-        for _ in range(2):
-            gate.require_place(A)
-        await gate.block(A)
-        with pytest.raises(QueueFullError):
-            await gate.ask(lambda: None, A)
-        with pytest.raises(QueueFullError):
-            await gate.ask(lambda: None, B)
-        gate.release.set()
-        await until(lambda: gate.running == 0)
-        assert await gate.ask(lambda: 1, B) == 1
 
 
 @in_loop

@@ -7,10 +7,8 @@ import os
 import signal
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import orjson
 import pytest
@@ -23,7 +21,6 @@ from tests.service.parsing.bodies import large_map
 from tests.service.searches import (
     POST,
     post,
-    searched_a_while,
     searched_briefly,
     searched_for,
     searching,
@@ -145,39 +142,3 @@ def test_reading_files_takes_no_place_of_a_search(busy: RunningService) -> None:
         for child in children_of(busy.process.pid) - before:
             os.kill(child, signal.SIGKILL)
     importing.join()
-
-
-@pytest.mark.long
-def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Any]) -> None:
-    flooded = start_service(keys="flood,robot", searches=1, queue=8)
-    body = searched_a_while()
-    found: Counter[tuple[str, int]] = Counter()
-    lock, begun, enough = threading.Lock(), threading.Event(), threading.Event()
-
-    def ask(key: str) -> None:
-        with client_of(flooded.url, authorization=f"Bearer {key}") as client:
-            while not enough.is_set():
-                answer = client.post("/v1/associate", content=body)
-                with lock:
-                    if key == "robot":
-                        begun.set()
-                    # Requests that are answered after the last counted one had no competition.
-                    if begun.is_set() and not enough.is_set():
-                        found[key, answer.status_code] += 1
-                    if answer.status_code == 429:
-                        assert (answer.json()["code"], answer.headers["retry-after"]) == ("rate_limited", "1")
-                    if found["flood", 200] + found["robot", 200] >= 60:
-                        enough.set()
-                if answer.status_code != 200:
-                    enough.wait(0.03)  # these clients share a processor with the service
-
-    threads = [threading.Thread(target=ask, args=(key,)) for key in ["flood"] * 20 + ["robot"] * 4]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    served = found["flood", 200] + found["robot", 200]
-    assert found["robot", 200] >= 0.9 * served / 2, found
-    assert found["flood", 429] > 0
-    # A key with less than its share is never sent away.
-    assert found["robot", 429] + found["robot", 503] == 0, found

@@ -10,7 +10,6 @@ from typing import Any
 
 import httpx
 import numpy as np
-from ezdxf.filemanagement import new
 from PIL import Image
 
 from formats import read_map
@@ -32,16 +31,6 @@ def refused(answer: httpx.Response, status: int, code: str) -> str:
     assert len(answer.content) <= 8192
     first = (problem.get("errors") or [{"pointer": "", "message": problem["detail"]}])[0]
     return f"{first['pointer']}: {first['message']}"
-
-
-def dxf_in_feet() -> bytes:
-    document = new(units=0)
-    corners = [(0, 0), (40, 0), (40, 20), (20, 20), (20, 30), (0, 30)]
-    document.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "A-WALL"})
-    document.modelspace().add_line((5, 5), (9, 5), dxfattribs={"layer": "A-FURN"})
-    text = io.StringIO()
-    document.write(text)
-    return text.getvalue().encode()
 
 
 def test_a_grid_becomes_a_map_that_can_be_put(client: httpx.Client, tmp_path: Path) -> None:
@@ -66,17 +55,6 @@ def test_a_grid_becomes_a_map_that_can_be_put(client: httpx.Client, tmp_path: Pa
     assert image.size == (200, 140)
     assert [image.getpixel(at) for at in ((100, 30), (70, 60), (2, 2))] == [254, 0, 205]
     assert (picture["pose"], picture["resolution"]) == ({"x": -1.0, "y": -2.0, "theta": 0.0}, 0.05)
-
-
-def test_fields_say_what_a_drawing_does_not(client: httpx.Client) -> None:
-    files = {"plan.dxf": dxf_in_feet()}
-    assert refused(send(client, files), 422, "invalid_request").startswith("/files/0: does not state its unit")
-    answer = send(client, files, ("units", "ft"), ("layers", "*wall*"), ("point", "1 1"))
-    assert answer.status_code == 200, answer.text
-    found = answer.json()
-    lengths = np.hypot(*np.diff(np.reshape(found["map"]["segments"], (-1, 2, 2)), axis=1)[:, 0].T)
-    assert found["map"]["oriented"]
-    assert sorted(np.round(lengths / 0.3048).tolist()) == [10, 20, 20, 20, 30, 40]
 
 
 def test_a_format_that_is_not_read(client: httpx.Client) -> None:

@@ -97,19 +97,6 @@ def test_one_writer_wins(pair: Pair, url: str) -> None:
             assert pair.clients[0].delete(url).status_code == 204
 
 
-def test_a_change_by_another_process_is_noticed_at_once(pair: Pair, url: str) -> None:
-    one, two = pair.clients
-    body = {"map": {"map_id": url.rsplit("/", 1)[1]}, "scan": {"segments": examples.SEEN}}
-    for revision in range(1, 11):
-        writer, reader = (one, two) if revision % 2 else (two, one)
-        assert writer.put(url, json=a_map(0) | {"frame_id": f"f{revision}"}).json()["revision"] == revision
-        for client in (reader, writer):
-            answer = client.post("/v1/associate", json=body).json()
-            assert (answer["map"]["revision"], answer["frame_id"]) == (revision, f"f{revision}")
-    assert one.delete(url).status_code == 204
-    assert two.post("/v1/associate", json=body).json()["code"] == "unknown_map"
-
-
 def test_readers_see_whole_revisions_while_others_write(pair: Pair, url: str) -> None:
     one, two = pair.clients
     assert put(one, url, 1)().status_code == 201

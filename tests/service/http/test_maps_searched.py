@@ -12,7 +12,7 @@ from linefix_client import laser
 from PIL import Image
 
 from linefix.documents import examples
-from tests.linefix.test_map_points import POSTS, ROOM, ROOMS, SCANNER, ranges
+from tests.linefix.test_map_points import POSTS, ROOMS, SCANNER, ranges
 from tests.service.asking import HERE, answered, pose_json
 
 from ..importing.forms import TYPE, YAML, encoded, form
@@ -39,6 +39,10 @@ def test_the_map_of_the_pose_is_named_and_all_are_listed(client: httpx.Client) -
     assert best.keys() == {"map_id", "revision", "status", "score", "probability", "pose"}
     assert (best["map_id"], best["pose"], best["probability"]) == ("room", answer["pose"], answer["probability"])
     assert (other["map_id"], other["status"]) == ("hall", "no_match")
+    twice = [{"map_id": name, "segments": examples.WALLS} for name in ("a", "b")]
+    assert asked(client, twice)["reasons"][0]["code"] == "similar_place"
+    for known in ({"map_weights": {"b": 0.9999}}, {"prior": {**PRIOR, "map_id": "b"}}):
+        assert asked(client, twice, **known)["map"]["map_id"] == "b"
 
 
 def test_stored_maps_are_named_with_their_revision_and_found_by_prefix(client: httpx.Client) -> None:
@@ -50,19 +54,6 @@ def test_stored_maps_are_named_with_their_revision_and_found_by_prefix(client: h
     # A map that changed is searched as it is now.
     assert client.put("/v1/maps/tower-2", json={"segments": HALL}).status_code == 200
     assert asked(client, {"prefix": "tower-"})["usable"] is False
-
-
-def test_equal_maps_are_both_listed(client: httpx.Client) -> None:
-    twice = [{"map_id": name, "segments": examples.WALLS} for name in ("a", "b")]
-    answer = asked(client, twice)
-    assert (answer["status"], answer["usable"]) == ("ambiguous", False)
-    assert [one["status"] for one in answer["maps"]] == ["ambiguous", "ambiguous"]
-    (other,) = {"a", "b"} - {answer["map"]["map_id"]}
-    assert answer["alternatives"][0]["map_id"] == other
-    (reason,) = [one for one in answer["reasons"] if one["code"] == "similar_place"]
-    assert f"the map {other}" in reason["message"]
-    for known in ({"map_weights": {"b": 0.9999}}, {"prior": {**PRIOR, "map_id": "b"}}):
-        assert asked(client, twice, **known)["map"]["map_id"] == "b"
 
 
 def test_a_batch_is_searched_on_several_maps(client: httpx.Client) -> None:
@@ -98,17 +89,6 @@ def test_maps_that_differ_in_their_points_are_different_maps(client: httpx.Clien
     assert client.get(URL).json() == MAP
 
 
-def test_points_of_several_maps(client: httpx.Client) -> None:
-    """Of two maps of the same room, the one with the posts that the scan shows is the robot's."""
-    one, posts = ({"map_id": name, "segments": ROOM.tolist()} for name in ("bare", "posts"))
-    posts |= {"points": POINTS, "points_sigma": 0.03}
-    for maps in ([one, posts], [posts, one]):
-        answer = answered(client, "/v1/associate", maps=maps, scan=SCAN)
-        assert (answer["usable"], answer["map"]["map_id"]) == (True, "posts")
-    twins = [one, {**one, "map_id": "twin"}]
-    assert not answered(client, "/v1/associate", maps=twins, scan=SCAN)["usable"]
-
-
 def test_an_update_keeps_the_points(client: httpx.Client) -> None:
     visits = [{"visit": name, "scans": [SCAN]} for name in ("monday", "tuesday")]
     for path, body in ((f"{URL}:update", {"visits": visits}), ("/v1/maps:apply", {"map": MAP, "changes": []})):
@@ -129,10 +109,3 @@ def test_an_imported_grid_has_points(client: httpx.Client) -> None:
     assert np.allclose(imported["map"]["points"], [[50.5 * 0.05, 40.5 * 0.05]])
     assert imported["map"]["points_sigma"] == 0.025
     assert client.put(URL, json=imported["map"]).is_success
-
-
-def test_an_analysis_sees_the_points(client: httpx.Client) -> None:
-    laser: dict[str, Any] = {"beams": 360, "sigma": 0.01}
-    bare, found = (answered(client, "/v1/analyze", map=one, laser=laser, spacing=2.0) for one in (BARE, MAP))
-    assert bare["summary"]["usable"] == 0
-    assert any(one["pose"]["x"] < 7.0 for one in found["places"] if one["usable"])

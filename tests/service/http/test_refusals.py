@@ -16,6 +16,7 @@ from linefix.documents import examples
 from linefix.documents.errors import BodyTooLargeError, Fault, InvalidRequestError
 from service import errors
 from service.http.problems import INTERNAL, KINDS, RAISED, TABLE, problem_of
+from tests.association.scenes import known
 
 from .wrong_requests import ASSOCIATE, BATCH, BODIES, LASER, PUT, REGISTER, ROOM, STATUSES, TAKEN, VECTORIZE, WRONG
 
@@ -180,44 +181,22 @@ def test_anything_else_is_a_defect_and_told_nothing_of() -> None:
     assert INTERNAL.kind.status == 500
 
 
-HEADERS = [
-    (errors.MissingKeyError(), {"www-authenticate": 'Bearer realm="linefix"'}),
-    (errors.UnknownKeyError(), {}),
-    *((error, {"retry-after": "1"}) for error in (errors.QueueFullError(), errors.ShareUsedError())),
-    *((error, {"retry-after": "1"}) for error in (errors.NotReadyError("x"), errors.ReadOnlyStoreError())),
-    (errors.TooMuchHeldError(), {"retry-after": "1", "connection": "close"}),
-    (BodyTooLargeError(7), {"connection": "close"}),
-    (errors.BodyTooSlowError(9.0), {"connection": "close"}),
-    (errors.EncodingError(), {"accept-encoding": "gzip"}),
-    (errors.MethodNotAllowedError(["GET", "PUT"]), {"allow": "GET, PUT"}),
-    (errors.RevisionConflictError(3), {"etag": '"3"'}),
-    (errors.RevisionConflictError(None), {}),
-]
-
-
-@pytest.mark.parametrize(("error", "expected"), HEADERS, ids=lambda value: type(value).__name__)
-def test_headers_of_a_problem(error: Exception, expected: dict[str, str]) -> None:
-    problem = problem_of(error)
-    assert problem is not None
-    answer = problem.response("id")
-    headers = {name: value for name, value in answer.headers.items() if name != "content-length"}
-    assert headers == {"content-type": "application/problem+json", **expected}
-    assert (answer.status_code, problem.detail) == (RAISED[type(error)].status, str(error))
+def test_a_problem_before_the_body_was_read_ends_the_connection() -> None:
+    for error in (errors.TooMuchHeldError(), errors.BodyTooSlowError(9.0), BodyTooLargeError(7)):
+        problem = known(problem_of(error))
+        assert problem.headers == {"Connection": "close"}
 
 
 def test_places_are_named_and_bounded() -> None:
     faults = [Fault("/" + "p" * 500, "m" * 500)] * 30
-    problem = problem_of(InvalidRequestError(faults))
-    assert problem is not None
+    problem = known(problem_of(InvalidRequestError(faults)))
     document = problem.as_json("id", lambda pointer: "/q" + pointer.removeprefix("/p"))
     assert document["detail"] == f"/q{'p' * 118}: {'m' * 200} (and 19 more)"
     assert document["errors"] == [{"pointer": "/q" + "p" * 118, "message": "m" * 200}] * 20
-    long = problem_of(errors.NotReadyError("x" * 1000))
-    assert long is not None
+    long = known(problem_of(errors.NotReadyError("x" * 1000)))
     assert long.as_json("id")["detail"] == "x" * 400
 
 
 def test_a_cancelled_request_is_told_why() -> None:
-    problem = problem_of(CancelledError())
-    assert problem is not None
+    problem = known(problem_of(CancelledError()))
     assert (problem.kind.code, problem.detail[:28]) == ("not_ready", "the service is shutting down")

@@ -6,7 +6,6 @@ import os
 import sqlite3
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psycopg
@@ -64,13 +63,6 @@ def test_what_another_does_is_seen_at_once(store: MapStore, database: str) -> No
 def test_it_leaves_no_transaction_open(database: str) -> None:
     """One that stays open keeps the server from cleaning up, and others from changing tables."""
     assert asked(database, "state") == [("idle",)]
-
-
-def test_threads_do_not_wait_for_each_other(store: MapStore) -> None:
-    store.put("m", b"{}", BOX)
-    with ThreadPoolExecutor(8) as threads:
-        found = list(threads.map(store.record, ["m"] * 400))
-    assert {record.revision for record in found} == {1}
 
 
 def test_a_connection_that_is_lost_is_made_anew(named: MapStore, database: str) -> None:

@@ -40,29 +40,23 @@ def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService], w
     assert "Traceback" not in running.log()
 
 
-def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., RunningService]) -> None:
+@pytest.mark.parametrize("first", [signal.SIGHUP, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
+def test_a_terminal_that_goes_away_drains_it_and_ctrl_c_cuts_it_short(
+    start_service: Callable[..., RunningService], first: signal.Signals
+) -> None:
     """It ended at once, without its last answers."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup may ignore it
     try:
         running = start_service(drain_s=5.0)
     finally:
         signal.signal(signal.SIGHUP, before)
-    running.process.send_signal(signal.SIGHUP)
-    until(lambda: running.client.get("/readyz").status_code == 503)
-    running.process.send_signal(signal.SIGINT)  # closes it at once
-    assert running.ended() == 0
-    assert "Traceback" not in running.log()
-
-
-@pytest.mark.long
-def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(drain_s=5.0)
     begun = time.monotonic()
-    running.process.send_signal(signal.SIGINT)
+    running.process.send_signal(first)
     until(lambda: running.client.get("/readyz").status_code == 503)
     running.process.send_signal(signal.SIGINT)
     assert running.ended() == 0
     assert time.monotonic() - begun < 5.0
+    assert "Traceback" not in running.log()
 
 
 @pytest.mark.long

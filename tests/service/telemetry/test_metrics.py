@@ -33,6 +33,7 @@ def exercise(client: httpx.Client) -> str:
     client.put("/v1/maps/seen", json=examples.MAP)
     client.post("/v1/associate", json={**examples.ASSOCIATE, "map": {"map_id": "seen"}})
     client.delete("/v1/maps/seen")
+    client.get("/nothing/at/all")
     return client.get("/metrics").text
 
 
@@ -40,6 +41,7 @@ def test_the_dashboard_asks_for_what_there_is(client: httpx.Client) -> None:
     text = exercise(client)
     there = set(re.findall(r"^(linefix_\w+)", text, re.MULTILINE))
     labels = {name: set(re.findall(r'(\w+)="', line)) for name, line in re.findall(r"^(linefix_\w+)(\S*)", text, re.M)}
+    assert ('route="unmatched"' in text, "/nothing/at/all" in text) == (True, False)
     assert len(asked_for()) >= 13
     for place, expression in asked_for().items():
         names = re.findall(r"linefix_\w+", expression)
