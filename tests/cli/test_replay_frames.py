@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from cli.errors import RefusedError
-from cli.logs import Frames
+from cli.logs import Frames, odometry_of
 from formats import LoggedScan
 from registration import RigidTransform
+from tests.association.scenes import known
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 from vectorization import LaserScan
@@ -139,3 +140,11 @@ def test_one_scan_without_a_mount_among_others_is_not_taken() -> None:
     given = Frames(RigidTransform(1.0, 2.0, 3.0))
     assert given.taken(scan(MOUNT)).mount == given.given
     assert given.taken(scan(None)).mount == given.given
+
+
+def test_odometry_is_of_the_frame_whose_poses_are_located() -> None:
+    robot = RigidTransform(3.0, -1.0, 0.4)
+    found = known(odometry_of(scan(MOUNT, robot.compose(MOUNT))))
+    assert (found.x, found.y, found.theta) == pytest.approx((robot.x, robot.y, robot.theta))
+    assert odometry_of(scan(None, robot)) == robot
+    assert odometry_of(scan(MOUNT)) is None
