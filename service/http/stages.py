@@ -80,9 +80,10 @@ async def look_up_maps(exchange: Exchange, asked: AssociateRequest | BatchReques
 
 
 async def index(exchange: Exchange, found: FoundMaps, *, oriented: bool | None) -> CachedMap:
-    """Index a map, or several, in a slot of another gate: its threads go behind all searches.
+    """Index a map in a slot of a search, and one for which that takes long in one of another gate: searches go first.
 
-    Indexing does not look at the deadline. Raises as `MapLookup.indexed`, and `DeadlinePassedError`.
+    Indexing does not look at the deadline: in one gate, a small map would wait for a large one. Raises as
+    `MapLookup.indexed`, and `DeadlinePassedError`.
     """
     services = exchange.services
     with stage("index"):
@@ -93,7 +94,8 @@ async def index(exchange: Exchange, found: FoundMaps, *, oriented: bool | None) 
         build = partial(services.lookup.indexed, found, oriented=oriented, deadline=exchange.deadline)
         with services.documents.account(exchange.ticket.holder) as account:
             account.take(found.unread_bytes)
-            return await services.indexing.run(queued(build), exchange.deadline, exchange.ticket)
+            gate = services.indexing if services.lookup.takes_long(found) else services.gate
+            return await gate.run(queued(build), exchange.deadline, exchange.ticket)
 
 
 async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:

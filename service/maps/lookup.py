@@ -21,6 +21,7 @@ from .tables import MapOutline, MapRecord
 
 OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
 LONG_SEGMENTS = 2_000  # of a map in a request, whose content is not compared with those of others in the event loop
+LONG_BYTES = 100_000  # of the document of one
 MOST_TOGETHER = 200_000  # segments of several maps, and points, as of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
@@ -77,10 +78,17 @@ class MapLookup:
         """Return whether maps are indexed already; `oriented` None: as each map states."""
         return self._cache.has(_key(found, oriented))
 
+    def takes_long(self, found: FoundMaps) -> bool:
+        """Return whether it may take long to index maps."""
+        single = found.maps.get(None)
+        if isinstance(single, InlineMap):
+            return len(single.segments) + len(single.points) > LONG_SEGMENTS
+        return single is None or (found.document is not None and len(found.document) > LONG_BYTES)
+
     def cached(self, found: FoundMaps, *, oriented: bool | None) -> CachedMap | None:
         """Return maps that are indexed already; None where they are not, or finding that out takes a while."""
         single = found.maps.get(None)
-        if isinstance(single, InlineMap) and len(single.segments) + len(single.points) > LONG_SEGMENTS:
+        if isinstance(single, InlineMap) and self.takes_long(found):
             return None
         return self._cache.find(_key(found, oriented))
 
