@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -223,5 +223,8 @@ def _thread_ms(call: Callable[[], object]) -> float:
 
 def _processor_seconds(pid: int) -> float:
     """Return what all threads of a process, and of those below it, have had of the processors."""
-    tasks = (task for one in family(pid) for task in Path(f"/proc/{one}/task").iterdir())
-    return 1e-9 * sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
+    seconds = 0.0
+    for task in (task for one in family(pid) for task in Path(f"/proc/{one}/task").iterdir()):
+        with suppress(OSError):  # a thread that has just ended
+            seconds += 1e-9 * int((task / "schedstat").read_text().split()[0])
+    return seconds

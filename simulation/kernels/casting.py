@@ -1,7 +1,7 @@
 """Ray casting.
 
 Nothing here validates: callers pass finite numbers. The kernel has a slow reference in
-``tests/simulation/reference.py``.
+``tests/simulation/test_simulation.py``.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Kernels of this stage. Each has a slow NumPy reference implementation in ``tests/association/reference``."""
+"""Kernels of this stage. Each has a slow NumPy reference in ``tests/association/kernels/reference.py``."""
