@@ -149,7 +149,7 @@ class MapIndex:
 
     @property
     def oriented(self) -> bool:
-        """Whether directions of segments mean anything; otherwise each segment is there in both directions."""
+        """True if the directions of segments mean anything; otherwise each segment is there in both directions."""
         return len(self.segments) == self.directed
 
     def warmed(self) -> Self:

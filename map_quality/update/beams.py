@@ -131,7 +131,8 @@ def _met(
     beams, columns, slant = beams[met], columns[met], slant[met]
     distance = ahead[met] / slant
     gap, tolerance = (ranges[beams] - distance) * np.abs(slant), _tolerance(one, sigma, distance)
-    kept = gap >= -tolerance
+    kept = np.flatnonzero(gap >= -tolerance)
+    kept = kept[_nearest(beams[kept], distance[kept])]
     beams, columns, slant, distance = beams[kept], columns[kept], slant[kept], distance[kept]
     gap, tolerance = gap[kept], tolerance[kept]
     directions, lengths = walls.directions[columns], walls.lengths[columns]
@@ -158,6 +159,14 @@ def _crossed(walls: Segments, origins: Floats, rays: Floats) -> tuple[Indices, I
     own = np.einsum("ij,ij->i", left, origins)[:, None]
     begins, ends = left @ walls.endpoints[:, :2].T >= own, left @ walls.endpoints[:, 2:].T >= own
     return np.divmod(np.flatnonzero(begins != ends), len(walls))
+
+
+def _nearest(beams: Indices, distance: Floats) -> Indices:
+    """Return the rows of the nearest walls of each beam, at most `MOST_PASSED`, which bounds the memory."""
+    order = np.lexsort((distance, beams))
+    sorted_beams = beams[order]
+    rank = np.arange(len(order)) - np.searchsorted(sorted_beams, sorted_beams)
+    return np.sort(order[rank < tuning.MOST_PASSED])
 
 
 def seen_walls(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> Indices:

@@ -25,6 +25,7 @@ USUAL_SIGMA = 0.02  # m; of the walls of a map that does not declare it
 
 CHUNK = 0.2  # m; walls are judged in pieces of about this length
 LEAST_SLANT = 0.17  # sine of the angle between beam and wall; flatter beams are no evidence
+MOST_PASSED = 32  # walls that one beam is evidence of, the nearest; memory
 LEAST_TOLERANCE = 0.06  # m; a beam that ends no farther from a wall reads it
 DEVIATIONS = 3.0  # times the standard deviation, likewise
 THROUGH = 2.0  # times the tolerance; a beam that ends farther behind a wall passed through it

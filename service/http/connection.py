@@ -1,4 +1,4 @@
-"""What one request receives and sends: the rest of a body that no route reads is dropped, an answer goes in pieces.
+"""The connection of one request: the rest of a body that no route reads is dropped, and an answer goes in pieces.
 
 A server that closes a connection with bytes unread has the system reset it, and the reset overtakes the answer: the
 client sees a broken connection in place of a refusal. Data that is handed to the server waits in its memory for as long

@@ -124,7 +124,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     assert float(answer["map"]["meta"]["thickness"]) == pytest.approx(THICK, abs=0.02)
     assert [note["code"] for note in answer["report"]["assumed"]] == ["thickness_found"]
     assert "from scans of drive.log" in answer["report"]["assumed"][0]["message"]
-    # Who says how thick they are is not contradicted, but told.
+    # A thickness that is given stays, and the report says that scans show another.
     told = linefix(*asked, "--thickness", str(2 * THICK), **PATIENT).out
     assert "finding  mirrored" not in told  # though scans that fit badly fit a little better so
     assert re.search("finding  thickness: The scans fit better if walls are (19|20) cm thinner", told)

@@ -1,4 +1,4 @@
-"""What a scanner reads on a robot that moves during the scan, worked out beam by beam."""
+"""The ranges of a scanner on a robot that moves during the scan, worked out beam by beam."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def gathered(*names: str, moved: bool = True, told: OdometryHistory | None = Non
 
 
 def test_odometry_says_how_the_robot_moved_between_them() -> None:
-    """Without it the older scan is left out, and that is told."""
+    """Without it the older scan is left out, and the answer names it as missing."""
     told = OdometryHistory()
     for nanosec, at in ((0, HERE), (40_000_000, linefix.RigidTransform(0.12, 0.01, 0.07)), (90_000_000, DRIVEN)):
         told.take(odometry(3, nanosec, at))

@@ -59,7 +59,7 @@ COUNTED = [
     ("beams", VectorizeRequest, lambda n: {"laser": {"angle_min": 0, "angle_increment": 0.1, "ranges": [1.0] * n}}),
     ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "correspondences": [[0, 0]] * n}),
     ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "weights": [1.0] * n}),
-    # What comes with each segment has the limit of the segments.
+    # Values that come with each segment have the limit of the segments.
     ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "point_counts": [1.0] * n}}),
     ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "sigma": [1.0] * n}}),
     ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {**SCAN, "spreads": [1.0] * n}}),

@@ -1,4 +1,4 @@
-"""Doubtful parts of a map are found by itself and by sample scans, and nothing in maps without them."""
+"""The check of a map finds its doubtful parts, alone and with sample scans, and nothing in maps without them."""
 
 from __future__ import annotations
 
