@@ -127,7 +127,7 @@ def replay(
     if files.out is not None:
         _write_poses(tally, files.out, output.notes)
     if files.picture is not None:
-        _draw(maps, where, tally, files.picture)
+        _draw(maps, where, tally, files.picture, output.notes)
     print_notes(opened_log, output.notes)
     print_lines(_log_lines(opened_log, frames), output.notes)
     if not output.as_json:
@@ -192,15 +192,19 @@ def _write_poses(tally: Tally, out: Path, where: TextIO) -> None:
             print_lines(rows([("poses", f"part {number} of the log, stamps {seconds}, in {file}")], 10), where)
 
 
-def _draw(maps: Sequence[NamedMap], where: Where, tally: Tally, picture: Path) -> None:
+def _draw(maps: Sequence[NamedMap], where: Where, tally: Tally, picture: Path, notes: TextIO) -> None:
     """Draw the map and the poses on it; of several maps those with a usable pose, each to a file with its name."""
-    several = len(maps) > 1
+    several, drawn = len(maps) > 1, []
     for one in maps:
         mine = [pose for pose in tally.poses if pose.map_id == (one.name if several else "")]
         usable, others = ([pose.pose for pose in mine if pose.usable is kind] for kind in (True, False))
         if usable or not several:
             out = picture.with_stem(f"{picture.stem}-{one.name}") if several else picture
             draw_picture(where.whole_map(one.document), out, usable, others)
+            drawn.append(out)
+    if several:
+        written = ", ".join(str(out) for out in drawn) or "none: no map has a usable pose"
+        print_lines(rows([("picture", written)], 10), notes)
 
 
 def _log_lines(log: Log, frames: Frames) -> Lines:

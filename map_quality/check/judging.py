@@ -176,8 +176,8 @@ def _thickness_finding(thicker: float, *, oriented: bool) -> Finding:
         "thickness",
         f"The scans fit better if walls are {100.0 * abs(thicker):.0f} cm {more} than drawn. For a drawing that was "
         f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For a grid, "
-        f"import it again with its `surface` {half:.1f} cm {depth}, or with the log, which estimates it. In any other "
-        f"map, move each segment by {half:.1f} cm to its {side}.",
+        f"import it again with the log, which estimates its `surface`, or with a `surface` {half:.1f} cm {depth}; its "
+        f"unit is cells. In any other map, move each segment by {half:.1f} cm to its {side}.",
     )
 
 

@@ -114,6 +114,7 @@ def test_a_log_is_replayed_on_several_maps(linefix: Linefix, files: Path, mode: 
     )  # fmt: skip
     row = next(line for line in told.out.splitlines() if line.startswith("floor "))
     assert int(row.split()[-1]) == len(usable)
+    assert "picture   way-floor.png\n" in told.out + told.err
     assert (files.parent / "way-floor.png").exists()
     assert not (files.parent / "way-hall.png").exists()
 

@@ -56,9 +56,14 @@ async function read(files: File[], mine: number): Promise<void> {
   if (problems.length === before) askSoon();
 }
 
+/** Show which file is read, after what was wrong with those before it. */
+function reading(name: string): void {
+  write(status, [...problems, `Reading ${name} ...`].join(" "));
+}
+
 async function readMap(files: File[], mine: number): Promise<void> {
   drawing = files;
-  status.textContent = `Reading ${files[0].name} ...`;
+  reading(files[0].name);
   await requirePicture(files);
   const isGrid = files.some(({ name }) => GRIDS.test(name));
   const options = isGrid ? { surface: surface.value } : { units: units.value };
@@ -86,11 +91,12 @@ async function requirePicture(files: File[]): Promise<void> {
 /** Read the scans of a log; also its map, where it has no scans or no other map was opened. */
 async function readLog(files: File[], mine: number): Promise<void> {
   let problem: unknown = null;
-  status.textContent = `Reading ${files[0].name} ...`;
+  const { name } = files.find((file) => !/yaml$/i.test(file.name)) ?? files[0];
+  reading(name);
   try {
     const found = await importScans(files, MOST_SCANS);
     if (!isLatest(mine)) return;
-    openScans(files.find(({ name }) => !/yaml$/i.test(name))!.name, found, MOST_SCANS);
+    openScans(name, found, MOST_SCANS);
     showScanImport(found.report);
   } catch (error) {
     problem = error;

@@ -20,7 +20,7 @@ const PROBLEMS: Partial<Record<Problem["code"], string>> = {
   unauthorized: "The service requires a key. Enter it under \"Key\" below.",
   overloaded: "The service is busy. Try again in some seconds.",
   rate_limited: "This key has sent too many requests. Try again in some seconds.",
-  deadline_exceeded: "The time ran out before the search began. Try again.",
+  deadline_exceeded: "The time ran out: the service is busy, or the file is large. Try again.",
   unknown_map: "There is no such stored map. It may have been deleted, or renamed.",
   revision_conflict: "The stored map has another revision by now. Open it again.",
 };

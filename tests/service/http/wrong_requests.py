@@ -274,8 +274,9 @@ STATUSES: list[tuple[str, Any, int, str, dict[str, str] | str]] = [
     *((f"PUT /v1/maps/{name}", examples.MAP, 422, "invalid_request", "/path/map_id: ")
       for name in ("a b", "x" * 129, "\u00e4", "a:b", "m:check")),
     ("GET /v1/maps/a b:check", b"", 422, "invalid_request", "/path/map_id: "),
-    ("GET /v1/maps/wrong:check?deadline_ms=soon", b"", 422, "invalid_request", "/query/deadline_ms: "),
+    ("GET /v1/maps/wrong:check?deadline_ms=soon", b"", 422, "invalid_request", "/query/deadline_ms: expected a number"),
     ("GET /v1/maps?limit=0", b"", 422, "invalid_request", "/query/limit: "),
+    ("GET /v1/maps?limit=1e3", b"", 422, "invalid_request", "/query/limit: expected an integer"),
     ("GET /v1/maps/wrong:check?deadline_ms=0", b"", 504, "deadline_exceeded", ""),
     (CHECK, {"scans": [STILL], "deadline_ms": 0}, 504, "deadline_exceeded", ""),
     (ANALYZE, {"deadline_ms": 0}, 504, "deadline_exceeded", ""),
