@@ -20,7 +20,6 @@
     deciding          whether the localizer agrees; when initialpose is published; the transform from the map
     health            diagnostics, status, log
     inputs            the watch over ages, contradictions and clocks of what is received
-    requests          requests with an id, and their results
     reporting         results as messages
     tuning            limits and thresholds
 """

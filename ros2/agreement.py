@@ -21,30 +21,13 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from association import Alternative
 from registration import IDENTITY, RigidTransform
+from registration.layout import Floats
 
 from . import tuning
 from .clock import Confirmation
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Place:
-    """A pose on a map.
-
-    Attributes
-    ----------
-    pose : RigidTransform
-        map_from_base.
-    map_id : str or None
-        Of several maps the one that the pose is on.
-    """
-
-    pose: RigidTransform
-    map_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +49,8 @@ class Observation:
         Of odometry; that of different parts is not comparable.
     unknown_s : float
         Seconds up to `stamp` in which odometry is not known; the uncertainty of a step grows with them.
-    others : sequence of Place
-        Other poses that explain the scan.
+    others : sequence of Alternative
+        Other poses that explain the scan; of each, `pose` and `map_id` count.
     conclusive : bool
         True when every pose that explains the scan about as well is `pose` or one of `others`.
     rival : bool
@@ -83,7 +66,7 @@ class Observation:
     odometry: RigidTransform | None = None
     part: tuple[int, ...] = ()
     unknown_s: float = 0.0
-    others: Sequence[Place] = ()
+    others: Sequence[Alternative | Observation] = ()
     conclusive: bool = False
     rival: bool = False
     map_id: str | None = None
@@ -299,6 +282,6 @@ def _verdict(begin: Observation, scan: Observation, step: RigidTransform, unknow
         return predicted.chi_square(scan.pose, covariance + scan.covariance) <= tuning.AGREEING_CHI_SQUARE
     if not scan.conclusive:
         return None
-    places = [one.pose for one in (Place(scan.pose, scan.map_id), *scan.others) if one.map_id == begin.map_id]
+    places = [one.pose for one in (scan, *scan.others) if one.map_id == begin.map_id]
     near = any(predicted.chi_square(pose, covariance) <= tuning.AGREEING_CHI_SQUARE for pose in places)
     return None if near else False

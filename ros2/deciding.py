@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from registration import RigidTransform, wrap_angle
 
 from . import tuning
-from .agreement import Event, Observation
+from .agreement import Observation
 from .frames import FrameError, Frames, matrix_of, planar
 from .messages import NS, PoseWithCovarianceStamped, nanoseconds
 from .odometry import OdometryHistory
@@ -101,20 +101,19 @@ class InitialPose:
 
     when: When = "start"
     _wanted: bool = True
-    _published: bool = False
-    _at: float | None = None
+    _at: float | None = None  # when it was published last
 
     def want(self) -> None:
         """Publish the next agreed pose, after a request or a new subscription."""
         self._wanted = True
 
-    def decide(self, event: Event, *, localizer_agrees: bool | None, lost: bool, now: float) -> str | None:
-        """Return why the agreed pose is published; None where it is not.
+    def decide(self, *, new: bool, localizer_agrees: bool | None, lost: bool, now: float) -> str | None:
+        """Return why the pose of a scan that is agreed is published; None where it is not.
 
         Parameters
         ----------
-        event : Event
-            Of the scan.
+        new : bool
+            True when it is the first scan of this pose.
         localizer_agrees : bool or None
             True when the localizer has this pose; None: not known.
         lost : bool
@@ -122,14 +121,12 @@ class InitialPose:
         now : float
             `time.monotonic()`, seconds.
         """
-        if event not in (Event.AGREED, Event.CONFIRMED):
-            return None
         if localizer_agrees and self.when != "always":
             self._wanted = False
             return None
         if self._wanted:
             return "agreed"
-        if event is Event.AGREED and self._published:
+        if new and self._at is not None:
             return "corrected"  # the pose published before is contradicted
         since = LOST_SECONDS if self._at is None else now - self._at
         if lost and self.when != "start" and since >= LOST_SECONDS:
@@ -138,7 +135,7 @@ class InitialPose:
 
     def published(self, *, subscribed: bool, now: float) -> None:
         """Note that the pose was published; without a subscriber it stays wanted."""
-        self._wanted, self._published, self._at = not subscribed, True, now
+        self._wanted, self._at = not subscribed, now
 
 
 @dataclass(slots=True)
@@ -153,19 +150,17 @@ class MapToOdom:
 
     current: RigidTransform | None = None
     _target: RigidTransform | None = None
+    _scan: Observation = field(default_factory=lambda: Observation(0))  # the last one that was taken
     _stamp: int = 0
-    _part: tuple[int, ...] = ()  # of odometry, which the correction is of,
-    _unknown_s: float = 0.0  # and how long odometry was not known before
 
-    def take(self, event: Event, scan: Observation) -> None:
-        """Take a scan that is agreed or confirmed; others, and those without odometry, change nothing."""
-        if event not in (Event.AGREED, Event.CONFIRMED) or scan.odometry is None:
+    def take(self, scan: Observation, *, new: bool) -> None:
+        """Take a scan that is agreed, with `new` the first of its pose; one without odometry changes nothing."""
+        if scan.odometry is None:
             return
         self._target = scan.pose.compose(scan.odometry.inverse())
-        other = (scan.part, scan.unknown_s) != (self._part, self._unknown_s)
-        if event is Event.AGREED or self.current is None or other:
+        before, self._scan = self._scan, scan
+        if new or self.current is None or (scan.part, scan.unknown_s) != (before.part, before.unknown_s):
             self.current, self._stamp = self._target, scan.stamp
-        self._part, self._unknown_s = scan.part, scan.unknown_s
 
     def advance(
         self, stamp: int, odometry: RigidTransform, part: tuple[int, ...] = (), unknown_s: float = 0.0
@@ -181,7 +176,7 @@ class MapToOdom:
         part, unknown_s : tuple of int, float
             As of `Observation`.
         """
-        doubtful = part != self._part or unknown_s - self._unknown_s > UNCONFIRMED_SECONDS
+        doubtful = part != self._scan.part or unknown_s - self._scan.unknown_s > UNCONFIRMED_SECONDS
         if self.current is None or self._target is None or doubtful:
             return None
         seconds = min(1.0, max(0.0, (stamp - self._stamp) / NS))

@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from formats.logs import transforms
 from formats.logs.sensors import tilt_of
 from formats.logs.tracks import Track
 from formats.logs.tuning import MOST_TILT
 from registration import IDENTITY, RigidTransform
+from registration.layout import Floats
 
 from .messages import TFMessage, TransformStamped, nanoseconds
 from .options import MAX_NAME, quoted
 from .tuning import MAX_FRAMES, MAX_MOUNT, MAX_TRANSFORMS, TRANSFORMS_KEPT
-
-Floats = NDArray[np.float64]
 
 
 class FrameError(ValueError):
@@ -128,9 +126,6 @@ def matrix_of_message(transform: TransformStamped) -> Floats:
         raise FrameError(f"{named} is not used: {error}") from None
 
 
-LONGEST_CHAIN = 64  # frames from a sensor to the root
-
-
 @dataclass(slots=True)
 class _Frame:
     """A frame in its parent."""
@@ -234,7 +229,7 @@ class Frames:
 
     def _ancestors(self, frame: str) -> list[str]:
         chain = [frame]
-        while chain[-1] in self._frames and len(chain) < LONGEST_CHAIN:
+        while chain[-1] in self._frames and len(chain) < transforms.LONGEST_CHAIN:
             parent = self._frames[chain[-1]].parent
             if parent in chain:
                 break

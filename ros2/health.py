@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from .messages import DiagnosticArray, DiagnosticStatus, Header, Time
-from .reporting import ERROR, OK, WARN, status_of
+from .messages import DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time
+from .reporting import ERROR, OK, WARN
 from .topics import Publisher
 from .tuning import LOG_SECONDS, REPEAT_SECONDS
 
@@ -75,8 +75,9 @@ class Health:
         self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [self._status(part, verdict, values)]))
 
     def _status(self, part: str, verdict: tuple[int, str], values: Mapping[str, str] | None) -> DiagnosticStatus:
-        prefix, hardware_id = self.names
-        return status_of(f"{prefix}linefix: {part}", hardware_id, verdict, values)
+        (level, message), (prefix, hardware_id) = verdict, self.names
+        pairs = [KeyValue(key, value) for key, value in (values or {}).items()]
+        return DiagnosticStatus(level, f"{prefix}linefix: {part}", message, hardware_id, pairs)
 
     def beat(self, state: State, stamp: Time, values: Mapping[str, str], doubt: str = "") -> None:
         """Publish the state, with why it is no better: at once where it or the map has changed, else once a second."""

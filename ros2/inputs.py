@@ -51,8 +51,8 @@ class Inputs:
         self._looked = time.monotonic()
         self._scans, self._ranges, self._searched = _Seen(), _Seen(), _Seen()
         self._senders: deque[tuple[float, str, Any]] = deque(maxlen=200)  # time, frame and publisher of the last scans
-        self.latency = 0
-        self._apart = 0  # scans one after the other whose clock differs from that of odometry
+        self.latency = self._offset = 0
+        self._apart = 0  # scans one after the other whose clock differs from that of odometry by such an offset
         self._disagreeing: float | None = None  # since when scans are usable, but none is agreed
         self._mapped = robot.options.map_topic is None
 
@@ -68,8 +68,8 @@ class Inputs:
             info = getattr(scan, "sample_info", None)
             self._senders.append((now, scan.header.frame_id, getattr(info, "publication_handle", None)))
         self.latency = received - stamp
-        offset = self._odometry.clock_offset(stamp, received)
-        apart = abs(offset) > CLOCKS_APART_NS and self._odometry.silent_s < ENDED_SECONDS
+        self._offset = self._odometry.clock_offset(stamp, received)
+        apart = abs(self._offset) > CLOCKS_APART_NS and self._odometry.silent_s < ENDED_SECONDS
         self._apart = self._apart + 1 if apart else 0
 
     def map(self) -> None:
@@ -151,7 +151,9 @@ class Inputs:
             yield "", self._reason(topics.maps[0])
         elif not silent(self._scans) and silent(self._searched):
             yield "", "scans arrive, but none can be searched; read the problem on /diagnostics"
-            yield from (("", _best_effort(one.subscription)) for one in topics.transforms if one.lossy)
+            remedy = "is best effort, so that earlier messages are lost; publish reliable and transient local"
+            lossy = (one.subscription.name for one in topics.transforms if one.lossy)
+            yield from (("", f"a publisher of {name} {remedy}") for name in lossy)
         if min(odometry.silent_s, now - began) > patience:
             reason = f"{self._reason(topics.odometry)}; or set --odom-frame, if it comes in tf"
             doubt = f"no odometry arrives any more on {odometry.source}" if odometry.source else ""
@@ -168,7 +170,8 @@ class Inputs:
             wrong = "the transform from the map would be wrong by that"
             yield told if self._robot.options.publish_tf else "", f"{told}; {remedy}. With --publish-tf, {wrong}"
         elif self._apart >= 3:
-            yield f"the clocks of scans and of odometry on {odometry.source} differ", self._clocks
+            line = f"{odometry.clocks(self._offset)} not used while the robot moves"
+            yield f"the clocks of scans and of odometry on {odometry.source} differ", line
         if self.shared:
             frame = f"several publishers send scans of the frame {quoted(self.shared)}"
             yield frame, f"{frame}, expected one; stop the others, or give each laser a frame of its own"
@@ -196,12 +199,6 @@ class Inputs:
             "not used"
         )
 
-    @property
-    def _clocks(self) -> str:
-        now = self._clock.steady()
-        offset = self._odometry.clock_offset(now - self.latency, now)
-        return f"{self._odometry.clocks(offset)} not used while the robot moves"
-
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._robot.options.domain
         if topic.writers.connected:
@@ -212,10 +209,3 @@ class Inputs:
                 f"the publisher of {topic.name} in domain {domain} has an incompatible QoS; publish with reliable QoS"
             )
         return f"no publisher on {topic.name} in domain {domain}; check the topic, ROS_DOMAIN_ID and the network"
-
-
-def _best_effort(topic: Subscription[Any]) -> str:
-    return (
-        f"a publisher of {topic.name} is best effort, so that earlier messages are lost; publish reliable and "
-        "transient local"
-    )

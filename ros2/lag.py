@@ -30,11 +30,11 @@ class Lag:
 
     def shift(self, stamp: int, received: int) -> int:
         """Return how long after the stamp of a scan odometry of its time is stamped, nanoseconds."""
-        return self._apart(stamp, received) if self._by_reception else 0
+        return self._shift(stamp, received, by_reception=self._by_reception)
 
-    def _apart(self, stamp: int, received: int) -> int:
+    def _shift(self, stamp: int, received: int, *, by_reception: bool) -> int:
         offset = self._odometry.clock_offset(stamp, received)
-        return offset if abs(offset) > CLOCKS_AGREE_NS else 0
+        return offset if by_reception and abs(offset) > CLOCKS_AGREE_NS else 0
 
     def take(self, scan: Observation, received: int) -> None:
         """Take a usable scan, and choose between the two ways."""
@@ -62,5 +62,5 @@ class Lag:
         return min(AGREEING_CHI_SQUARE, predicted.chi_square(end[0].pose, covariance + end[0].covariance))
 
     def _known(self, scan: Observation, received: int, *, by_reception: bool) -> Known | None:
-        shift = self._apart(scan.stamp, received) if by_reception else 0
+        shift = self._shift(scan.stamp, received, by_reception=by_reception)
         return self._odometry.known(scan.stamp + shift, received)

@@ -19,7 +19,6 @@ from .maps import UNNAMED, Maps
 from .messages import NS, String, Time, nanoseconds
 from .options import quoted
 from .reporting import WARN, at_least, map_marker, stamped_pose, transform_of
-from .requests import Requests
 from .robot import Robot
 from .searching import observation_of
 from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
@@ -42,12 +41,11 @@ class Localization:
         self._robot, self._odometry = robot, robot.odometry
         self._options, self._topics, self._health = robot.options, robot.topics, robot.health
         self.maps: Maps | None = None
-        self._map_name = UNNAMED  # of the last agreed pose
+        self._map_name, self._frame = UNNAMED, "map"  # of the last agreed pose
         self._localizer_map: str | None = None  # of the last pose that was published to a localizer
         self._agreement, self._initial = Agreement(robot.options.agree), InitialPose(robot.options.when)
         self._watch = Watch(robot.frames, robot.odometry, transforms=not robot.options.publish_tf)
         self._correction, self._lag = MapToOdom(), Lag(robot.odometry)
-        self._requests = Requests(robot.topics.named_requests, robot.topics.results)
         self._pending: tuple[Time, Observation, str] | None = None
         self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
         self._transformed = 0  # the time of the last transform that was published, nanoseconds
@@ -59,15 +57,10 @@ class Localization:
             self._map_name, self._localizer_map = UNNAMED, None
             self.begin_again()
         if not maps.several:
-            self._publish_walls(None)
+            self._publish_walls(maps, None)
 
-    def _publish_walls(self, map_id: str | None) -> None:
-        if self.maps is not None:
-            walls, frame = self.maps.walls_of(map_id), self.maps.frame_of(map_id)
-            self._topics.walls.publish(map_marker(walls, frame))
-
-    def _frame_of(self, scan: Observation | None) -> str:
-        return "map" if scan is None or self.maps is None else self.maps.frame_of(scan.map_id)
+    def _publish_walls(self, maps: Maps, map_id: str | None) -> None:
+        self._topics.walls.publish(map_marker(maps.walls_of(map_id), maps.frame_of(map_id)))
 
     @property
     def map_frames(self) -> Collection[str]:
@@ -84,9 +77,8 @@ class Localization:
 
     def take_requests(self) -> None:
         """Take requests for a pose."""
-        if self._topics.requests.take() or self._requests.take():
+        if self._topics.requests.take():
             self.begin_again()
-        self._requests.expire()
 
     def take_localizer(self) -> None:
         """Take the poses of the robot's localizer; report those that cannot be used."""
@@ -105,8 +97,8 @@ class Localization:
         stamp = nanoseconds(stamped)
         return self._odometry.awaited(stamp + self._lag.shift(stamp, stamp + latency))
 
-    def take(self, answer: linefix.AssociationResult, stamped: Time, latency: int) -> bool:
-        """Take the result of a scan that was received so long after its stamp, ns; return whether it is agreed."""
+    def take(self, maps: Maps, answer: linefix.AssociationResult, stamped: Time, latency: int) -> bool:
+        """Take the result on maps of a scan that was received so long after its stamp, ns; return if it is agreed."""
         stamp = nanoseconds(stamped) or nanoseconds(self._robot.clock.now())
         received = stamp + latency
         if answer.usable:
@@ -119,39 +111,37 @@ class Localization:
         event = self._agreement.take(scan)
         if self._agreement.latest is None:
             self._correction = MapToOdom()  # where the clock was set back, the agreement forgets the pose
-        self._correction.take(event, scan)
         if event is Event.CONTRADICTED:
             self._pending = None
             self._health.note("a scan contradicts the agreed pose; drive on until a new pose is agreed")
         if event not in (Event.AGREED, Event.CONFIRMED):
             return False
-        self._follow(scan.map_id)
-        frame = self._frame_of(scan)
+        new = event is Event.AGREED
+        self._correction.take(scan, new=new)
+        self._follow(maps, scan.map_id)
         # The same coordinates on another map are another place, and the map of the localizer is known by what it got.
         agrees = None
         if scan.map_id == self._localizer_map:
-            agrees = self._watch.compare(scan, frame, self._robot.odom_frame)
+            agrees = self._watch.compare(scan, self._frame, self._robot.odom_frame)
         else:
             self._initial.want()
-        reason = self._initial.decide(event, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
-        agreed = stamped_pose(stamped, scan.pose, scan.covariance, frame)
-        self._topics.agreed.publish(agreed)
-        self._requests.answer(agreed, self._map_name)
+        reason = self._initial.decide(new=new, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
+        self._topics.agreed.publish(stamped_pose(stamped, scan.pose, scan.covariance, self._frame))
         if reason is not None:
             self._pending = stamped, scan, reason
             self.publish_initial()
         return True
 
-    def _follow(self, map_id: str | None) -> None:
+    def _follow(self, maps: Maps, map_id: str | None) -> None:
         """Publish the map of the agreed pose where it is another one than before."""
-        name = UNNAMED if self.maps is None else self.maps.name_of(map_id)
+        name, self._frame = maps.name_of(map_id), maps.frame_of(map_id)
         if name == self._map_name:
             return
         changed = f"the map changed from {self._map_name} to {name}" if self._map_name else f"the map is {name}"
         self._map_name = name
         self._topics.map_id.publish(String(name))
         if map_id is not None:
-            self._publish_walls(map_id)
+            self._publish_walls(maps, map_id)
             self._health.log(changed)
 
     def publish_initial(self) -> None:
@@ -180,7 +170,7 @@ class Localization:
                 self._health.note(problem, "no subscriber")
             return
         widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
-        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame_of(scan)))
+        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame))
         self._localizer_map = scan.map_id
         line = f"published {name} ({reason}): {place}"
         self._health.note(line, line)
@@ -200,8 +190,7 @@ class Localization:
         next_one = self._transformed + TRANSFORM_PERIOD_NS
         self._transformed = next_one if 0 <= stamp - next_one < TRANSFORM_PERIOD_NS else stamp
         ahead = time_of(stamp + TRANSFORM_TOLERANCE_NS)
-        frames = self._frame_of(self._agreement.latest), self._robot.odom_frame
-        self._topics.tf.publish(transform_of(ahead, frames, map_from_odom))
+        self._topics.tf.publish(transform_of(ahead, (self._frame, self._robot.odom_frame), map_from_odom))
 
     def state(self, *, searched: bool, confirmed: bool) -> State:
         """Return the state; whether the last scans could be searched, and may confirm a pose, is given."""

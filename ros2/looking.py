@@ -84,10 +84,6 @@ def look_of(
     FrameError
         When no range is valid.
     """
-    if not message.ranges:
-        raise FrameError(
-            f"no valid range in the scan of {quoted(message.header.frame_id)}: found no ranges; check the driver"
-        )
     notes = Notes()
     laser, increment = laser_of(message, notes), time_increment_of(message, notes) if motion else 0.0
     if np.isnan(laser.cleaned).all():

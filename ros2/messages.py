@@ -1,6 +1,7 @@
 """The messages of ROS 2 that the node receives and publishes, as types of DDS; their names end in ``dds_::Name_``.
 
-Their fields are those of the definitions in ``rosbags``; each has a default: zero, empty, and no rotation.
+Each is an attribute of this module, such as ``messages.LaserScan``. Its fields are those of the definition in
+``rosbags``; each has a default: zero, empty, and no rotation.
 """
 
 # Annotations of messages are read while the program runs, so they are no strings here.
@@ -58,37 +59,21 @@ def _field(kind: Nodetype, of: Any) -> tuple[Any, Callable[[], Any]]:
     return idl.types.sequence[inner], list
 
 
-Time: Any = message("builtin_interfaces/msg/Time")
-Clock: Any = message("rosgraph_msgs/msg/Clock")
-Header: Any = message("std_msgs/msg/Header")
-Empty: Any = message("std_msgs/msg/Empty")
-String: Any = message("std_msgs/msg/String")
-ColorRGBA: Any = message("std_msgs/msg/ColorRGBA")
-Point: Any = message("geometry_msgs/msg/Point")
-Vector3: Any = message("geometry_msgs/msg/Vector3")
-Quaternion: Any = message("geometry_msgs/msg/Quaternion")
-Pose: Any = message("geometry_msgs/msg/Pose")
-PoseWithCovariance: Any = message("geometry_msgs/msg/PoseWithCovariance")
-PoseWithCovarianceStamped: Any = message("geometry_msgs/msg/PoseWithCovarianceStamped")
-Twist: Any = message("geometry_msgs/msg/Twist")
-TwistWithCovariance: Any = message("geometry_msgs/msg/TwistWithCovariance")
-Transform: Any = message("geometry_msgs/msg/Transform")
-TransformStamped: Any = message("geometry_msgs/msg/TransformStamped")
-TFMessage: Any = message("tf2_msgs/msg/TFMessage")
-Odometry: Any = message("nav_msgs/msg/Odometry")
-MapMetaData: Any = message("nav_msgs/msg/MapMetaData")
-OccupancyGrid: Any = message("nav_msgs/msg/OccupancyGrid")
-LaserScan: Any = message("sensor_msgs/msg/LaserScan")
-KeyValue: Any = message("diagnostic_msgs/msg/KeyValue")
-DiagnosticStatus: Any = message("diagnostic_msgs/msg/DiagnosticStatus")
-DiagnosticArray: Any = message("diagnostic_msgs/msg/DiagnosticArray")
-Marker: Any = message("visualization_msgs/msg/Marker")
-MarkerArray: Any = message("visualization_msgs/msg/MarkerArray")
+NAMES = {name.rpartition("/")[2]: name for name in ROS.fielddefs}
+
+
+def __getattr__(name: str) -> Any:
+    """Return the type of a message by its short name, such as ``LaserScan``."""
+    if name not in NAMES:
+        raise AttributeError(f"found no message {name}")
+    return message(NAMES[name])
+
+
 # Most transforms on a topic that robots share are of others, and four million cells take too long to decode at once.
 SerializedTransforms: Any = message("tf2_msgs/msg/TFMessage", serialized=True)
 SerializedGrid: Any = message("nav_msgs/msg/OccupancyGrid", serialized=True)
 
 
-def nanoseconds(stamp: Time) -> int:
-    """Return a time as one number."""
+def nanoseconds(stamp: Any) -> int:
+    """Return a ``Time`` as one number."""
     return int(stamp.sec) * NS + int(stamp.nanosec)

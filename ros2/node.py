@@ -16,7 +16,7 @@ from .messages import NS, LaserScan
 from .options import NodeOptions, quoted
 from .reporting import WARN, answer_marker, stamped_pose, values_of, verdict_of
 from .robot import Robot
-from .searching import Found, Searcher, search_options
+from .searching import Found, Searcher
 from .topics import Waiting
 from .tuning import END_SECONDS, ODOMETRY_SECONDS, SAME_MAP, TRANSFORM_PERIOD_NS
 
@@ -64,7 +64,7 @@ class Node:
         self._ended, self._searched = False, False
         self._beat = TRANSFORM_PERIOD_NS / NS if options.publish_tf else BEAT
         self._waiting = Waiting(participant, self._topics.subscriptions)
-        self._searcher = Searcher(search_options(options), self._waiting.wake)
+        self._searcher = Searcher(options, self._waiting.wake)
         self._converter = MapConverter(self._waiting.wake, options.surface) if options.map_topic else None
         if maps is not None:
             self._localization.use(maps)
@@ -154,8 +154,7 @@ class Node:
                     self._gathering.take(topic, scan)
                 else:
                     self._next[topic] = [scan]
-        ready = self._gathering.ready()
-        if ready:
+        if ready := self._gathering.ready():
             self._next[0] = ready
         while self._next and not self._searcher.busy:
             self._search(self._next.pop(next(iter(self._next))))
@@ -214,6 +213,6 @@ class Node:
             self._topics.pose.publish(stamped_pose(stamp, answer.pose, answer.covariance, frame))
         self._topics.markers.publish(answer_marker(answer, stamp, frame))
         if not self._inputs.shared:
-            agreed = self._localization.take(answer, stamp, self._inputs.latency)
+            agreed = self._localization.take(found.maps, answer, stamp, self._inputs.latency)
             self._inputs.result(usable=answer.usable, agreed=agreed)
         self._health.publish("scan", stamp, verdict_of(answer), values_of(answer, 1e3 * found.seconds))

@@ -11,9 +11,10 @@ import numpy as np
 from formats.logs.tracks import Known, Track
 from formats.logs.tuning import JITTER, STALE_NS
 from registration import IDENTITY, RigidTransform
+from registration.layout import Floats
 
 from .clock import Clock, Confirmation
-from .frames import Floats, matrix_in_space, matrix_of, planar
+from .frames import matrix_in_space, matrix_of, planar
 from .messages import NS, Odometry, nanoseconds
 from .tuning import CLOCK_BACK_NS, CLOCKS_AGREE_NS, ENDED_SECONDS, MAX_SPEED, MAX_TURN_RATE
 

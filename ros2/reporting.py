@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -65,13 +64,13 @@ def map_marker(walls: linefix.Segments, frame: str) -> ros.MarkerArray:
     """Return the walls of a map, to be shown once."""
     ends = walls.endpoints.reshape(-1, 2)
     points = [ros.Point(x, y, 0.0) for x, y in ends.tolist()]
-    return ros.MarkerArray([_marker(frame, ros.Time(), "map", LINES, GREY, points=points)])
+    return ros.MarkerArray([_marker(frame, ros.Time(), "linefix/map", LINES, GREY, points=points)])
 
 
 def answer_marker(answer: linefix.AssociationResult, stamp: ros.Time, frame: str) -> ros.MarkerArray:
     """Return the robot where it was found: green where that is usable, amber where not, gone where there is none."""
     color = GREEN if answer.usable else AMBER
-    arrow = _marker(frame, stamp, "robot", ARROW, color)
+    arrow = _marker(frame, stamp, "linefix/robot", ARROW, color)
     if answer.pose is None:
         arrow.action = DELETE
     else:
@@ -83,7 +82,6 @@ def _marker(
     frame: str, stamp: ros.Time, name: str, kind: int, color: ros.ColorRGBA, points: list[ros.Point] | None = None
 ) -> ros.Marker:
     thin, header = ros.Vector3(LINE_WIDTH, 0.0, 0.0), ros.Header(stamp, frame)
-    name = f"linefix/{name}"
     return ros.Marker(header, name, type=kind, action=ADD, scale=thin, color=color, points=points or [])
 
 
@@ -105,11 +103,3 @@ def verdict_of(answer: linefix.AssociationResult) -> tuple[int, str]:
     if answer.usable:
         return OK, "pose usable"
     return WARN, answer.reasons[0].message if answer.reasons else answer.status.value
-
-
-def status_of(
-    name: str, hardware_id: str, verdict: tuple[int, str], values: Mapping[str, str] | None = None
-) -> ros.DiagnosticStatus:
-    """Return a status; `verdict` is its level and message."""
-    pairs = [ros.KeyValue(key, value) for key, value in (values or {}).items()]
-    return ros.DiagnosticStatus(verdict[0], name, verdict[1], hardware_id, pairs)

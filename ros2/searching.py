@@ -13,7 +13,7 @@ import linefix
 from formats.logs.tracks import Known
 from registration import IDENTITY, InputError
 
-from .agreement import Observation, Place
+from .agreement import Observation
 from .frames import planar
 from .looking import Look
 from .maps import Maps
@@ -31,7 +31,7 @@ def observation_of(answer: linefix.AssociationResult, known: Known | None, stamp
     odometry = () if known is None else (planar(known.matrix), known.part, known.unknown_ns / NS)
     return replace(
         Observation(stamp, answer.pose or IDENTITY, covariance, answer.usable, *odometry),
-        others=tuple(Place(one.pose, one.map_id) for one in answer.alternatives),
+        others=answer.alternatives,
         conclusive=_conclusive(answer),
         rival=any(one.score > best - RIVAL_NATS for one in answer.alternatives),
         map_id=answer.map_id,
@@ -45,22 +45,6 @@ def _conclusive(answer: linefix.AssociationResult) -> bool:
     unlisted = (1.0 - answer.search.complete_above) * answer.diagnostics.score
     listed = len(answer.alternatives) < OPTIONS.max_alternatives
     return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
-
-
-def search_options(options: NodeOptions) -> linefix.AssociationOptions:
-    """Return how the node searches each scan."""
-    return replace(OPTIONS, on_map=options.on_map, usable_from=options.usable_from)
-
-
-def locate(
-    index: linefix.MapIndex | linefix.MapSet,
-    looks: Sequence[Look],
-    options: linefix.AssociationOptions = OPTIONS,
-    deadline: linefix.Deadline | None = None,
-) -> linefix.AssociationResult:
-    """Find where the robot is by one scan, or several together, at the time of the first beam of the first."""
-    together = linefix.assemble([look.view for look in looks])
-    return linefix.locate(index, together, options=options, deadline=deadline)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,14 +77,14 @@ class Searcher:
 
     Parameters
     ----------
-    options : AssociationOptions
-        Of each search.
+    options : NodeOptions
     found : callable
         Called in the thread of the searches when a result can be taken.
     """
 
-    def __init__(self, options: linefix.AssociationOptions, found: Callable[[], None]) -> None:
-        self._options, self._found = options, found
+    def __init__(self, options: NodeOptions, found: Callable[[], None]) -> None:
+        self._options = replace(OPTIONS, on_map=options.on_map, usable_from=options.usable_from)
+        self._found = found
         self._deadline = linefix.Deadline()
         self._pool = ThreadPoolExecutor(1, "searches")
         self._search: Future[Found] | None = None
@@ -132,7 +116,8 @@ class Searcher:
     def _searched(self, maps: Maps, looks: Sequence[Look]) -> Found:
         begun, answer, problem = time.monotonic(), None, ""
         try:
-            answer = locate(maps.index, looks, self._options, self._deadline)
+            together = linefix.assemble([look.view for look in looks])  # at the time of the first beam of the first
+            answer = linefix.locate(maps.index, together, options=self._options, deadline=self._deadline)
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan

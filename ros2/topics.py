@@ -42,14 +42,6 @@ def topic_name(name: str) -> str:
     return f"rt/{name.strip('/')}"
 
 
-def undecodable(kind: type[IdlStruct], error: Exception) -> str:
-    """Return the problem of a message whose bytes are not those of its type."""
-    return (
-        f"a message cannot be decoded and is ignored: {error}; expected a {kind.__name__}. Check the type that is "
-        "published"
-    )
-
-
 class Subscription(Generic[Message]):
     """A subscription.
 
@@ -90,6 +82,11 @@ class Subscription(Generic[Message]):
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
         return [message for reader in self.readers for message in self._taken(reader)]
 
+    def report_undecodable(self, kind: type[IdlStruct], error: Exception) -> None:
+        """Report a message whose bytes are not those of its type."""
+        expected = f"expected a {kind.__name__}. Check the type that is published"
+        self.problem(f"{self.name}: a message cannot be decoded and is ignored: {error}; {expected}")
+
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
         for _ in range(MOST):
@@ -99,7 +96,7 @@ class Subscription(Generic[Message]):
                 self.problem(f"{self.name}: reading failed: {error}")
                 break
             except Exception as error:  # whatever decoding raises for bytes that are no such message
-                self.problem(f"{self.name}: {undecodable(self._kind, error)}")
+                self.report_undecodable(self._kind, error)
                 continue
             if not samples:
                 break
@@ -192,7 +189,7 @@ class Transforms:
             try:
                 found.append(ros.TFMessage.deserialize(message.serialized))
             except Exception as error:  # whatever decoding raises for bytes that are no such message
-                self.subscription.problem(f"{self.subscription.name}: {undecodable(ros.TFMessage, error)}")
+                self.subscription.report_undecodable(ros.TFMessage, error)
         return found
 
     @property
@@ -234,7 +231,6 @@ class Topics:
         ]
         self.clock = subscribe("/clock", ros.Clock, STREAM) if options.use_sim_time else None
         self.requests = subscribe("linefix/locate", ros.Empty, RELIABLE)
-        self.named_requests = subscribe("linefix/locate_request", ros.String, RELIABLE)
         self.amcl = subscribe("amcl_pose", ros.PoseWithCovarianceStamped, LATCHED, RELIABLE)
         self.initial = publish("initialpose", ros.PoseWithCovarianceStamped, RELIABLE)
         self.pose = publish("linefix/pose", ros.PoseWithCovarianceStamped, RELIABLE)
@@ -244,7 +240,6 @@ class Topics:
         self.markers = publish("linefix/markers", ros.MarkerArray, NEWEST)
         self.map_id = publish("linefix/map_id", ros.String, NEWEST)
         self.status = publish("linefix/status", ros.DiagnosticStatus, NEWEST)
-        self.results = publish("linefix/locate_result", ros.DiagnosticStatus, LATCHED)
         self.diagnostics = publish("/diagnostics", ros.DiagnosticArray, RELIABLE)
         name = "tf" if options.namespace and not options.frame_prefix else "/tf"
         self.tf = publish(name, ros.TFMessage, RELIABLE) if options.publish_tf else None

@@ -70,5 +70,4 @@ CLOCKS_AGREE_NS = 200_000_000  # ns; times from stamp to reception may differ by
 LAG_SECONDS = 3.0  # s between two scans whose motion is compared with odometry
 LAG_DECIDES = 12.0  # by which a sum of chi-squares has to be less before the time of odometry is chosen otherwise
 SILENT_SECONDS = 10.0  # s without scans, a map or a transform, after which that is logged
-RESULT_SECONDS = 30.0  # s after which a request without an agreed pose is answered
 LOG_SECONDS = 60.0  # s within which the same line is logged once

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from registration import RigidTransform
-from ros2.agreement import Agreement, Event, Observation, Place
+from ros2.agreement import Agreement, Event, Observation
 from tests.association.scenes import known
 
 COVARIANCE = np.diag([0.005**2, 0.005**2, 0.002**2])
 SECOND = 1_000_000_000
 MAP_FROM_ODOM = RigidTransform(3.0, -2.0, 0.7)
 WRONG = RigidTransform(-4.0, 1.0, 2.6)  # moves a pose to a place that looks alike
-FAR = Place(RigidTransform(9.0, 9.0, 0.0))
+FAR = Observation(0, RigidTransform(9.0, 9.0, 0.0))
 
 
 def straight(count: int, step: float = 0.2) -> list[RigidTransform]:
@@ -144,7 +144,7 @@ def test_scans_that_are_not_usable_contradict_only_where_they_list_all_poses() -
     elsewhere = replace(wrong(scans[6]), usable=False)
     assert agreement.take(elsewhere) is Event.NOTHING
     assert agreement.take(replace(elsewhere, conclusive=True)) is Event.CONTRADICTED
-    listed = replace(elsewhere, conclusive=True, others=(Place(scans[6].pose),))
+    listed = replace(elsewhere, conclusive=True, others=(scans[6],))
     assert agreement.take(listed) is Event.NOTHING
     assert agreement.take(Observation(scans[6].stamp)) is Event.NOTHING
     assert agreement.take(scans[7]) is Event.CONFIRMED
@@ -169,7 +169,7 @@ def test_an_alternative_on_another_map_is_another_place() -> None:
         agreement.take(scan)
     elsewhere = replace(wrong(scans[6]), usable=False, conclusive=True)
     for map_id, event in (("hq-2", Event.CONTRADICTED), ("hq-1", Event.NOTHING)):
-        assert agreement.take(replace(elsewhere, others=(Place(known(scans[6].pose), map_id),))) is event
+        assert agreement.take(replace(elsewhere, others=(on_map(scans[6], map_id),))) is event
     assert agreement.take(replace(scans[6], map_id="hq-2", usable=False, conclusive=True)) is Event.CONTRADICTED
 
 

@@ -69,12 +69,12 @@ def test_an_agreed_pose_is_confirmed_over_a_jump_of_odometry() -> None:
 def test_no_transform_is_published_before_a_scan_confirms_odometry_that_jumped() -> None:
     correction, here = MapToOdom(), RigidTransform(1.0, 2.0, 0.3)
     first = confirmed(0, here)
-    correction.take(Event.AGREED, first)
+    correction.take(first, new=True)
     assert correction.advance(SECOND, here) is not None
     assert correction.advance(SECOND, IDENTITY, (1,)) is None
     assert correction.advance(SECOND, here, (), 0.4) is not None
     assert correction.advance(SECOND, IDENTITY, (), 1.0) is None  # the gap may hide a restart
-    correction.take(Event.CONFIRMED, replace(first, stamp=2 * SECOND, odometry=IDENTITY, part=(1,)))
+    correction.take(replace(first, stamp=2 * SECOND, odometry=IDENTITY, part=(1,)), new=False)
     current = known(correction.advance(2 * SECOND, IDENTITY, (1,)))
     assert (current.x, current.y) == pytest.approx(
         (known(first.pose).x, known(first.pose).y)

@@ -20,7 +20,7 @@ TRUE = RigidTransform(3.0, -2.0, 0.7)  # map_from_odom
 def decide(
     initial: InitialPose, event: Event, now: float, *, agrees: bool | None = None, lost: bool = False
 ) -> str | None:
-    reason = initial.decide(event, localizer_agrees=agrees, lost=lost, now=now)
+    reason = initial.decide(new=event is Event.AGREED, localizer_agrees=agrees, lost=lost, now=now)
     if reason is not None:
         initial.published(subscribed=True, now=now)
     return reason
@@ -28,11 +28,9 @@ def decide(
 
 def test_it_is_published_once_at_the_start_and_on_request() -> None:
     initial = InitialPose()
-    assert decide(initial, Event.NOTHING, 0.0) is None
     assert decide(initial, Event.AGREED, 1.0) == "agreed"
     assert [decide(initial, Event.CONFIRMED, 1.0 + k) for k in range(9)] == [None] * 9
     initial.want()
-    assert decide(initial, Event.CONTRADICTED, 20.0) is None
     assert decide(initial, Event.CONFIRMED, 21.0) == "agreed"
 
 
@@ -63,11 +61,9 @@ def test_the_transform_follows_in_small_steps() -> None:
     correction = MapToOdom()
     far = RigidTransform(50.0, 20.0, 1.0)  # of the origin of odometry
     assert correction.advance(0, far) is None
-    correction.take(Event.NOTHING, confirmed(0, far))
-    assert correction.current is None
-    correction.take(Event.AGREED, confirmed(0, far))
+    correction.take(confirmed(0, far), new=True)
     assert correction.advance(SECOND, far) == correction.current
-    correction.take(Event.CONFIRMED, confirmed(SECOND, far, off=0.1))
+    correction.take(confirmed(SECOND, far, off=0.1), new=False)
     before = correction.advance(SECOND, far)
     half = correction.advance(SECOND + SECOND // 4, far)
     whole = correction.advance(3 * SECOND, far)
@@ -76,14 +72,14 @@ def test_the_transform_follows_in_small_steps() -> None:
     assert whole is not None
     places = [one.compose(far).x for one in (before, half, whole)]
     assert np.subtract(places, places[0]) == pytest.approx([0.0, 0.05, 0.1], abs=1e-9)  # 0.2 m/s
-    correction.take(Event.AGREED, confirmed(3 * SECOND, far, off=5.0))
+    correction.take(confirmed(3 * SECOND, far, off=5.0), new=True)
     jumped = known(correction.advance(3 * SECOND, far))
     assert jumped.compose(far).x == pytest.approx(places[0] + 5.0)
 
 
 def test_the_transform_never_follows_without_odometry() -> None:
     correction = MapToOdom()
-    correction.take(Event.AGREED, Observation(0, TRUE, np.eye(3), True))
+    correction.take(Observation(0, TRUE, np.eye(3), True), new=True)
     assert correction.advance(0, TRUE) is None
 
 

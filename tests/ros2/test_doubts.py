@@ -12,7 +12,7 @@ import pytest
 import linefix
 from registration import IDENTITY
 from ros2 import NodeOptions, messages
-from ros2.agreement import Agreement, Observation
+from ros2.agreement import Agreement, Event, Observation
 from ros2.clock import Clock
 from ros2.deciding import MapToOdom
 from ros2.frames import matrix_in_space, planar
@@ -244,7 +244,9 @@ def test_scans_of_another_clock_do_not_turn_the_pose(late: float) -> None:
         fix = odometry.known(stamp + shift, received)
         if fix is not None:
             scan = replace(scan, odometry=planar(fix.matrix), part=fix.part)
-        correction.take(agreement.take(scan), scan)
+        event = agreement.take(scan)
+        if event in (Event.AGREED, Event.CONFIRMED):
+            correction.take(scan, new=event is Event.AGREED)
         newest = known(odometry.newest)
         transforms.append(correction.advance(newest[0], newest[1], newest[2].part))
     turned = [abs(one.theta) for one in transforms if one is not None]

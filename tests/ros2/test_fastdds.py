@@ -198,7 +198,7 @@ def test_a_request_is_received(domain: int, room: linefix.MapIndex, program: Pat
 
 
 def test_the_other_topics(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    """A mount that moves, a localizer, requests with an id, agreed poses and markers."""
+    """A mount that moves, a localizer, agreed poses and markers."""
     with running(NodeOptions(domain=domain), room), peer_without_bridge(program, domain) as robot:
         robot.until("marker linefix/map 12")
         way = Way(robot)
@@ -210,8 +210,6 @@ def test_the_other_topics(domain: int, room: linefix.MapIndex, program: Path) ->
 
         robot.until("agreed", drive)
         robot.until("marker linefix/robot", drive)
-        robot.send("request", "job-7")
-        robot.until("result job-7 0 the pose is agreed", drive)
 
         def elsewhere() -> None:
             drive()

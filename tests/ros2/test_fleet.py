@@ -318,21 +318,6 @@ def test_a_mount_that_moves_is_followed(domain: int, room: linefix.MapIndex) -> 
         robot.until(robot.poses, play, is_at_truth)
 
 
-def test_a_request_with_an_id_is_answered(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(domain=domain, agree=1), room):
-        robot = Fleet(domain)
-        requests = Publisher(robot.net, "/linefix/locate_request", messages.String, RELIABLE)
-        results = Subscription(robot.net, "/linefix/locate_result", messages.DiagnosticStatus, LATCHED)
-        robot.mounts.publish(mount())
-        robot.until(robot.poses, lambda: robot.drive(MAP_FROM_BASE, 1.0))
-        requests.publish(messages.String("job 7"))
-        found, _ = drive_until(robot, results, 2.0)
-    assert (found.name, found.level) == ("job 7", 0)
-    told = {one.key: one.value for one in found.values}
-    assert told.keys() >= {"x", "y", "qz", "qw", "stamp", "frame_id"}
-    assert told["map_id"] == "room"
-
-
 def test_scans_without_a_time_are_taken(domain: int, room: linefix.MapIndex) -> None:
     with fleet(domain, room, agree=1) as robot:
         unstamped = replace(scan_from(MAP_FROM_BASE, 1.0), header=messages.Header(frame_id="laser"))

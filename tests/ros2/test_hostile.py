@@ -207,7 +207,7 @@ UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, 
         "Check for degrees in the driver",
     ),
     "nothing but unknown ranges": (mount, replace(scan(1), ranges=[math.nan] * 720), "none of 720 ranges is a number"),
-    "no range": (mount, replace(scan(1), ranges=[]), "no valid range in the scan"),
+    "no range": (mount, replace(scan(1), ranges=[]), "expected at least one range, found none"),
     "steep": (
         lambda: transform("base_link", "laser", rotation=tilted(23.0)),
         scan(1),

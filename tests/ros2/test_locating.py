@@ -13,10 +13,9 @@ from ros2.frames import Frames, Mount
 from ros2.looking import look_of
 from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
-from ros2.searching import locate
 from tests.association.scenes import known
 
-from .robot import SCANNER, WALLS, laser_scan
+from .robot import SCANNER, WALLS, laser_scan, located
 
 TRUTH = linefix.RigidTransform(1.0, 1.5, 0.4)  # of the laser
 MOUNT = linefix.RigidTransform(0.3, -0.1, 2.0)
@@ -28,7 +27,7 @@ def seen() -> messages.LaserScan:
 
 
 def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> linefix.AssociationResult:
-    return locate(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)])
+    return located(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)])
 
 
 def test_its_covariance_is_that_of_the_client() -> None:

@@ -13,11 +13,11 @@ from rosbags.typesys import Stores, get_typestore
 from ros2 import messages
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
-ALL = [
-    f"{kind.__idl_typename__.partition('::')[0]}/msg/{name}"
-    for name, kind in vars(messages).items()
-    if hasattr(kind, "__idl_typename__") and not name.startswith("Serialized")
-]
+USED = (
+    "Clock ColorRGBA DiagnosticArray DiagnosticStatus Empty Header KeyValue LaserScan MapMetaData Marker MarkerArray "
+    "OccupancyGrid Odometry Point Pose PoseWithCovariance PoseWithCovarianceStamped Quaternion String TFMessage Time "
+    "Transform TransformStamped Twist TwistWithCovariance Vector3"
+)
 
 
 def filled(name: str, numbers: Any) -> tuple[Any, Any]:
@@ -47,8 +47,9 @@ def value(described: Any, numbers: Any) -> tuple[Any, Any]:
     return [one for one, _ in made], [other for _, other in made]
 
 
-@pytest.mark.parametrize("name", sorted(ALL))
-def test_its_bytes_are_those_of_rosbags(name: str) -> None:
+@pytest.mark.parametrize("short", USED.split())
+def test_its_bytes_are_those_of_rosbags(short: str) -> None:
+    name = messages.NAMES[short]
     ours, theirs = filled(name, count(1))
     assert ours.serialize() == bytes(TYPES.serialize_cdr(theirs, name))
     assert type(ours).deserialize(ours.serialize()) == ours

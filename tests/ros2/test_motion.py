@@ -15,12 +15,23 @@ from ros2.frames import Frames, Mount
 from ros2.looking import Look, look_of, looks_of, motion_of
 from ros2.odometry import OdometryHistory, Speed
 from ros2.options import NodeOptions
-from ros2.searching import locate
 from ros2.topics import SENSOR, Publisher
 from tests.association.scenes import known
 from tests.linefix.moving import moving_ranges
 
-from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, WALLS, Robot, bridge, is_at_truth, laser_scan, mount, running
+from .robot import (
+    BASE_FROM_LASER,
+    MAP_FROM_BASE,
+    ROOM,
+    WALLS,
+    Robot,
+    bridge,
+    is_at_truth,
+    laser_scan,
+    located,
+    mount,
+    running,
+)
 
 SCANNER = linefix.simulation.Scanner.over(1.5 * math.pi, 720, sigma=0.01)
 SPEED = Speed(0.8, -0.1, 2.0)
@@ -157,9 +168,9 @@ def test_a_scanner_upside_down_moves_the_right_way_round() -> None:
     driven = OdometryHistory()
     driven.take(odometry(10))
     look = look_of(moving_scan(10, flipped=True), Mount(BASE_FROM_LASER, flipped=True), driven, IDENTITY, motion=True)
-    located = locate(linefix.index_map(ROOM), [look])
-    assert located.usable
-    pose = known(located.pose)
+    found = located(linefix.index_map(ROOM), [look])
+    assert found.usable
+    pose = known(found.pose)
     assert math.hypot(pose.x - MAP_FROM_BASE.x, pose.y - MAP_FROM_BASE.y) < 0.03
     assert abs(pose.theta - MAP_FROM_BASE.theta) < 0.02
 

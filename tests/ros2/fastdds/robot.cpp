@@ -119,7 +119,7 @@ using Posed = g::PoseWithCovarianceStamped_;
 
 // What this robot and an AMCL would publish besides its own topics.
 struct Others {
-    DataWriter *global_mounts, *moving, *amcl, *requests;
+    DataWriter *global_mounts, *moving, *amcl;
 };
 
 static g::TransformStamped_ transform(const std::string& parent, const std::string& child, std::istream& words) {
@@ -158,12 +158,6 @@ static void publish_other(const Others& others, const std::string& command, std:
         message.pose().pose().orientation().w(std::cos(0.5 * theta));
         for (int k : {0, 7, 35}) message.pose().covariance()[k] = 0.01;
         others.amcl->write(&message);
-    } else if (command == "request") {
-        std_msgs::msg::dds_::String_ message;
-        std::string id;
-        words >> id;
-        message.data(id);
-        others.requests->write(&message);
     }
 }
 
@@ -193,11 +187,6 @@ static void subscribe_others(Robot& robot) {
     using Text = std_msgs::msg::dds_::String_;
     robot.reader<std_msgs::msg::dds_::String_PubSubType, Text>(
         "linefix/map_id", LATCHED, [](const Text& message) { print("map_id " + message.data()); });
-    using Status = diagnostic_msgs::msg::dds_::DiagnosticStatus_;
-    robot.reader<diagnostic_msgs::msg::dds_::DiagnosticStatus_PubSubType, Status>(
-        "linefix/locate_result", LATCHED, [](const Status& message) {
-            print("result " + message.name() + ' ' + std::to_string(message.level()) + ' ' + message.message());
-        });
 }
 
 int main(int argc, char** argv) {
@@ -212,7 +201,6 @@ int main(int argc, char** argv) {
         robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf_static", LATCHED),
         robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>(space.empty() ? "/tf" : "tf", RELIABLE),
         robot.writer<g::PoseWithCovarianceStamped_PubSubType>("amcl_pose", LATCHED),
-        robot.writer<std_msgs::msg::dds_::String_PubSubType>("linefix/locate_request", RELIABLE),
     };
     print("ready");  // before any reader: what is latched comes at once, and counts
     subscribe_others(robot);
