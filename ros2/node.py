@@ -7,6 +7,8 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
+from cyclonedds.topic import Topic
+
 from .connecting import connect
 from .inputs import Inputs
 from .localization import Localization
@@ -63,6 +65,7 @@ class Node:
         self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
         self._beat = TRANSFORM_PERIOD_NS / NS if options.publish_tf else BEAT
+        self._types = [one for one in participant.children if isinstance(one, Topic)]
         self._waiting = Waiting(participant, self._topics.subscriptions)
         self._searcher = Searcher(options, self._waiting.wake)
         self._converter = MapConverter(self._waiting.wake, options.surface) if options.map_topic else None
@@ -97,11 +100,13 @@ class Node:
         return self._searcher.end(max(0.0, until - time.monotonic())) and converted
 
     def leave(self) -> None:
-        """Delete the topics of the node, after `close`; other participants then know that it is gone.
+        """Delete readers and writers of the node, after `close`, so that other participants discover that it is gone.
 
-        DDS waits here for subscribers that have not received everything, and without limit for one that is gone.
+        DDS waits here for subscribers that have not received everything, and without limit for one that is gone. Topics
+        stay: Cyclone DDS reads the type of the first sample that it stored when it deletes samples of other types.
         """
-        self.__dict__.clear()
+        for name in vars(self).keys() - {"_types"}:
+            delattr(self, name)
         gc.collect()
 
     def turn(self) -> None:
