@@ -228,12 +228,20 @@ for (const [id, action] of Object.entries({
     looked();
   });
 
-for (const button of document.querySelectorAll<HTMLButtonElement>("#tools [aria-controls]"))
-  button.addEventListener("click", () => {
-    const panel = document.getElementById(button.getAttribute("aria-controls")!)!;
-    panel.hidden = !panel.hidden;
-    button.setAttribute("aria-expanded", String(!panel.hidden));
-  });
+const openers = [...document.querySelectorAll<HTMLButtonElement>("#tools [aria-controls]")];
+
+/** Show the panel of a button, or hide it. */
+function expand(button: HTMLButtonElement, is_open: boolean): void {
+  document.getElementById(button.getAttribute("aria-controls")!)!.hidden = !is_open;
+  button.setAttribute("aria-expanded", String(is_open));
+}
+
+for (const button of openers) button.addEventListener("click", () => expand(button, button.getAttribute("aria-expanded") !== "true"));
+document.addEventListener("keydown", ({ key }) => {
+  if (key !== "Escape") return;
+  for (const button of openers) expand(button, false);
+  document.querySelector<HTMLElement>("#hover")!.hidden = true; // what a pointer that stays would leave in the way
+});
 for (const tick of document.querySelectorAll<HTMLInputElement>("#layers input"))
   tick.addEventListener("change", () => {
     state.layers[tick.value as Layer] = tick.checked;

@@ -90,6 +90,9 @@ def test_layers_are_switched(page: Page) -> None:
     for layer in ("scan", "correspondences"):
         page.locator("#layers").get_by_label(layer).click()
     assert legend(page)[:2] == ["true pose", "beam"]
+    page.keyboard.press("Escape")
+    expect(page.locator("#layers")).to_be_hidden()
+    expect(page.get_by_role("button", name="Layers")).to_have_attribute("aria-expanded", "false")
 
 
 def test_an_imported_grid_lies_under_its_walls(page: Page, tmp_path: Path) -> None:
