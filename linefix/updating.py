@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from association import Deadline, MapIndex, Scan
-from map_quality import MapUpdate, VisitScan, update
+from map_quality import MapUpdate, VisitScan, finished, updating
 from registration import InvalidArgumentError, Segments
 from vectorization import LaserScan
 
@@ -48,7 +48,7 @@ def update_map(
     Returns
     -------
     MapUpdate
-        Its `segments` are the new map, its `changes` have their evidence. See `map_quality.update` for the steps.
+        Its `segments` are the new map, its `changes` have their evidence. See `map_quality.updating` for the steps.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def update_map(
     """
     index = index_map(map)
     scans = [_visit_scan(one, name, number) for name, some in visits.items() for number, one in enumerate(some)]
-    return update(index, scans, deadline, accept=accept, refuse=refuse)
+    return finished(updating(index, scans, deadline, accept=accept, refuse=refuse))
 
 
 def _visit_scan(one: Any, visit: str, number: int) -> VisitScan:

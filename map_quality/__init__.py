@@ -6,7 +6,6 @@ as a program would; a finding never changes an answer.
 """
 
 from .analyze.analyze import Analysis, PlaceVerdict
-from .analyze.standing import Standing, standing_places
 from .check.check import check_map
 from .check.judging import conclude
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
@@ -17,16 +16,14 @@ from .update.result import (
     ChangeCode,
     Evidence,
     KeptCode,
-    KeptWalls,
     MapUpdate,
-    RefusedVisit,
     Replacement,
     Sharpened,
     Usable,
     apply_changes,
 )
 from .update.scans import UpdateError, VisitScan
-from .update.update import update, updating
+from .update.update import updating
 from .views import AnalysisError, Robot, finished
 
 __all__ = [
@@ -40,19 +37,16 @@ __all__ = [
     "Finding",
     "FindingCode",
     "KeptCode",
-    "KeptWalls",
     "MapCheck",
     "MapUpdate",
     "Place",
     "PlaceVerdict",
-    "RefusedVisit",
     "Replacement",
     "Robot",
     "Sample",
     "SampleReport",
     "Sharpened",
     "Size",
-    "Standing",
     "UpdateError",
     "Usable",
     "VisitScan",
@@ -60,8 +54,6 @@ __all__ = [
     "check_map",
     "conclude",
     "finished",
-    "standing_places",
     "try_sample",
-    "update",
     "updating",
 ]

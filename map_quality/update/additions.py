@@ -11,10 +11,10 @@ from association import Deadline
 from registration import Segments
 
 from . import tuning
-from .beams import within
+from .beams import lie_on, within
 from .evidence import are_enough
 from .result import Bools, Floats, Indices
-from .scans import Localized, blocks, go_on
+from .scans import Localized, go_on
 from .walls import runs
 
 
@@ -37,10 +37,14 @@ class SeenLines:
     places: Indices
     weights: Floats
 
-    def take(self, rows: Indices | Bools) -> SeenLines:
+    @property
+    def place_count(self) -> int:
+        """Number of different squares."""
+        return len(np.unique(self.places, axis=0))
+
+    def take(self, rows: Indices) -> SeenLines:
         """Return some of the lines."""
-        kept = np.flatnonzero(rows) if rows.dtype == bool else rows
-        return SeenLines(self.lines.take(kept), self.visits[kept], self.places[kept], self.weights[kept])
+        return SeenLines(self.lines.take(rows), self.visits[rows], self.places[rows], self.weights[rows])
 
 
 def unexplained(found: Sequence[Localized], known: Segments, deadline: Deadline) -> SeenLines:
@@ -48,15 +52,13 @@ def unexplained(found: Sequence[Localized], known: Segments, deadline: Deadline)
     none = np.zeros(0, dtype=np.intp)
     ends, visits, places, weights = [np.zeros((0, 4))], [none], [none.reshape(0, 2)], [np.zeros(0)]
     for one in found:
-        seen = one.scan.measured
-        long = np.flatnonzero(seen.segments.lengths >= tuning.LEAST_SEEN)
-        lines = Segments.derived(one.pose.apply(seen.segments.endpoints[long].reshape(-1, 2)).reshape(-1, 4))
-        place = np.array([one.pose.x, one.pose.y])
+        seen, place = one.scan.measured, np.array([one.pose.x, one.pose.y])
+        lines = Segments.derived(one.pose.apply(seen.segments.endpoints.reshape(-1, 2)).reshape(-1, 4))
         reach = np.abs(lines.endpoints.reshape(-1, 2) - place).max(initial=0.0)
         near = known.take(within(known, place, 1.5 * float(reach)))
-        new = _fraction_on_map(lines, near, deadline) < tuning.FULLY_ON_MAP
-        rows = long[new]
-        ends.append(lines.endpoints[new])
+        long = np.flatnonzero(lines.lengths >= tuning.LEAST_SEEN)
+        rows = np.array([k for k in long if not _is_on_map(lines.take(np.array([k])), near, deadline)], dtype=np.intp)
+        ends.append(lines.endpoints[rows])
         visits.append(np.full(len(rows), one.visit))
         places.append(np.tile(one.place, (len(rows), 1)))
         weights.append(np.maximum(seen.point_counts[rows], 1.0) / np.maximum(seen.sigma[rows], 1e-3) ** 2)
@@ -65,20 +67,9 @@ def unexplained(found: Sequence[Localized], known: Segments, deadline: Deadline)
     )
 
 
-def _fraction_on_map(lines: Segments, known: Segments, deadline: Deadline) -> Floats:
-    """Return which fraction of each line lies along walls of the map that face the same way, at most 1, (n,)."""
-    covered = np.zeros(len(lines))
-    for part in blocks(len(lines), len(known), deadline):
-        parallel = lines.directions[part] @ known.directions.T >= np.cos(2.0 * tuning.SAME_ANGLE)
-        beside = np.abs(lines.midpoints[part] @ known.normals.T - known.offsets) <= tuning.ON_MAP
-        rows, walls = np.nonzero(parallel & beside)
-        rows += part.start
-        direction = lines.directions[rows]
-        ends = [np.einsum("ij,ij->i", known.endpoints[walls, k : k + 2] - lines.endpoints[rows, :2], direction)
-                for k in (0, 2)]  # fmt: skip
-        low, high = np.maximum(np.minimum(*ends), 0.0), np.minimum(np.maximum(*ends), lines.lengths[rows])
-        covered += np.bincount(rows, np.maximum(0.0, high - low), len(lines))
-    return np.asarray(np.minimum(1.0, covered / lines.lengths))
+def _is_on_map(line: Segments, known: Segments, deadline: Deadline) -> bool:
+    on_it = lie_on(line.points(tuning.BIN), line.directions[0], known, deadline, near=tuning.ON_MAP)
+    return float(on_it.mean()) >= tuning.FULLY_ON_MAP
 
 
 def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Floats, Floats]:
@@ -107,21 +98,15 @@ def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Fl
         mine = _along(endpoints, directions)
         rows = left[mine]
         left, endpoints, directions = left[~mine], endpoints[~mine], directions[~mine]
-        if not _is_seen_often(seen.visits[rows], seen.places[rows]):
-            continue
         group = seen.take(rows)
+        if len(rows) < tuning.LEAST_VISITS or not are_enough(len(np.unique(group.visits)), group.place_count):
+            continue
         found = _pieces(group, known, deadline)
         walls += [piece for piece, _ in found]
         sigmas += [sigma for _, sigma in found]
         if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
             known = Segments.derived(np.concatenate([known.endpoints, [piece for piece, _ in found]]))
     return np.array(walls).reshape(-1, 4), np.array(sigmas)
-
-
-def _is_seen_often(visits: Indices, places: Indices) -> bool:
-    if len(visits) < tuning.LEAST_VISITS:
-        return False
-    return bool(are_enough(len(np.unique(visits)), len(np.unique(places, axis=0))))
 
 
 def _along(endpoints: Floats, directions: Floats) -> Bools:
@@ -156,7 +141,8 @@ def _pieces(group: SeenLines, known: Segments, deadline: Deadline) -> list[tuple
         steps = np.bincount(first, minlength=count + 1) - np.bincount(past, minlength=count + 1)
         covered += np.cumsum(steps[:count]) > 0
     seen = covered >= tuning.LEAST_VISITS
-    seen[seen] = ~_on_map(known, place + middles[seen, None] * direction, direction, deadline)
+    on_map = {"near": tuning.ON_MAP, "past": tuning.ON_MAP, "cosine": tuning.SAME_SIDE}  # also across a round column
+    seen[seen] = ~lie_on(place + middles[seen, None] * direction, direction, known, deadline, **on_map)
     long = np.array([run for run in runs(seen) if (run[1] - run[0]) * tuning.BIN >= tuning.LEAST_PIECE]).reshape(-1, 2)
     ends = place + (low + tuning.BIN * long)[..., None] * direction
     return [(piece, sigma) for piece in ends.reshape(-1, 4)]
@@ -175,25 +161,4 @@ def _fit(group: SeenLines) -> tuple[Floats, Floats, float]:
     residuals = off @ normal
     scatter = float(weight @ residuals**2 / weight.sum())
     # Lines of one place share the error of its pose.
-    places = len(np.unique(group.places, axis=0))
-    return place, direction, float(np.sqrt(scatter / places + 1.0 / weight.sum()) + 0.002)
-
-
-def _on_map(known: Segments, points: Floats, direction: Floats, deadline: Deadline) -> Bools:
-    """Return which points of a line lie on a wall of the map that faces about the same way, (k,).
-
-    A line across the sides of a round column is off their directions, too.
-    """
-    facing = np.flatnonzero(known.directions @ direction >= tuning.SAME_SIDE)
-    low = points.min(axis=0, initial=np.inf) - tuning.ON_MAP
-    high = points.max(axis=0, initial=-np.inf) + tuning.ON_MAP
-    begins, ends = known.endpoints[facing, :2], known.endpoints[facing, 2:]
-    met = (np.maximum(begins, ends) >= low).all(axis=1) & (np.minimum(begins, ends) <= high).all(axis=1)
-    walls = known.take(facing[met])
-    out = np.zeros(len(points), dtype=bool)
-    for rows in blocks(len(points), len(walls), deadline):
-        off = points[rows, None, :] - walls.endpoints[None, :, :2]
-        along = np.clip(np.einsum("kij,ij->ki", off, walls.directions), 0.0, walls.lengths)
-        gaps = np.linalg.norm(off - along[..., None] * walls.directions, axis=2)
-        out[rows] = (gaps <= tuning.ON_MAP).any(axis=1)
-    return out
+    return place, direction, float(np.sqrt(scatter / group.place_count + 1.0 / weight.sum()) + 0.002)

@@ -1,7 +1,4 @@
-"""Beams of a scan that end on walls, or pass through them, in chunks along each wall.
-
-A scan is no evidence for the walls that its pose depends on alone.
-"""
+"""Beams of a scan that end on walls, or pass through them, in chunks along each wall."""
 
 from __future__ import annotations
 
@@ -59,6 +56,12 @@ class Chunks:
         place, along = walls.endpoints[wall, :2], walls.directions[wall]
         return np.concatenate([place + begin * step * along, place + end * step * along])
 
+    def middles(self, wall: int) -> Floats:
+        """Return the middles of the chunks of a wall, (k, 2)."""
+        count, walls = int(self.counts[wall]), self.walls
+        along = (np.arange(count)[:, None] + 0.5) / count * walls.lengths[wall]
+        return np.asarray(walls.endpoints[wall, :2] + along * walls.directions[wall])
+
     def walls_of(self, chunks: Indices) -> Indices:
         """Return the wall of each of some chunks."""
         return np.searchsorted(self.first, chunks, side="right") - 1
@@ -80,17 +83,13 @@ class Followed:
     counts: Indices
 
 
-def follow(
-    chunks: Chunks, one: Localized, lines: Floats, sigma: float, deadline: Deadline, *, oriented: bool
-) -> Followed:
+def follow(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline, *, oriented: bool) -> Followed:
     """Follow the beams of a scan through walls.
 
     Parameters
     ----------
     chunks : Chunks
     one : Localized
-    lines : (k, 3)
-        Lines of walls that the scan is no evidence for, as of `critical_lines`.
     sigma : float
         Standard deviation of the walls, metres.
     deadline : Deadline
@@ -100,13 +99,12 @@ def follow(
     origins, rays, ranges = beams_in_map(one)
     near = within(chunks.walls, origins.mean(axis=0), float(ranges.max(initial=0.0))) if len(ranges) else NOTHING
     walls, first, counts = chunks.walls.take(near), chunks.first[near], chunks.counts[near]
-    is_evidence = ~on_lines(walls, lines)
     met, flags = [NOTHING], [np.zeros((0, 3), dtype=bool)]
     for rows in blocks(len(ranges), len(near), deadline):
         column, along, kinds = _met(walls, one, (origins[rows], rays[rows], ranges[rows]), sigma, oriented=oriented)
         part = (along / walls.lengths[column] * counts[column]).astype(np.intp)
         met.append(first[column] + np.minimum(part, counts[column] - 1))
-        flags.append(kinds & is_evidence[column, None])
+        flags.append(kinds)
     seen, where = np.unique(np.concatenate(met), return_inverse=True)
     kinds = np.concatenate(flags)
     total = np.stack([np.bincount(where[kinds[:, k]], minlength=len(seen)) for k in range(3)], axis=1)
@@ -169,17 +167,6 @@ def _nearest(beams: Indices, distance: Floats) -> Indices:
     return np.sort(order[rank < tuning.MOST_PASSED])
 
 
-def seen_walls(chunks: Chunks, one: Localized, sigma: float, deadline: Deadline) -> Indices:
-    """Return the walls that beams of a scan end on or near, or pass through.
-
-    All where the pose of the scan is not known: it may be anywhere.
-    """
-    if one.result.pose is None or one.result.covariance is None:
-        return np.arange(len(chunks.walls))
-    seen = follow(chunks, one, np.zeros((0, 3)), sigma, deadline, oriented=False)
-    return np.unique(chunks.walls_of(seen.chunks))
-
-
 def beams_in_map(one: Localized) -> tuple[Floats, Floats, Floats]:
     """Return the beams that came back: their origins (m, 2), unit directions (m, 2), and ranges (m,); map frame.
 
@@ -203,6 +190,43 @@ def within(walls: Segments, place: Floats, reach: float) -> Indices:
     return np.flatnonzero(np.einsum("ij,ij->i", gaps, gaps) <= (reach + 1.0) ** 2)
 
 
+def lie_on(
+    points: Floats,
+    direction: Floats,
+    walls: Segments,
+    deadline: Deadline,
+    *,
+    near: float,
+    past: float = 0.0,
+    cosine: float = math.cos(2.0 * tuning.SAME_ANGLE),
+) -> Bools:
+    """Return which points of a line lie on walls that face about the same way, (k,).
+
+    Parameters
+    ----------
+    points : (k, 2)
+    direction : (2,)
+        Of the line, a unit vector.
+    walls : Segments
+    deadline : Deadline
+    near, past : float
+        Largest distance from a wall across it, and beyond its ends; metres.
+    cosine : float
+        Least cosine of the angle between the line and a wall.
+    """
+    low, high = points.min(axis=0, initial=np.inf) - near, points.max(axis=0, initial=-np.inf) + near
+    begins, ends = walls.endpoints[:, :2], walls.endpoints[:, 2:]
+    met = ((np.maximum(begins, ends) >= low) & (np.minimum(begins, ends) <= high)).all(axis=1)
+    walls = walls.take(np.flatnonzero(met & (walls.directions @ direction >= cosine)))
+    out = np.zeros(len(points), dtype=bool)
+    for rows in blocks(len(points), len(walls), deadline):
+        off = points[rows, None, :] - walls.endpoints[None, :, :2]
+        along = np.einsum("kij,ij->ki", off, walls.directions)
+        across = np.abs(np.einsum("kij,ij->ki", off, walls.normals))
+        out[rows] = ((along >= -past) & (along <= walls.lengths + past) & (across <= near)).any(axis=1)
+    return out
+
+
 def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
     """Return how far a beam may end from a wall and still read it, metres."""
     assert one.result.covariance is not None
@@ -213,21 +237,15 @@ def _tolerance(one: Localized, sigma: float, distance: Floats) -> Floats:
     return np.maximum(tuning.LEAST_TOLERANCE, tuning.DEVIATIONS * deviation)
 
 
-def critical_lines(one: Localized, known: Segments) -> Floats:
-    """Return the lines of the wall without which the pose of a scan would move or be free: normal and offset, (k, 3).
+def on_critical_wall(one: Localized, walls: Segments) -> Bools:
+    """Return which walls, the first of them those of the map, are pieces of the wall that the pose depends on, (n,).
 
-    They are of the segments of the map, `known`, that are pieces of this wall; none where the pose depends on no wall.
+    Without it the pose would move or be free. All walls on its line are pieces of it.
     """
-    diagnostics = one.result.diagnostics
+    out, diagnostics = np.zeros(len(walls), dtype=bool), one.result.diagnostics
     wall = None if diagnostics is None else diagnostics.critical_wall
-    on = known.take(np.array(() if wall is None else wall.map, dtype=np.intp))
-    return np.column_stack([on.normals, on.offsets])
-
-
-def on_lines(walls: Segments, lines: Floats) -> Bools:
-    """Return which walls lie on any of some lines, as pieces of one wall do, (n,)."""
-    out = np.zeros(len(walls), dtype=bool)
-    for line in lines:
-        along, off = np.abs(walls.directions @ line[:2]), np.abs(walls.midpoints @ line[:2] - line[2])
+    for piece in () if wall is None else wall.map:
+        normal, offset = walls.normals[piece], walls.offsets[piece]
+        along, off = np.abs(walls.directions @ normal), np.abs(walls.midpoints @ normal - offset)
         out |= (along < 0.05) & (off < tuning.LEAST_TOLERANCE)
     return out

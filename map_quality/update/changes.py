@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,17 +11,25 @@ from association import Deadline
 from registration import Segments
 
 from . import tuning
-from .beams import Chunks
+from .beams import lie_on
 from .evidence import Judged, WallEvidence, are_enough
 from .result import Bools, Change, Evidence, Floats
-from .scans import blocks, go_on
-from .walls import NO_SIGMA, NO_WALLS, Draft, find_cuts, runs
+from .scans import go_on
+from .walls import NO_SIGMA, NO_WALLS, Draft, corner_error, find_cuts, runs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """A change that evidence shows, and which scans saw the walls that it takes away or brings, (n,)."""
+
+    change: Change
+    seen_by: Bools
 
 
 def draft_changes(
     evidence: WallEvidence, known: Segments, sigmas: Floats, sigma: float, names: Sequence[str], deadline: Deadline
-) -> list[Change]:
-    """Return the changes that the evidence shows.
+) -> list[Shown]:
+    """Return the changes that the evidence shows, with the scans that saw their walls.
 
     Parameters
     ----------
@@ -45,19 +53,21 @@ def draft_changes(
     judged = evidence.judge()
     cuts, passed = find_cuts(evidence, judged, known, sigma, deadline)
     extended, added = _new_walls(judged, known, {cut.segments[0] for cut in cuts}, sigmas, sigma, deadline)
-    added = shown(_joined(added, known, deadline))
+    near = tuning.JOINED + corner_error(sigma)
+    added = shown(_joined(added, known, tuning.JOINED, deadline))
     # Nothing of a wall that moved is seen again; its faces may have no end in common.
     unread = [replace(cut, code="removed", new=NO_WALLS, sigma=NO_SIGMA) for cut in cuts if not cut.rest_read]
     whole = {cut.segments[0]: cut for cut in (*unread, *passed)}
-    gone = shown(_joined([whole[wall] for wall in sorted(whole)], known, deadline))
+    gone = shown(_joined([whole[wall] for wall in sorted(whole)], known, near, deadline))
     moved, added = _moves(gone, added, known, deadline)
     taken = {segment for one in moved for segment in one.segments}
 
     left = [cut for cut in cuts if cut.segments[0] not in taken]
-    removed = _joined([cut for cut in left if cut.code == "removed"], known, deadline)
+    removed = _joined([cut for cut in left if cut.code == "removed"], known, near, deadline)
     shortened = [cut for cut in left if cut.code == "shortened"]
-    told = (change_of(one, evidence, names) for one in (*moved, *removed, *added, *extended, *shortened))
-    return [one for one in told if one is not None]
+    drafts = (*moved, *removed, *added, *extended, *shortened)
+    told = ((change_of(one, evidence, names), one.seen_by(evidence)) for one in drafts)
+    return [Shown(change, seen_by) for change, seen_by in told if change is not None]
 
 
 def _new_walls(
@@ -68,11 +78,13 @@ def _new_walls(
     added, chunks = [], judged.chunks
     pieces: list[Floats] = []
     for wall, sigma in enumerate(sigmas, len(known)):
+        # Of two walls that face the same way the one in front hides the other, so that both are never seen. Flat beams
+        # show a wall too near, for example.
+        direction, new = chunks.walls.directions[wall], Segments.derived(np.array(pieces).reshape(-1, 4))
+        is_double = lie_on(chunks.middles(wall), direction, new, deadline, near=tuning.DOUBLED)
         own = chunks.of_wall(wall)
-        gone, there = judged.gone[own], judged.there[own]
-        single = ~_doubled(Segments.derived(np.array(pieces).reshape(-1, 4)), chunks, wall, deadline)
-        for begin, end in runs(_filled(there, gone) & single):
-            piece, read = chunks.part(wall, begin, end), own.start + begin + np.flatnonzero(there[begin:end])
+        for begin, end in runs(judged.there[own] & ~is_double):
+            piece, read = chunks.part(wall, begin, end), own.start + np.arange(begin, end)
             if np.hypot(*(piece[2:] - piece[:2])) < tuning.LEAST_PIECE:
                 continue
             pieces.append(piece)
@@ -88,32 +100,6 @@ def _new_walls(
                 sigma=np.array([sigma]),
             )
     return list(extended.values()), added
-
-
-def _filled(there: Bools, gone: Bools) -> Bools:
-    """Return the chunks that are there, with single ones between them of which nothing is known."""
-    out = there.copy()
-    out[1:-1] |= there[:-2] & there[2:] & ~gone[1:-1]
-    return out
-
-
-def _doubled(new: Segments, chunks: Chunks, wall: int, deadline: Deadline) -> Bools:
-    """Return which chunks of a wall lie close before or behind a new wall that faces the same way, (k,).
-
-    The one in front hides the other, so that both are never seen. Flat beams show a wall too near, for example.
-    """
-    walls, count = chunks.walls, int(chunks.counts[wall])
-    direction = walls.directions[wall]
-    places = (np.arange(count) + 0.5) / count * walls.lengths[wall]
-    points = walls.endpoints[wall, :2] + places[:, None] * direction
-    near = new.take(np.flatnonzero(new.directions @ direction >= np.cos(2.0 * tuning.SAME_ANGLE)))
-    out = np.zeros(count, dtype=bool)
-    for rows in blocks(count, len(near), deadline):
-        off = points[rows, None, :] - near.endpoints[None, :, :2]
-        along = np.einsum("kij,ij->ki", off, near.directions)
-        across = np.abs(np.einsum("kij,ij->ki", off, near.normals))
-        out[rows] = ((along >= 0.0) & (along <= near.lengths) & (across <= tuning.DOUBLED)).any(axis=1)
-    return out
 
 
 def _continued(known: Segments, piece: Floats, step: float) -> int | None:
@@ -154,16 +140,16 @@ def _prolonged(known: Segments, wall: int, line: Floats, piece: Floats) -> Float
     return np.concatenate([place + min(reach) * along, place + max(reach) * along])
 
 
-def _joined(drafts: Sequence[Draft], known: Segments, deadline: Deadline) -> list[Draft]:
-    """Join changes of walls, old or new, whose ends are near one another: they are one thing."""
+def _joined(drafts: Sequence[Draft], known: Segments, near: float, deadline: Deadline) -> list[Draft]:
+    """Join changes of walls, old or new, whose ends are within `near` metres of one another: they are one thing."""
     ends = [np.concatenate([known.endpoints[list(one.segments)], one.new]) for one in drafts]
     label = np.arange(len(drafts))
     corners = np.concatenate([NO_WALLS, *ends]).reshape(-1, 2)
     owner = np.repeat(label, [2 * len(one) for one in ends])
     for corner, own in zip(corners, owner, strict=True):
         go_on(deadline)
-        near = label[owner[np.hypot(*(corners - corner).T) <= tuning.JOINED]]
-        label[np.isin(label, near)] = label[own]
+        met = label[owner[np.hypot(*(corners - corner).T) <= near]]
+        label[np.isin(label, met)] = label[own]
     joined: dict[int, Draft] = {}
     for one, of in zip(drafts, label.tolist(), strict=True):
         joined[of] = joined[of].with_also(one) if of in joined else one

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from registration import Segments
 
 from ..views import Steps
 from . import tuning
-from .beams import NOTHING, Chunks, critical_lines, follow
+from .beams import NOTHING, Chunks, follow, on_critical_wall
 from .result import Bools, Indices
 from .scans import Localized
 
@@ -43,11 +43,13 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallEvidence:
-    """Evidence of scans about chunks of walls: a row for each chunk that a scan saw something of.
+    """Evidence of scans about chunks of walls: a row for each chunk that a scan is evidence for.
 
     Attributes
     ----------
     chunks : Chunks
+    sights : tuple of (c,) or None
+        Chunks that each scan saw something of, those without evidence, too; None where its pose is not known.
     chunk : (r,)
         Ascending.
     visit, place : (r,)
@@ -57,6 +59,7 @@ class WallEvidence:
     """
 
     chunks: Chunks
+    sights: tuple[Indices | None, ...]
     chunk: Indices
     visit: Indices
     place: Indices
@@ -102,6 +105,10 @@ class WallEvidence:
         """Return which rows read their chunk, or pass through it."""
         through, ended, _ = self.counts[rows].T
         return np.asarray((through + ended > 0) & ((ended > through) == on))
+
+    def seen_by(self, chunks: Indices) -> Bools:
+        """Return which scans saw something of some chunks; one whose pose is not known may have."""
+        return np.array([seen is None or np.isin(seen, chunks).any() for seen in self.sights], dtype=bool)
 
     def passed_walls(self) -> Indices:
         """Return the walls with a chunk that most beams of several visits pass through."""
@@ -156,16 +163,26 @@ def shows(agree: Indices, against: Indices) -> Bools:
 
 
 def gather(
-    walls: Segments, found: Sequence[Localized], sigma: float, deadline: Deadline, *, oriented: bool
+    walls: Segments,
+    found: Sequence[Localized],
+    chosen: Collection[Localized],
+    sigma: float,
+    deadline: Deadline,
+    *,
+    oriented: bool,
 ) -> Steps[WallEvidence]:
     """Follow the beams of localized scans through walls, one scan at a step, and return the evidence.
+
+    A scan is no evidence for the wall that its pose depends on.
 
     Parameters
     ----------
     walls : Segments
         Of the map, and those that may be there; metres in the map frame.
     found : sequence of Localized
-        Scans that give evidence.
+        All scans.
+    chosen : collection of Localized
+        Those of them that give evidence.
     sigma : float
         Standard deviation of the walls, metres.
     deadline : Deadline
@@ -173,15 +190,20 @@ def gather(
         True if a wall is seen from its left only.
     """
     chunks = Chunks.of(walls)
-    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
+    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in chosen))}
     chunk, counts, of_scan = [NOTHING], [np.zeros((0, 3), dtype=np.intp)], [np.zeros((0, 2), dtype=np.intp)]
+    sights: list[Indices | None] = []
     for one in found:
-        seen = follow(chunks, one, critical_lines(one, walls), sigma, deadline, oriented=oriented)
-        chunk.append(seen.chunks)
-        counts.append(seen.counts)
-        of_scan.append(np.tile((one.visit, places[one.place]), (len(seen.chunks), 1)))
+        is_placed = one.result.pose is not None and one.result.covariance is not None
+        seen = follow(chunks, one, sigma, deadline, oriented=oriented) if is_placed else None
+        sights.append(None if seen is None else seen.chunks)
+        if seen is not None and one in chosen:
+            own = ~on_critical_wall(one, walls)[chunks.walls_of(seen.chunks)]
+            chunk.append(seen.chunks[own])
+            counts.append(seen.counts[own])
+            of_scan.append(np.tile((one.visit, places[one.place]), (own.sum(), 1)))
         yield
     met = np.concatenate(chunk)
     order = np.argsort(met, kind="stable")
     visit, place = np.concatenate(of_scan)[order].T
-    return WallEvidence(chunks, met[order], visit, place, np.concatenate(counts)[order])
+    return WallEvidence(chunks, tuple(sights), met[order], visit, place, np.concatenate(counts)[order])

@@ -6,11 +6,11 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from association import CancelledError, Deadline, MapIndex
+from association import Deadline, MapIndex
 from registration import RigidTransform
 
 from ..views import Steps
@@ -42,7 +42,6 @@ class Carrying:
     found: list[Localized]
     deadline: Deadline
     until: float = math.inf
-    _trail: dict[int, Localized] = field(default_factory=dict)  # since the last anchor: answers without odometry
 
     def carry(self) -> Steps[None]:
         """Carry poses forward and backward in each visit, one search at a step.
@@ -70,7 +69,7 @@ class Carrying:
         If more pairs of neighbours contradict each other than agree, the odometry of the visit is not used.
         """
         pairs = list(itertools.pairwise(usable))
-        agreeing = [pair for pair in pairs if self._agree(*pair)]
+        agreeing = [pair for pair in pairs if self._is_near(*pair) and self._distance(*pair) <= tuning.AGREEING]
         against = [pair for pair in pairs if self._distance(*pair) > tuning.AGREEING]
         if len(against) > len(agreeing):
             return set()
@@ -82,42 +81,30 @@ class Carrying:
     def _along(self, rows: Sequence[int], anchors: set[int]) -> Steps[None]:
         """Carry poses along some scans in this order, from anchor to anchor."""
         last: int | None = None
-        self._trail.clear()
+        alone: dict[int, Localized] = {}  # since the last anchor: answers without odometry
         for k in rows:
+            one = self.found[k]
             if k in anchors:
                 if last is not None and self._distance(last, k) > tuning.AGREEING:
-                    for at, found in self._trail.items():
-                        self.found[at] = found
-                last = k
-                self._trail.clear()
-            elif last is not None and self._is_wanted(k):
-                carried = self._carried(last, k)
-                if carried is not None:
-                    yield
-                    last = k if carried.precise else last
+                    for at, before in alone.items():
+                        self.found[at] = before
+                last, alone = k, {}
+            elif last is not None and self._is_wanted(last, k):
+                pose, covariance = self._predicted(last, k)
+                carried = one.searched(self.index, self.deadline, replace(one.sent, pose=pose, covariance=covariance))
+                yield
+                if carried.located:
+                    alone[k], self.found[k] = one, carried
+                last = k if carried.precise else last
 
-    def _is_wanted(self, k: int) -> bool:
-        one = self.found[k]
-        return not (one.located or one.held_back) and one.sent.pose is None
+    def _is_wanted(self, last: int, k: int) -> bool:
+        """Return whether a scan needs a pose, which another one can give, and there is time."""
+        one, in_time = self.found[k], not self.deadline.passed and time.monotonic() <= self.until
+        return in_time and not (one.located or one.held_back) and one.sent.pose is None and self._is_near(last, k)
 
-    def _carried(self, last: int, k: int) -> Localized | None:
-        """Search a scan with the prior from another; None where the prior is too wide, or there is no time."""
-        if self.deadline.cancelled:
-            raise CancelledError
-        pose, covariance = self._predicted(last, k)
-        if _sigma(covariance) > tuning.MOST_CONFIRMING_SIGMA or self.deadline.passed or time.monotonic() > self.until:
-            return None
-        one = self.found[k]
-        found = one.searched(self.index, self.deadline, replace(one.sent, pose=pose, covariance=covariance))
-        if found.located:
-            self._trail[k], self.found[k] = one, found
-        return found
-
-    def _agree(self, a: int, b: int) -> bool:
-        """Return whether the poses of two scans agree with odometry, which is precise enough to tell."""
-        return (
-            _sigma(self._predicted(a, b)[1]) <= tuning.MOST_CONFIRMING_SIGMA and self._distance(a, b) <= tuning.AGREEING
-        )
+    def _is_near(self, a: int, b: int) -> bool:
+        """Return whether odometry between two scans is precise enough to tell anything."""
+        return math.sqrt(np.diag(self._predicted(a, b)[1])[:2].max()) <= tuning.MOST_CONFIRMING_SIGMA
 
     def _distance(self, a: int, b: int) -> float:
         """Return the squared Mahalanobis distance of the poses of two scans by odometry."""
@@ -136,8 +123,3 @@ class Carrying:
         place, turn = odometry_deviations(math.hypot(step.x, step.y), abs(step.theta))
         moved = known.pose.carry(known.result.covariance, step)
         return known.pose.compose(step), moved + np.diag([place**2, place**2, turn**2])
-
-
-def _sigma(covariance: np.ndarray) -> float:
-    """Return the larger standard deviation of x and y, metres."""
-    return float(np.sqrt(np.diag(covariance)[:2].max()))

@@ -236,14 +236,9 @@ def choose_evidence(
     A visit of another building has few usable scans. A laser with a wrong scale leaves residuals that grow with the
     distance of the walls.
     """
-    refused: dict[int, RefusedVisit] = {}
-    for number, name in enumerate(names):
-        own = [one for one in found if one.visit == number]
-        told = _doubt(own, known, sigma)
-        if told is not None:
-            refused[number] = RefusedVisit(name, told)
-    chosen = [one for one in found if one.precise and not one.held_back and one.visit not in refused]
-    return chosen, list(refused.values())
+    doubts = [_doubt([one for one in found if one.visit == k], known, sigma) for k in range(len(names))]
+    chosen = [one for one in found if one.precise and not one.held_back and doubts[one.visit] is None]
+    return chosen, [RefusedVisit(name, why) for name, why in zip(names, doubts, strict=True) if why is not None]
 
 
 def _doubt(own: Sequence[Localized], known: Segments, sigma: float) -> str | None:

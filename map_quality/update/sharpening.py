@@ -83,10 +83,7 @@ def sharpen(index: MapIndex, found: Sequence[Localized], sigma: float, deadline:
     np.maximum.at(widest, number, spread)
     better = _seen_often(pairs, found, len(walls)) & (widest <= tuning.SHARPER * sigma)
     mine = np.flatnonzero(better[number])
-    moved, ends = pieces[mine], known.endpoints.copy()
-    ends[moved] = _moved(own, number, middles, shift)[mine]
-    ends = _joined(known, ends, moved)
-    return Sharpened(moved, ends[moved], spread[mine])
+    return Sharpened(pieces[mine], _moved(own, number, middles, shift)[mine], spread[mine])
 
 
 def _extents(known: Segments, wall_of: Indices, count: int) -> tuple[Floats, Floats]:
@@ -172,12 +169,11 @@ def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: 
 
 def _seen_often(pairs: _Pairs, found: Sequence[Localized], count: int) -> Bools:
     """Return which walls are seen on several visits and from several places, (n,)."""
-    places = {place: k for k, place in enumerate(dict.fromkeys(one.place for one in found))}
-    of_scan = np.array([(one.visit, places[one.place]) for one in found], dtype=np.intp).reshape(-1, 2)
-    often = np.ones(count, dtype=bool)
-    for column, least in ((0, tuning.LEAST_VISITS), (1, tuning.LEAST_POSES)):
-        seen = np.unique(np.stack([pairs.wall, of_scan[pairs.scan, column]], axis=1), axis=0)
-        often &= np.bincount(seen[:, 0], minlength=count) >= least
+    often, visits = np.ones(count, dtype=bool), [(one.visit,) for one in found]
+    for least, of_scan in ((tuning.LEAST_VISITS, visits), (tuning.LEAST_POSES, [one.place for one in found])):
+        numbers = np.unique(of_scan, axis=0, return_inverse=True)[1].ravel()
+        seen = np.unique(np.stack([pairs.wall, numbers[pairs.scan]]), axis=1)[0]
+        often &= np.bincount(seen, minlength=count) >= least
     return often
 
 
@@ -187,27 +183,4 @@ def _moved(known: Segments, wall_of: Indices, middles: Floats, shift: Floats) ->
     for k in (0, 2):
         along = np.einsum("ij,ij->i", known.endpoints[:, k : k + 2] - middles[wall_of], known.directions)
         out[:, k : k + 2] += (shift[wall_of, 0] + shift[wall_of, 1] * along)[:, None] * known.normals
-    return out
-
-
-def _joined(known: Segments, ends: Floats, moved: Indices) -> Floats:
-    """Return the ends with corners closed again: walls that moved end where they cross the wall that they met."""
-    new, out = Segments.derived(ends), ends.copy()
-    _, cell = np.unique(np.round(known.endpoints.reshape(-1, 2) / tuning.CORNER), axis=0, return_inverse=True)
-    order = np.argsort(cell.ravel(), kind="stable")
-    first, count = np.unique(cell.ravel()[order], return_index=True, return_counts=True)[1:]
-    corners = np.stack([order[first[count == 2]], order[first[count == 2] + 1]], axis=1)
-    walls = corners // 2
-    is_moved = np.zeros(len(known), dtype=bool)
-    is_moved[moved] = True
-    for (a, b), both in zip(walls.tolist(), corners.tolist(), strict=True):
-        if a == b or not (is_moved[a] or is_moved[b]):
-            continue
-        normals = np.stack([new.normals[a], new.normals[b]])
-        if abs(float(np.linalg.det(normals))) < tuning.CORNER_SINE:
-            continue
-        point = np.linalg.solve(normals, [new.offsets[a], new.offsets[b]])
-        for corner in both:
-            if is_moved[corner // 2]:
-                out[corner // 2, 2 * (corner % 2) : 2 * (corner % 2) + 2] = point
     return out

@@ -72,7 +72,6 @@ LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one sc
 MOST_POSES = 1000  # of scans that are estimated with the walls; memory and time
 MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
 FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
-CORNER, CORNER_SINE = 0.02, 0.35  # m, and sine of the angle; ends of two walls that are one corner
 
 # --- Confidence, and the check of the proposal ------------------------------------------------------------------------
 

@@ -13,14 +13,13 @@ import numpy as np
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from registration import InvalidArgumentError, Segments
 
-from ..views import Steps, finished
+from ..views import Steps
 from . import tuning
 from .additions import candidates, unexplained
-from .beams import Chunks, seen_walls
-from .changes import draft_changes
+from .changes import Shown, draft_changes
 from .evidence import gather
 from .odometry import Carrying
-from .result import Bools, Change, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
+from .result import Bools, MapUpdate, RefusedVisit, Sharpened, apply, apply_changes, with_ends
 from .scans import (
     Localized,
     TimeOverError,
@@ -41,20 +40,19 @@ from .verifying import (
     kept_walls,
     usable_of,
 )
-from .walls import NO_WALLS
 
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
 
 
-def update(
+def updating(
     index: MapIndex,
     scans: Sequence[VisitScan],
     deadline: Deadline | None = None,
     *,
     accept: float | None = None,
     refuse: Collection[int] = (),
-) -> MapUpdate:
-    """Propose changes of a map that scans of several visits show.
+) -> Steps[MapUpdate]:
+    """Propose changes of a map that scans of several visits show, one search at a step.
 
     1. Localize: search each scan in the map. Usable and precise ones give evidence, except one in ten.
     2. Suggest: join lines of scans that the map does not show to walls that may be new.
@@ -89,24 +87,6 @@ def update(
     CancelledError
         When the deadline was cancelled.
     """
-    return finished(updating(index, scans, deadline, accept=accept, refuse=refuse))
-
-
-def updating(
-    index: MapIndex,
-    scans: Sequence[VisitScan],
-    deadline: Deadline | None,
-    *,
-    accept: float | None,
-    refuse: Collection[int],
-) -> Steps[MapUpdate]:
-    """Do what `update` does, one search at a step, and return the same.
-
-    Raises
-    ------
-    UpdateError, InvalidArgumentError, CancelledError
-        As `update`.
-    """
     if not len(scans):
         raise UpdateError("found no scans, expected scans of at least two visits", argument="scans")
     if accept is not None and not 0.0 <= accept <= 1.0:
@@ -115,9 +95,11 @@ def updating(
     first = yield from begun.localize()
     chosen, refused = choose_evidence(begun.names, first, begun.known, begun.sigma)
     proposed = Proposed()
-    with contextlib.suppress(TimeOverError):
+    with contextlib.suppress(TimeOverError, IndexingEndedError):
         proposed = yield from begun.propose(chosen, first)
         proposed = yield from begun.sharpen(proposed, chosen, first)
+    if begun.deadline.cancelled:
+        raise CancelledError
     return begun.proposal(proposed, first, refused, accept, refuse)
 
 
@@ -147,8 +129,6 @@ class _Update:
         now = time.monotonic()
         at = math.inf if self.deadline.at is None else now + FIRST_SEARCHES * (self.deadline.at - now)
         for number, one in enumerate(self.scans):
-            if self.deadline.cancelled:
-                raise CancelledError
             if time.monotonic() > at:
                 break
             visit, result = self.names.index(one.visit), search(self.index, one, self.deadline)
@@ -163,29 +143,29 @@ class _Update:
         known, deadline = self.known, self.deadline
         new, sigmas = candidates(unexplained(chosen, known, deadline), known, deadline)
         walls = Segments.derived(np.concatenate([known.endpoints, new]))
-        evidence = yield from gather(walls, chosen, self.sigma, deadline, oriented=self.index.oriented)
-        changes = draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline)
-        proposed = yield from self.verify(changes, first)
-        drafted = {k for change in changes for k in change.segments}
+        oriented = self.index.oriented
+        evidence = yield from gather(walls, first, set(chosen), self.sigma, deadline, oriented=oriented)
+        shown = draft_changes(evidence, known, sigmas, self.sigma, self.names, deadline)
+        proposed = yield from self.verify(shown, first)
+        drafted = {k for one in shown for k in one.change.segments}
         changed = {k for change in proposed.changes for k in change.segments}
         return replace(proposed, kept=tuple(kept_walls(evidence, len(known), drafted, changed)))
 
-    def verify(self, changes: Sequence[Change], first: Sequence[Localized]) -> Steps[Proposed]:
+    def verify(self, shown: Sequence[Shown], first: Sequence[Localized]) -> Steps[Proposed]:
         """Search scans on the new map; drop changes that lower the score of their scans, or move their poses."""
-        seen, held = self._seeing(changes, first), np.array([one.held_back for one in first], dtype=bool)
-        left = dropped = list(range(len(changes)))
-        found = list(first)
+        left, dropped, found = list(shown), list(shown), list(first)
+        held = np.array([one.held_back for one in first], dtype=bool)
         while left:
-            kept = [changes[k] for k in left]
-            segments = apply(self.known, kept)
+            changes = tuple(one.change for one in left)
+            segments = apply(self.known, changes)
             if not len(segments):
                 break
-            again = seen[dropped].any(axis=0) | held
+            again = np.any([held, *(one.seen_by for one in dropped)], axis=0)
             found = yield from self._search_again(self._indexed(segments), found, again)
-            dropped = [k for k in left if not is_better(seen[k], first, found)]
+            dropped = [one for one in left if not is_better(one.seen_by, first, found)]
             if not dropped:
-                return Proposed(tuple(kept), tuple(found)) if keeps_usable(first, found) else Proposed()
-            left = [k for k in left if k not in dropped]
+                return Proposed(changes, tuple(found)) if keeps_usable(first, found) else Proposed()
+            left = [one for one in left if one not in dropped]
         return Proposed()
 
     def sharpen(self, proposed: Proposed, chosen: Sequence[Localized], first: Sequence[Localized]) -> Steps[Proposed]:
@@ -204,35 +184,19 @@ class _Update:
             return proposed
         sharpened = Sharpened(better.segments[mine], better.ends[mine], better.sigma[mine])
         new = self._indexed(apply(with_ends(self.known, sharpened), proposed.changes))
-        found = proposed.found or tuple(first)
-        again = yield from self._search_again(new, first)
-        better_for_all = is_better(np.ones(len(first), dtype=bool), found, again) and keeps_usable(found, again)
+        found, everyone = proposed.found or tuple(first), np.ones(len(first), dtype=bool)
+        again = yield from self._search_again(new, first, everyone)
+        better_for_all = is_better(everyone, found, again) and keeps_usable(found, again)
         return replace(proposed, found=tuple(again), sharpened=sharpened) if better_for_all else proposed
 
     def _indexed(self, segments: Segments) -> MapIndex:
-        index, oriented = self.index, self.index.oriented
-        try:
-            return MapIndex.build(segments, index.sigma, oriented=oriented, points=index.points, deadline=self.deadline)
-        except IndexingEndedError:
-            go_on(self.deadline)
-            raise
+        index, deadline = self.index, self.deadline
+        return MapIndex.build(segments, index.sigma, oriented=index.oriented, points=index.points, deadline=deadline)
 
-    def _seeing(self, changes: Sequence[Change], found: Sequence[Localized]) -> Bools:
-        """Return which scans see walls that each change takes away, or that it brings, (changes, scans)."""
-        ends = [np.concatenate([self.known.endpoints[list(one.segments)], one.new]) for one in changes]
-        owner = np.repeat(np.arange(len(changes)), [len(one) for one in ends])
-        chunks = Chunks.of(Segments.derived(np.concatenate([NO_WALLS, *ends])))
-        out = np.zeros((len(changes), len(found)), dtype=bool)
-        for k, one in enumerate(found):
-            out[owner[seen_walls(chunks, one, self.sigma, self.deadline)], k] = True
-        return out
-
-    def _search_again(
-        self, index: MapIndex, found: Sequence[Localized], again: Bools | None = None
-    ) -> Steps[list[Localized]]:
-        """Search scans, or some of them, in another map; return all."""
+    def _search_again(self, index: MapIndex, found: Sequence[Localized], again: Bools) -> Steps[list[Localized]]:
+        """Search some of the scans, `again`, in another map; return all."""
         out = list(found)
-        for k in range(len(found)) if again is None else np.flatnonzero(again).tolist():
+        for k in np.flatnonzero(again).tolist():
             go_on(self.deadline)
             out[k] = found[k].searched(index, self.deadline)
             yield

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -48,10 +49,10 @@ class Draft:
     door: bool = False
     rest_read: bool = False
 
-    @property
-    def chunks(self) -> Indices:
-        """All chunks that it is about."""
-        return np.concatenate([self.gone, self.there])
+    def seen_by(self, evidence: WallEvidence) -> Bools:
+        """Return which scans saw something of the walls that it takes away, or brings, (n,)."""
+        old = [np.arange(*evidence.chunks.first[wall : wall + 2]) for wall in self.segments]
+        return evidence.seen_by(np.concatenate([self.there, *old]))
 
     def with_also(self, other: Draft, code: ChangeCode | None = None) -> Draft:
         """Return one change that does both."""
@@ -93,18 +94,25 @@ def find_cuts(
             cut = _cut(judged, wall, sigma)
             if cut is not None:
                 cuts[wall] = cut
-    cuts |= _between(judged, known, cuts)
-    passed |= _between(judged, known, cuts | passed)
+    cuts |= _between(judged, known, cuts, sigma)
+    passed |= _between(judged, known, cuts | passed, sigma)
     return [cuts[wall] for wall in sorted(cuts)], [passed[wall] for wall in sorted(passed)]
 
 
-def _between(judged: Judged, known: Segments, cuts: Mapping[int, Draft]) -> dict[int, Draft]:
+def _between(judged: Judged, known: Segments, cuts: Mapping[int, Draft], sigma: float) -> dict[int, Draft]:
     """Return the removal of other walls no longer than a stub that nothing reads, with removed walls at both ends."""
-    corner, removed = _corners(known), [wall for wall, cut in cuts.items() if cut.code == "removed"]
-    between = np.isin(corner, corner[removed]).all(axis=1) & (known.lengths < tuning.LONGEST_STUB)
+    removed = [wall for wall, cut in cuts.items() if cut.code == "removed"]
+    ends = scipy.spatial.cKDTree(known.endpoints[removed].reshape(-1, 2))
+    gaps = np.asarray(ends.query(known.endpoints.reshape(-1, 2))[0]).reshape(-1, 2)
+    between = (gaps <= tuning.LOOP_GAP + corner_error(sigma)).all(axis=1) & (known.lengths < tuning.LONGEST_STUB)
     between[list(cuts)] = False
     found = np.flatnonzero(between).tolist()
     return {k: Draft("removed", (k,)) for k in found if not judged.read[judged.chunks.of_wall(k)].any()}
+
+
+def corner_error(sigma: float) -> float:
+    """Return how far apart the ends of two walls may be that meet at a corner, metres."""
+    return tuning.DEVIATIONS * math.hypot(sigma, sigma)
 
 
 def _corners(walls: Segments) -> Indices:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from association import Deadline, MapIndex
 from linefix import LaserScan, scan_of
-from map_quality import VisitScan
+from map_quality import MapUpdate, VisitScan, finished, updating
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
@@ -52,3 +53,20 @@ def visit(
         laser = LaserScan(scanner.angle_min, scanner.angle_increment, change(seen.ranges), 0.0, scanner.range_max)
         out.append(VisitScan(scan_of(laser), name))
     return out
+
+
+def update(
+    index: MapIndex,
+    scans: Sequence[VisitScan],
+    deadline: Deadline | None = None,
+    *,
+    accept: float | None = None,
+    refuse: Collection[int] = (),
+) -> MapUpdate:
+    """Take all steps of an update."""
+    return finished(updating(index, scans, deadline, accept=accept, refuse=refuse))
+
+
+def told(update: MapUpdate) -> list[tuple[str, tuple[int, ...]]]:
+    """Return code and segments of each change."""
+    return [(str(one.code), one.segments) for one in update.changes]

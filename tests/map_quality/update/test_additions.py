@@ -32,9 +32,9 @@ def added(*lines: list[float], passed: float | None = None) -> np.ndarray:
     on = np.full(len(wall), True) if passed is None else np.abs(chunks.walls.midpoints[wall, 1] - passed) > 0.06
     chunk, scan = np.divmod(np.arange(6 * len(wall)), 6)
     counts = np.stack([9 * ~on[chunk], 9 * on[chunk], 0 * chunk], axis=1)
-    evidence = WallEvidence(chunks, chunk, scan % 2, scan % 3, counts)
+    evidence = WallEvidence(chunks, (), chunk, scan % 2, scan % 3, counts)
     drafts = draft_changes(evidence, MAP, sigmas, 0.005, ["monday", "tuesday"], Deadline())
-    return np.concatenate([one.new for one in drafts if one.code == "added"])
+    return np.concatenate([one.change.new for one in drafts if one.change.code == "added"])
 
 
 @pytest.mark.parametrize("across", [0.18, -0.18])
@@ -71,8 +71,8 @@ def test_single_beams_do_not_remove_a_wall_whose_rest_nothing_reads() -> None:
     scan = np.concatenate([np.tile(np.arange(6), 18), np.zeros(18, dtype=int)])
     counts = np.zeros((len(scan), 3), dtype=int)
     counts[:, 0] = [9] * len(many) + [1] * len(single)
-    evidence = WallEvidence(chunks, np.concatenate([many, single]), scan % 2, scan % 3, counts)
+    evidence = WallEvidence(chunks, (), np.concatenate([many, single]), scan % 2, scan % 3, counts)
     drafts = draft_changes(evidence, MAP, np.zeros(0), 0.005, ["monday", "tuesday"], Deadline())
     (draft,) = drafts
-    assert draft.code == "shortened"
-    assert draft.new == pytest.approx(np.array([[50.0, 50.0, 52.0, 50.0], [55.6, 50.0, 60.0, 50.0]]))
+    assert draft.change.code == "shortened"
+    assert draft.change.new == pytest.approx(np.array([[50.0, 50.0, 52.0, 50.0], [55.6, 50.0, 60.0, 50.0]]))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import map_quality
 from association import Deadline, MapIndex
+from map_quality.update.beams import Chunks, follow
+from map_quality.update.scans import Localized, search
 from registration import Segments
 
-from .hall import PILLAR, RACK, segments, visit
+from .hall import PILLAR, RACK, SCANNER, segments, update, visit
 
 SIGMA = 0.02
 
@@ -33,10 +36,10 @@ def test_memory_is_that_of_what_the_scans_see() -> None:
     walls = Segments.from_array(np.concatenate([segments(RACK, PILLAR).endpoints, far]))
     index = MapIndex.build(walls, SIGMA)
     scans = [one for k in range(10) for one in visit(segments(PILLAR), f"day {k}", k)[::3]]
-    map_quality.update(index, scans, Deadline())
+    update(index, scans, Deadline())
     tracemalloc.start()
     try:
-        found = map_quality.update(index, scans)
+        found = update(index, scans)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -45,10 +48,26 @@ def test_memory_is_that_of_what_the_scans_see() -> None:
     assert peak < 100e6  # the index takes half of it
 
 
+def test_memory_is_bounded_where_thousands_of_beams_pass_thousands_of_walls() -> None:
+    hall, scanner = segments(RACK, PILLAR), replace(SCANNER, beams=4000, angle_increment=math.tau / 4000)
+    one = visit(hall, "monday", 1, scanner)[0]
+    localized = Localized(0, one, search(MapIndex.build(hall, SIGMA), one, Deadline()), False)
+    y = np.linspace(0.1, 7.9, 12_000)
+    walls = Chunks.of(Segments.from_array(np.stack([np.full_like(y, 0.1), y, np.full_like(y, 11.9), y], axis=1)))
+    tracemalloc.start()
+    try:
+        seen = follow(walls, localized, SIGMA, Deadline(), oriented=True)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert seen.counts[:, 0].sum() > 10_000
+    assert peak < 100e6
+
+
 @pytest.mark.parametrize("looks", [1, 30, 100, 300, 1000])
 def test_a_deadline_ends_an_update_wherever_it_is(looks: int) -> None:
     scans = [one for k in range(3) for one in visit(segments(PILLAR), f"day {k}", k)]
     Looked.left = looks
-    found = map_quality.update(MapIndex.build(segments(RACK, PILLAR), SIGMA), scans, Looked())
+    found = update(MapIndex.build(segments(RACK, PILLAR), SIGMA), scans, Looked())
     assert not found.complete
     assert Looked.left > -100

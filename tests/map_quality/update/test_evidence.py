@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from association import Deadline, MapIndex
+from map_quality import finished
 from map_quality.update.beams import Chunks, beams_in_map, follow
+from map_quality.update.evidence import gather
 from map_quality.update.scans import Localized, search
 from map_quality.update.tuning import DEVIATIONS, LEAST_SLANT, LEAST_TOLERANCE, THROUGH
 
 from .hall import PILLAR, RACK, segments, visit
 
-SIGMA, NO_LINES = 0.005, np.zeros((0, 3))
+SIGMA = 0.005
 
 
 def localized() -> list[Localized]:
@@ -57,9 +60,21 @@ def test_beams_are_counted_as_one_by_one() -> None:
     for one in localized():
         for oriented in (False, True):
             seen, expected = (
-                follow(chunks, one, NO_LINES, SIGMA, Deadline(), oriented=oriented),
+                follow(chunks, one, SIGMA, Deadline(), oriented=oriented),
                 counted(chunks, one, oriented=oriented),
             )
             assert seen.chunks.tolist() == np.flatnonzero(expected.sum(axis=0)).tolist()
             assert np.array_equal(seen.counts.T, expected[:, seen.chunks])
             assert expected.any(axis=1).all()
+
+
+def test_a_scan_sees_a_wall_if_a_beam_meets_it_and_any_wall_if_its_pose_is_not_known() -> None:
+    walls = segments(PILLAR, RACK, [[13.5, 2.0, 13.5, 3.0]])
+    one = localized()[0]
+    lost = replace(one, result=replace(one.result, covariance=None))
+    evidence = finished(gather(walls, [one, lost], {one}, SIGMA, Deadline(), oriented=True))
+    first = evidence.chunks.first
+    saw = [evidence.seen_by(np.arange(first[wall], first[wall + 1])).tolist() for wall in (0, 16, 20)]
+    assert saw == [[True, True], [True, True], [False, True]]
+    silent = finished(gather(walls, [one], set(), SIGMA, Deadline(), oriented=True))
+    assert (len(evidence.chunk) > 0, len(silent.chunk)) == (True, 0)

@@ -10,17 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import map_quality
 from association import CancelledError, Deadline, MapIndex, mirrored
 from linefix import LaserScan, scan_of
 from map_quality import UpdateError, VisitScan
 from map_quality.scale import Matched, errors_of
-from map_quality.update.beams import critical_lines, on_lines
+from map_quality.update.beams import on_critical_wall
 from map_quality.update.scans import Localized, held_back, search
 from registration import InputError, RigidTransform, Segments
 from simulation import Scanner, scan
 
-from .hall import PILLAR, RACK, SCANNER, box, segments, visit
+from .hall import PILLAR, RACK, SCANNER, box, segments, update, visit
 
 HALL = segments(RACK, PILLAR)
 TODAY = segments(PILLAR)
@@ -38,14 +37,14 @@ def index() -> MapIndex:
 
 @pytest.mark.parametrize("factor", [0.98, 1.02])
 def test_scans_off_scale_change_nothing(factor: float) -> None:
-    found = map_quality.update(index(), days(TODAY, change=lambda ranges: ranges * factor))
+    found = update(index(), days(TODAY, change=lambda ranges: ranges * factor))
     assert found.changes == ()
 
 
 def test_scans_of_a_mirrored_laser_change_nothing() -> None:
     backward = replace(SCANNER, angle_min=-SCANNER.angle_min, angle_increment=-SCANNER.angle_increment)
     scans = [replace(one, scan=mirrored(one.scan)) for one in days(TODAY, scanner=backward)]
-    found = map_quality.update(index(), scans)
+    found = update(index(), scans)
     assert found.changes == ()
     assert found.refused_visits
 
@@ -53,7 +52,7 @@ def test_scans_of_a_mirrored_laser_change_nothing() -> None:
 def test_scans_of_another_building_change_nothing_and_the_visits_are_named() -> None:
     other = Segments.from_array(np.array([*box(1, 1, 4, 3), [0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10],
                                           [11, 10, 0, 10], [0, 10, 0, 0]], dtype=float))  # fmt: skip
-    found = map_quality.update(index(), days(other))
+    found = update(index(), days(other))
     assert found.changes == ()
     assert [one.visit for one in found.refused_visits] == ["day 0", "day 1", "day 2"]
     assert "usable" in found.refused_visits[0].message
@@ -64,10 +63,10 @@ def test_a_visit_counts_though_most_of_its_scans_are_off_the_map() -> None:
     other = Segments.from_array(np.array([[0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10], [11, 10, 0, 10],
                                           [0, 10, 0, 0]], dtype=float))  # fmt: skip
     with_a_cart = MapIndex.build(segments(RACK, PILLAR, box(6.0, 5.0, 7.2, 5.8)), 0.005)
-    found = map_quality.update(with_a_cart, [*days(HALL), *days(other) * 2])
+    found = update(with_a_cart, [*days(HALL), *days(other) * 2])
     assert found.refused_visits == ()
     assert [one.code for one in found.changes] == ["removed"]
-    (refused, *_) = map_quality.update(with_a_cart, [*days(HALL), *days(other) * 6]).refused_visits
+    (refused, *_) = update(with_a_cart, [*days(HALL), *days(other) * 6]).refused_visits
     assert "that the map shows the places" in refused.message
 
 
@@ -78,25 +77,25 @@ def test_visits_along_one_route_hold_other_places_back() -> None:
 
 
 def test_a_proposal_that_there_is_no_time_to_verify_is_none() -> None:
-    found = map_quality.update(index(), days(TODAY), Deadline(time.monotonic()))
+    found = update(index(), days(TODAY), Deadline(time.monotonic()))
     assert (found.changes, found.complete) == ((), False)
     deadline = Deadline()
     deadline.cancel()
     with pytest.raises(CancelledError):
-        map_quality.update(index(), days(TODAY), deadline)
+        update(index(), days(TODAY), deadline)
 
 
 def test_single_changes_are_refused_and_unsure_ones_not_accepted() -> None:
     scans = days(TODAY)
-    refused = map_quality.update(index(), scans, refuse=[0])
+    refused = update(index(), scans, refuse=[0])
     assert (len(refused.changes), refused.accepted) == (1, (False,))
     assert refused.segments.endpoints.tolist() == HALL.endpoints.tolist()
-    assert map_quality.update(index(), scans, accept=1.0).accepted == (False,)
-    assert map_quality.update(index(), scans, accept=0.9).accepted == (True,)
+    assert update(index(), scans, accept=1.0).accepted == (False,)
+    assert update(index(), scans, accept=0.9).accepted == (True,)
     with pytest.raises(InputError, match="refuse: found 1, expected an index of the 1 proposed"):
-        map_quality.update(index(), scans, refuse=[1])
+        update(index(), scans, refuse=[1])
     with pytest.raises(InputError, match=r"accept: found 2.0, expected a confidence from 0 to 1"):
-        map_quality.update(index(), scans, accept=2.0)
+        update(index(), scans, accept=2.0)
 
 
 def test_a_pose_of_the_senders_needs_its_covariance_and_does_not_replace_the_search() -> None:
@@ -104,12 +103,12 @@ def test_a_pose_of_the_senders_needs_its_covariance_and_does_not_replace_the_sea
     with pytest.raises(UpdateError, match="covariance: found none"):
         replace(one, pose=RigidTransform(1.0, 1.0, 0.0))
     wrong = [replace(each, pose=RigidTransform(3.0, 3.0, 0.0), covariance=1e-4 * np.eye(3)) for each in days(TODAY)]
-    assert map_quality.update(index(), wrong).changes == ()
+    assert update(index(), wrong).changes == ()
 
 
 def test_scans_are_needed_and_with_ranges() -> None:
     with pytest.raises(UpdateError, match="scans: found no scans"):
-        map_quality.update(index(), [])
+        update(index(), [])
     bare = replace(days(TODAY)[0].scan, beams=None)
     with pytest.raises(UpdateError, match="without ranges"):
         VisitScan(bare, "day 0")
@@ -127,7 +126,7 @@ def test_a_wall_that_alone_fixes_a_pose_is_no_evidence_for_itself() -> None:
     assert result.pose is not None
     assert math.hypot(result.pose.x - at.x, result.pose.y - at.y) < 0.1
     localized = Localized(0, one, result, False)
-    assert on_lines(corridor, critical_lines(localized, corridor)).tolist() == [False, True, False]
+    assert on_critical_wall(localized, corridor).tolist() == [False, True, False]
 
 
 FEW_USABLE = pytest.mark.xfail(strict=True, reason="1 to 3 scans are usable, not 4")

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import map_quality
 from association import Deadline, MapIndex
 from map_quality import MapUpdate, VisitScan
 from map_quality.update.odometry import Carrying
 from map_quality.update.scans import Localized, search
 from registration import RigidTransform, Segments
 
+from .hall import told, update
 from .rooms import FIRST, IN_HALL, SECOND, drive, places_in, rooms, with_odometry
 
 OLD, TODAY = rooms(), rooms(cupboards=[FIRST])
@@ -23,11 +23,7 @@ APART = (FIRST[0] - SECOND[0], FIRST[1] - SECOND[1])
 
 
 def updated(scans: list[VisitScan]) -> MapUpdate:
-    return map_quality.update(MapIndex.build(OLD, 0.005), scans)
-
-
-def told(update: MapUpdate) -> list[tuple[str, tuple[int, ...]]]:
-    return [(str(one.code), one.segments) for one in update.changes]
+    return update(MapIndex.build(OLD, 0.005), scans)
 
 
 def days(

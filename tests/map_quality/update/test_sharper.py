@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-import map_quality
 from association import MapIndex
 from benchmarks.worlds.map_errors import walls_off
 from map_quality import MapUpdate
 from registration import Segments
 
-from .hall import PILLAR, RACK, box, segments, visit
+from .hall import PILLAR, RACK, box, segments, update, visit
 
 HIDDEN = box(20.0, 0.0, 24.0, 3.0)
 TRUE = segments(RACK, PILLAR, HIDDEN)
@@ -23,7 +22,7 @@ def blurred(seed: int) -> Segments:
 
 def updated(old: Segments, sigma: float = SIGMA) -> MapUpdate:
     scans = [one for k in range(5) for one in visit(TRUE, f"day {k}", k)]
-    return map_quality.update(MapIndex.build(old, sigma), scans)
+    return update(MapIndex.build(old, sigma), scans)
 
 
 def off(ends: np.ndarray, indices: np.ndarray) -> np.ndarray:
@@ -59,18 +58,8 @@ def test_walls_that_no_scan_sees_stay_where_they_are() -> None:
     assert found.segments.endpoints[unseen].tolist() == old.endpoints[unseen].tolist()
 
 
-def test_corners_stay_closed() -> None:
-    found = updated(blurred(2))
-    outline = found.segments.endpoints[:12]
-    assert np.isin(np.arange(12), found.sharpened.segments).sum() >= 10
-    drawn = blurred(2).endpoints[:12]
-    met = np.linalg.norm(drawn[:, 2:] - np.roll(drawn, -1, axis=0)[:, :2], axis=1) < 0.02
-    gaps = np.linalg.norm(outline[:, 2:] - np.roll(outline, -1, axis=0)[:, :2], axis=1)
-    assert gaps[met].max(initial=0.0) < 0.02
-
-
 def test_a_map_that_is_sharp_or_does_not_declare_its_sigma_stays_as_it_is() -> None:
     assert len(updated(TRUE, 0.005).sharpened.segments) == 0
     scans = [one for k in range(3) for one in visit(TRUE, f"day {k}", k)]
-    found = map_quality.update(MapIndex.build(TRUE), scans)
+    found = update(MapIndex.build(TRUE), scans)
     assert (found.sigma, len(found.sharpened.segments)) == (None, 0)
