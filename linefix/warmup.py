@@ -49,7 +49,7 @@ def warm_up() -> None:
         map_quality.try_sample(index, sample, Deadline(), oriented=True)
     analysis = map_quality.Analysis.over(index, robot, 3.0)
     for number in range(len(analysis.standing.poses)):
-        analysis.look(number)
+        map_quality.finished(analysis.looking(number))
 
 
 def warm_up_second_half() -> None:

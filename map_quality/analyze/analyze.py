@@ -19,7 +19,7 @@ from association import (
 )
 from registration import RigidTransform, Segments
 
-from ..views import AnalysisError, Robot, Steps, finished, is_elsewhere, is_same, look, similar_pose
+from ..views import AnalysisError, Robot, Steps, is_elsewhere, is_same, look, similar_pose
 from .drive import STEP, seen_on_the_way, ways_from
 from .standing import CLEARANCE, Standing, is_free, standing_places
 
@@ -79,8 +79,6 @@ class Analysis:
         The map as sent; the scanner also sees the points of the index.
     robot : Robot
     standing : Standing
-    oriented : bool
-        True when directions mean something.
     seed : int
         Of the noise.
     drive : float
@@ -93,7 +91,6 @@ class Analysis:
     segments: Segments
     robot: Robot
     standing: Standing
-    oriented: bool = True
     seed: int = 0
     drive: float = 0.0
     landmark: Analysis | None = None
@@ -134,7 +131,7 @@ class Analysis:
         # Of a map without directions the index holds each segment twice.
         segments = Segments.derived(index.segments.endpoints[: index.directed])
         standing = standing_places(segments, robot, spacing, point)
-        analysis = cls(index, segments, robot, standing, index.oriented, seed, drive)
+        analysis = cls(index, segments, robot, standing, seed, drive)
         return analysis if landmark is None or not len(landmark) else analysis.with_segments(landmark)
 
     def with_segments(self, landmark: Segments) -> Analysis:
@@ -147,21 +144,11 @@ class Analysis:
         """
         ends = np.vstack([self.segments.endpoints, landmark.endpoints])
         segments = Segments.derived(ends)
-        index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented, points=self.index.points)
+        index = MapIndex.build(segments, self.index.sigma, oriented=self.index.oriented, points=self.index.points)
         return replace(self, landmark=replace(self, index=index, segments=segments, drive=0.0, landmark=None))
 
-    def look(self, number: int, deadline: Deadline | None = None) -> PlaceVerdict | None:
-        """Take a scan at one of the poses and search it; None where a robot cannot stand there.
-
-        Raises
-        ------
-        CancelledError
-            When the deadline was cancelled.
-        """
-        return finished(self.looking(number, deadline))
-
     def looking(self, number: int, deadline: Deadline | None = None) -> Steps[PlaceVerdict | None]:
-        """Do what `look` does, one search at a step, and return the same.
+        """Take a scan at one of the poses and search it, one search at a step; None where a robot cannot stand there.
 
         Raises
         ------
@@ -170,21 +157,32 @@ class Analysis:
         """
         pose = self.standing.pose(number)
         points_away = np.hypot(*(self.index.points.positions - [pose.x, pose.y]).T) >= CLEARANCE
-        free = is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented)
+        free = is_free(self.segments, pose, self.robot.range_max, oriented=self.index.oriented)
         if not (free and points_away.all()):
             return None
         seen = self._scan(pose, number)
-        found = _verdict(number, pose, self._search(seen, deadline))
+        result = self._search(seen, deadline)
+        mistaken = is_elsewhere(result, pose)
+        found = PlaceVerdict(
+            number=number,
+            pose=pose,
+            status=Status.AMBIGUOUS if mistaken else result.status,
+            usable=result.usable and not mistaken,
+            probability=result.probability,
+            similar_pose=similar_pose(result, pose),
+            unobservable=result.unobservable,
+            reasons=("similar_place",) if mistaken else tuple(reason.code for reason in result.reasons),
+        )
         if self.drive:
             metres = 0.0 if found.usable else (yield from self._knows_after(number, pose, seen, deadline))
             found = replace(found, resolved_after=metres)
         if self.landmark is not None:
             yield
-            found = replace(found, with_landmark=self.landmark.look(number, deadline))
+            found = replace(found, with_landmark=(yield from self.landmark.looking(number, deadline)))
         return found
 
     def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
-        return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented, on_map=1.0), deadline)
+        return associate(self.index, seen, None, AssociationOptions(oriented=self.index.oriented, on_map=1.0), deadline)
 
     def _knows_after(
         self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
@@ -210,17 +208,3 @@ class Analysis:
         arms = self.index.points.arms()
         seen = Segments.derived(np.vstack([self.segments.endpoints, arms])) if len(arms) else self.segments
         return look(seen, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
-
-
-def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> PlaceVerdict:
-    mistaken = is_elsewhere(result, pose)
-    return PlaceVerdict(
-        number=number,
-        pose=pose,
-        status=Status.AMBIGUOUS if mistaken else result.status,
-        usable=result.usable and not mistaken,
-        probability=result.probability,
-        similar_pose=similar_pose(result, pose),
-        unobservable=result.unobservable,
-        reasons=("similar_place",) if mistaken else tuple(reason.code for reason in result.reasons),
-    )

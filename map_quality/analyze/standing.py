@@ -48,8 +48,7 @@ class Standing:
 
     def pose(self, number: int) -> RigidTransform:
         """Return one of the poses, map_from_scan."""
-        x, y, theta = (float(value) for value in self.poses[number])
-        return RigidTransform(x, y, theta)
+        return RigidTransform(*self.poses[number].tolist())
 
 
 def standing_places(

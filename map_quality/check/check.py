@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from association import AssociationOptions, CancelledError, Deadline, IndexingEndedError, MapIndex, associate
-from registration import RigidTransform, Segments
-from simulation import Scanner, scan
+from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 
-from ..views import Robot, in_time, look, similar_pose
+from ..analyze.analyze import Analysis
+from ..views import Robot, finished, in_time, look
 from . import tuning
-from .pieces import drawing_findings, drawn_sigma, find_near_walls, longest_pieces
+from .pieces import drawing_findings, drawn_sigma, find_near_walls
 from .result import Advice, Finding, MapCheck, Place, Size
 from .sides import Sides, direction_findings, look_from_walls
 
-LEAST_SEEN = 3  # segments of a scan that is searched
 ROBOT = Robot(beams=tuning.RAYS, range_max=tuning.REACH, sigma=tuning.SIGMA)
-RAY = Scanner(beams=1, angle_min=0.0, range_max=tuning.FOLLOWED, sigma=0.0)
 
 
 def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bool = True) -> MapCheck:
@@ -47,21 +42,20 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     until = deadline or Deadline()
     size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
     findings: list[Finding] = []
-    if not tuning.SMALLEST <= size.diagonal <= tuning.LARGEST:
+    is_likely = tuning.SMALLEST <= size.diagonal <= tuning.LARGEST
+    if not is_likely:
         said = f"{size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m"
         findings.append(Finding("unlikely_size", f"The map's diagonal is {said}. Check that it is in metres."))
     advice, near = Advice(drawn_sigma(index)), find_near_walls(index, until)
-    if oriented and not findings:  # of another unit walls are too far apart to see one another
+    if oriented and is_likely:  # in another unit walls are too far apart to see one another
         sides = look_from_walls(index, near.opposite, until)
         findings += direction_findings(index, sides)
         advice = Advice(advice.sigma, _directed(sides, findings))
-    for found in () if until.passed else drawing_findings(index, near, until):
-        findings.append(found)
-        if until.passed:
-            break
+    if not until.passed:
+        findings += drawing_findings(index, near, until)
     means_something = oriented and advice.oriented is not False
-    likeness = find_look_alikes(index, until, oriented=means_something)
-    findings += likeness_findings(likeness)
+    likeness = find_look_alikes(index, until, oriented=means_something) if is_likely else Likeness()
+    findings += likeness.findings
     if until.cancelled:
         raise CancelledError
     return MapCheck(size, tuple(findings), advice, likeness.places, likeness.viewpoints, not until.passed)
@@ -84,69 +78,37 @@ class Likeness:
         Number of places that were tried.
     places : tuple of Place
         Those that are similar to others.
-    segments : tuple of int
-        The segments that are seen from these.
+    findings : tuple of Finding
+        At most one, with the segments that are seen from these.
     """
 
-    viewpoints: int
-    places: tuple[Place, ...]
-    segments: tuple[int, ...]
+    viewpoints: int = 0
+    places: tuple[Place, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> Likeness:
-    """Simulate scans at some places, spread over the length of the walls, and search each in the map.
+    """Analyze a map at a few places: which of them are similar to others.
 
     The number of places depends on the time that the deadline leaves.
     """
     try:
-        searched = index if oriented else index.undirected_by(deadline)
+        analysis = Analysis.over(index if oriented else index.undirected_by(deadline), ROBOT)
     except IndexingEndedError:
-        return Likeness(0, (), ())
-    segments = index.segments.take(np.arange(index.directed))
-    options = AssociationOptions(oriented=oriented, on_map=1.0)
-    looked, found, hits = 0, [], set[int]()
-    for number, pose in in_time(enumerate(_places(index, segments)), deadline):
-        seen = look(segments, pose, ROBOT, np.random.default_rng(number))
-        if len(seen.scan.measured) < LEAST_SEEN:
-            continue
-        other = similar_pose(associate(searched, seen.scan, None, options, deadline), pose)
-        looked += 1
-        if other is not None:
-            found.append(Place(pose, other))
-            hits.update(seen.hits.tolist())
-    return Likeness(looked, tuple(found), tuple(sorted(hits)))
-
-
-def likeness_findings(likeness: Likeness) -> Iterator[Finding]:
-    """Describe how much of the map is similar to another part of it."""
-    if likeness.places:
-        yield Finding(
-            "looks_alike",
-            f"At {len(likeness.places)} of {likeness.viewpoints} poses a laser with a range of {tuning.REACH:g} m sees "
-            "the same as at another pose of the map. There a scan alone is ambiguous: send a prior, or the scans of a "
-            "drive.",
-            likeness.segments,
-        )
-
-
-def _places(index: MapIndex, segments: Segments) -> Iterator[RigidTransform]:
-    """Yield free places in front of walls, in the map frame, at even steps of the length of all walls."""
-    reached = np.cumsum(index.walls.longest)
-    chosen = np.searchsorted(reached, (np.arange(tuning.PLACES) + 0.5) / tuning.PLACES * reached[-1])
-    for piece in dict.fromkeys(longest_pieces(index)[chosen].tolist()):
-        place = _free_place(segments, piece % index.directed)
-        if place is not None:
-            yield place
-
-
-def _free_place(segments: Segments, piece: int) -> RigidTransform | None:
-    """Return a place in front of the middle of a segment, on its free side where a scan shows something from there."""
-    (x, y), (dx, dy) = segments.midpoints[piece], segments.directions[piece]
-    for normal in (math.atan2(dx, -dy), math.atan2(-dx, dy)):
-        c, s = math.cos(normal), math.sin(normal)
-        at_wall = RigidTransform(x + tuning.OFF_THE_WALL * c, y + tuning.OFF_THE_WALL * s, normal)
-        room = float(scan(segments, at_wall, RAY).ranges[0])
-        if tuning.LEAST_ROOM < room < math.inf:
-            away = min(tuning.CLEARANCE, 0.5 * room)
-            return RigidTransform(x + away * c, y + away * s, 0.0)
-    return None
+        return Likeness()
+    looked, places, hits = 0, [], set[int]()
+    for number in in_time(analysis.standing.order.tolist(), deadline):
+        found = finished(analysis.looking(number, deadline))
+        looked += found is not None
+        if found is not None and found.similar_pose is not None:
+            places.append(Place(found.pose, found.similar_pose))
+            hits.update(look(analysis.segments, found.pose, ROBOT, np.random.default_rng(number)).hits.tolist())
+        if looked == tuning.PLACES:
+            break
+    if not places:
+        return Likeness(looked)
+    message = (
+        f"At {len(places)} of {looked} poses a laser with a range of {tuning.REACH:g} m sees the same as at another "
+        "pose of the map. There a scan alone is ambiguous: send a prior, or the scans of a drive."
+    )
+    return Likeness(looked, tuple(places), (Finding("looks_alike", message, tuple(sorted(hits))),))

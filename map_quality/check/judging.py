@@ -195,12 +195,10 @@ def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
         return
     if scale.agreeing < min(2, count) or scale.agreeing <= tuning.MANY * scale.usable:
         return
-    if scale.of_scans:
-        factor, unit = unit_mistake(1.0 / scale.factor, "scans")
-        remedy = f"divide the lengths of the scans by {factor:.4g}"
-    else:
-        factor, unit = unit_mistake(scale.factor, "map")
-        remedy = f"divide the map by {factor:.4g}, or multiply the scans by this factor"
+    of_scans, size = scale.of_scans, 1.0 / scale.factor if scale.of_scans else scale.factor
+    factor, unit = unit_mistake(size, "scans" if of_scans else "map")
+    remedy = f"divide the {'lengths of the scans' if of_scans else 'map'} by {factor:.4g}"
+    remedy += "" if of_scans else ", or multiply the scans by this factor"
     yield Finding("scale", f"{scale.agreeing} of {count} scans fit better at another scale: {remedy}.{unit}")
 
 

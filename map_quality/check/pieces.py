@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,18 +15,41 @@ from registration.layout import Floats, Records
 
 from ..views import in_time
 from . import tuning
-from .result import Finding
+from .result import Finding, FindingCode
 
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
+FAULTS: Mapping[FindingCode, str] = {
+    "short_pieces": f"are shorter than {100.0 * tuning.SHORT:g} cm, also together with the segments that they "
+    "continue. A search does not profit from them. Omit or join them.",
+    "doubled_faces": f"lie less than {100.0 * tuning.DOUBLE:g} cm from a parallel segment that faces the same way, or "
+    "faces them. Either one face of a wall is drawn twice, or the inside of a wall is drawn as free space. A scan fits "
+    "both segments. Keep one of them.",
+    "both_ways": "lie on another segment of the opposite direction: these walls have no thickness. Scans from both "
+    "sides fit better if the distance of the two faces is the thickness of the wall.",
+    "overlaps": "lie on others that run the same way: they are drawn twice. Remove one of them.",
+    "gaps": f"end {{least:g}} to {100.0 * tuning.GREATEST_GAP:g} cm before another segment: rays pass through the "
+    "gaps. Extend the segments until they meet.",
+}
+
+
 def drawing_findings(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
     """Yield findings about how the lines of a directed map are drawn; `near` are its walls next to others."""
-    yield from _short(index)
-    yield from _doubled(index, near)
-    yield from _overlapping(index, near, deadline)
-    yield from _gaping(index, deadline)
+    least = max(tuning.LEAST_GAP, tuning.GAP_SIGMAS * (index.sigma or 0.0))
+    found: dict[FindingCode, set[int]] = {
+        "short_pieces": segments_of(index, index.walls.longest < tuning.SHORT),
+        "doubled_faces": segments_of(index, near.doubled),
+        "both_ways": segments_of(index, near.opposite),
+        "overlaps": segments_of(index, near.overlapping) | _lapping(index),
+        "gaps": _gaping(index, least, deadline),
+    }
+    for code, segments in found.items():
+        if segments:
+            fraction = index.segments.lengths[list(segments)].sum() / index.segments.lengths[: index.directed].sum()
+            said = f"{len(segments)} segments, {100.0 * fraction:.2g} % of the length, "
+            yield Finding(code, said + FAULTS[code].format(least=100.0 * least), tuple(sorted(segments)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,80 +120,26 @@ def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
     near.overlapping[pairs[along & on_it & (shared > tuning.OVERLAP)]] = True
 
 
-def _short(index: MapIndex) -> Iterator[Finding]:
-    lengths = index.walls.longest
-    short = lengths < tuning.SHORT
-    if short.any():
-        share = lengths[short].sum() / lengths.sum()
-        found = segments_of(index, short)
-        yield Finding(
-            "short_pieces",
-            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * tuning.SHORT:g} "
-            "cm, also together with the segments that they continue. A search does not profit from them. Omit or join "
-            "them.",
-            found,
-        )
+def _gaping(index: MapIndex, least: float, deadline: Deadline) -> set[int]:
+    """Return segments whose ends nearly meet another: at no other end, on no other line, and yet near one.
 
-
-def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
-    if near.doubled.any():
-        found = segments_of(index, near.doubled)
-        yield Finding(
-            "doubled_faces",
-            f"{len(found)} segments lie less than {100.0 * tuning.DOUBLE:g} cm from a parallel segment that faces the "
-            "same way, or faces them. Either one face of a wall is drawn twice, or the inside of a wall is drawn as "
-            "free space. A scan fits both segments. Keep one of them.",
-            found,
-        )
-    if near.opposite.any():
-        found = segments_of(index, near.opposite)
-        yield Finding(
-            "both_ways",
-            f"{len(found)} segments lie on another segment of the opposite direction: these walls have no thickness. "
-            "Scans from both sides fit better if the distance of the two faces is the thickness of the wall.",
-            found,
-        )
-
-
-def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
-    found = set(segments_of(index, near.overlapping)) | _lapping(index, deadline)
-    if found:
-        yield Finding(
-            "overlaps",
-            f"{len(found)} segments lie on others that run the same way: they are drawn twice. Remove one of them.",
-            tuple(sorted(found)),
-        )
-
-
-def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
-    """Yield a finding if ends nearly meet another segment: at no other end, on no other line, and yet near one.
-
-    Ends are as uncertain as the walls: gaps within the declared error of the map are none.
+    Ends are as uncertain as the walls: gaps of at most `least` metres are within the declared error of the map.
     """
-    least = max(tuning.LEAST_GAP, tuning.GAP_SIGMAS * (index.sigma or 0.0))
-    if least >= tuning.GREATEST_GAP:
-        return
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
     _, first, counts = np.unique(ends, axis=0, return_index=True, return_counts=True)
     # A segment whose end is as near as this to its own begin is too short for the test.
     alone = np.sort(first[(counts == 1) & (index.segments.lengths[first // 2] > tuning.GREATEST_GAP)])
-    if not len(alone) or deadline.passed:
-        return
+    if least >= tuning.GREATEST_GAP or not len(alone) or deadline.passed:
+        return set()
     # After the end itself; infinite where there is none.
     distances, _ = scipy.spatial.cKDTree(ends).query(ends[alone], k=2, distance_upper_bound=tuning.GREATEST_GAP)
     nearest = np.asarray(distances)[:, 1]
-    loose, found = np.flatnonzero(nearest > least)[: tuning.MOST_ENDS], set()
+    loose, found = np.flatnonzero(nearest > least)[: tuning.MOST_ENDS], set[int]()
     for end, gap in in_time(zip(alone[loose].tolist(), nearest[loose].tolist(), strict=True), deadline):
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
         if apart > least + tuning.SAME_LINE and min(apart, gap) <= tuning.GREATEST_GAP:
             found.add(end // 2)
-    if found:
-        yield Finding(
-            "gaps",
-            f"{len(found)} segments end {100.0 * least:g} to {100.0 * tuning.GREATEST_GAP:g} cm before another "
-            "segment: rays pass through the gaps. Extend the segments until they meet.",
-            tuple(sorted(found)),
-        )
+    return found
 
 
 def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:
@@ -189,24 +158,19 @@ def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:
     return float(np.hypot(x, y).min(initial=np.inf))
 
 
-def _lapping(index: MapIndex, deadline: Deadline) -> set[int]:
+def _lapping(index: MapIndex) -> set[int]:
     """Return the segments of one wall that begin before another of it ends, and those others."""
-    starts, order = index.pieces.starts, index.pieces.items
-    ends = index.segments.shifted(-index.origin).endpoints
-    found: set[int] = set()
-    for wall in in_time(np.flatnonzero(np.diff(starts) > 1), deadline):
-        row, pieces = index.walls.rows[wall], order[starts[wall] : starts[wall + 1]]
-        d = np.array([row["dx"], row["dy"]])
-        begins, stops = ends[pieces, :2] @ d, ends[pieces, 2:] @ d
-        by = np.argsort(begins, kind="stable")
-        pieces, begins, stops = pieces[by], begins[by], stops[by]
-        reach = np.maximum.accumulate(stops)
-        # Which piece reaches so far: the last that reached farther than all before it.
-        farther = np.append(True, stops[1:] > reach[:-1])
-        last = np.maximum.accumulate(np.where(farther, np.arange(len(by)), 0))
-        lapping = np.flatnonzero(begins[1:] - reach[:-1] < -tuning.OVERLAP)
-        found.update(pieces[last[lapping]].tolist(), pieces[lapping + 1].tolist())
-    return found
+    wall = index.wall_of_piece[: index.directed]
+    rows, ends = index.walls.rows[wall], index.segments.shifted(-index.origin).endpoints[: index.directed]
+    directions = np.stack([rows["dx"], rows["dy"]], axis=1)
+    begins, stops = (np.einsum("ij,ij->i", ends[:, k : k + 2], directions) for k in (0, 2))
+    order = np.lexsort((begins, wall))
+    aside = 4.0 * index.diagonal * wall[order]  # walls one after the other, so that none reaches into the next
+    begins, stops = begins[order] + aside, stops[order] + aside
+    reach = np.maximum.accumulate(stops)
+    last = np.maximum.accumulate(np.where(stops >= reach, np.arange(len(order)), 0))  # the piece that reaches so far
+    lapping = np.flatnonzero(begins[1:] < reach[:-1] - tuning.OVERLAP)
+    return set(order[np.concatenate([last[lapping], lapping + 1])].tolist())
 
 
 def drawn_sigma(index: MapIndex) -> float | None:
@@ -223,12 +187,11 @@ def drawn_sigma(index: MapIndex) -> float | None:
     return round(step / math.sqrt(12.0), 4) if len(ends) >= tuning.MANY_ENDS and step <= tuning.LARGEST_PIXEL else None
 
 
-def segments_of(index: MapIndex, walls: NDArray[np.bool_] | NDArray[np.intp]) -> tuple[int, ...]:
+def segments_of(index: MapIndex, walls: Flags | Indices) -> set[int]:
     """Return the segments, as sent, that some walls consist of; `walls` are flags or indices."""
     chosen = np.zeros(len(index.walls.rows), dtype=bool)
     chosen[walls] = True
-    pieces = np.flatnonzero(chosen[index.wall_of_piece]) % index.directed
-    return tuple(np.unique(pieces).tolist())
+    return set((np.flatnonzero(chosen[index.wall_of_piece]) % index.directed).tolist())
 
 
 def longest_pieces(index: MapIndex) -> Indices:

@@ -140,7 +140,7 @@ def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:
             f"Directions contradict one another: {100.0 * sides.contradiction:.0f} % of the rays between segments "
             "start on a left side and end on a right side, or the reverse. If the lines are centre lines of walls, or "
             'have no directions, set "oriented": false.',
-            segments_of(index, sides.walls[sides.against.any(axis=1)]),
+            tuple(sorted(segments_of(index, sides.walls[sides.against.any(axis=1)]))),
         )
     elif wrong.any():
         found = segments_of(index, sides.walls[wrong])
@@ -148,5 +148,5 @@ def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:
             "mixed_directions",
             f"{len(found)} segments seem to have begin and end exchanged: most rays from their left meet the right "
             "side of other segments. Free space must lie on the left. Exchange their ends.",
-            found,
+            tuple(sorted(found)),
         )

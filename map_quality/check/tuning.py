@@ -46,8 +46,6 @@ MOST = 0.55  # of the length, measured: 0.42 at most in plans, from 0.60 on in m
 PLACES = 12  # tables
 RAYS = 360
 REACH = 12.0  # m, tables; of the laser that is thought of
-CLEARANCE = 1.5  # m; how far from a wall it stands at most
-LEAST_ROOM = 0.6  # m, tables; in front of a wall, for a robot to stand there
 SIGMA = 0.01  # m
 
 # --- Size -------------------------------------------------------------------------------------------------------------
