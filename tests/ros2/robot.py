@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,8 +21,6 @@ import numpy as np
 import linefix
 from ros2 import Maps, Node, NodeOptions, messages
 from ros2.clock import time_of
-from ros2.looking import Look
-from ros2.searching import OPTIONS
 from ros2.topics import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 ROOT = Path(__file__).parent.parent.parent
@@ -96,11 +94,6 @@ def odometry_at(
     message = messages.Odometry(messages.Header(at_second(second), frame), child)
     message.pose.pose = messages.Pose(messages.Point(at.x, at.y), quaternion(at.theta))
     return message
-
-
-def located(index: linefix.MapIndex, looks: Sequence[Look]) -> linefix.AssociationResult:
-    """Search scans together, as the bridge does."""
-    return linefix.locate(index, linefix.assemble([look.view for look in looks]), options=OPTIONS)
 
 
 def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:

@@ -15,7 +15,7 @@ from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
 from tests.association.scenes import known
 
-from .robot import SCANNER, WALLS, laser_scan, located
+from .robot import SCANNER, WALLS, laser_scan
 
 TRUTH = linefix.RigidTransform(1.0, 1.5, 0.4)  # of the laser
 MOUNT = linefix.RigidTransform(0.3, -0.1, 2.0)
@@ -27,7 +27,8 @@ def seen() -> messages.LaserScan:
 
 
 def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> linefix.AssociationResult:
-    return located(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)])
+    look = look_of(scan, mount, OdometryHistory(), IDENTITY, motion=True)
+    return linefix.locate(linefix.index_map(walls), linefix.assemble([look.view]))
 
 
 def test_its_covariance_is_that_of_the_client() -> None:

@@ -19,19 +19,7 @@ from ros2.topics import SENSOR, Publisher
 from tests.association.scenes import known
 from tests.linefix.moving import moving_ranges
 
-from .robot import (
-    BASE_FROM_LASER,
-    MAP_FROM_BASE,
-    ROOM,
-    WALLS,
-    Robot,
-    bridge,
-    is_at_truth,
-    laser_scan,
-    located,
-    mount,
-    running,
-)
+from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, WALLS, Robot, bridge, is_at_truth, laser_scan, mount, running
 
 SCANNER = linefix.simulation.Scanner.over(1.5 * math.pi, 720, sigma=0.01)
 SPEED = Speed(0.8, -0.1, 2.0)
@@ -168,7 +156,7 @@ def test_a_scanner_upside_down_moves_the_right_way_round() -> None:
     driven = OdometryHistory()
     driven.take(odometry(10))
     look = look_of(moving_scan(10, flipped=True), Mount(BASE_FROM_LASER, flipped=True), driven, IDENTITY, motion=True)
-    found = located(linefix.index_map(ROOM), [look])
+    found = linefix.locate(linefix.index_map(ROOM), linefix.assemble([look.view]))
     assert found.usable
     pose = known(found.pose)
     assert math.hypot(pose.x - MAP_FROM_BASE.x, pose.y - MAP_FROM_BASE.y) < 0.03

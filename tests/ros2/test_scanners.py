@@ -16,7 +16,7 @@ from ros2.options import NodeOptions
 from ros2.topics import SENSOR, Publisher
 from tests.association.scenes import known
 
-from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, located, odometry_at, quaternion, scan_from
+from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, odometry_at, quaternion, scan_from
 
 HERE = linefix.RigidTransform(0.0, 0.0, 0.0)
 FRONT, BACK = linefix.RigidTransform(0.3, 0.1, 0.0), linefix.RigidTransform(-0.3, -0.1, math.pi)
@@ -83,7 +83,8 @@ def gathered(*names: str, moved: bool = True, told: OdometryHistory | None = Non
     looks, missing = looks_of(
         [seen(name, 3, moved=moved) for name in names], where, NodeOptions(), told or OdometryHistory()
     )
-    return located(linefix.index_map(ROOM), looks), missing
+    together = linefix.assemble([look.view for look in looks])
+    return linefix.locate(linefix.index_map(ROOM), together), missing
 
 
 def test_odometry_says_how_the_robot_moved_between_them() -> None:
