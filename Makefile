@@ -133,7 +133,7 @@ PIN := -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-ind
 
 lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is made of them
 	$(BIN)/python $(PIN) --generate-hashes --extra formats --extra service pyproject.toml requirements/image.in -o requirements/runtime.txt
-	$(BIN)/python $(PIN) --extra service --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python $(PIN) --extra service --extra formats --extra batch --extra ray --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python $(PIN) --generate-hashes -c requirements/dev.txt --group build -o requirements/build.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --extra service --extra formats --group demo pyproject.toml -o requirements/demo.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt

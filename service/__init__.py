@@ -12,7 +12,7 @@ Each room imports only from those below it; import-linter holds them to that (`p
     admission/, maps/      who is let in; stored maps and their indices
     importing/             maps of other tools, read in a process with bounds of its own
     parsing/               from the bytes of a body to a checked request, large ones in another process
-    telemetry/             counts, traces and the log
+    telemetry/             counts and the log
     page/                  the files of the page at /, built
     database_location, errors, memory, thread_pool, version
 """

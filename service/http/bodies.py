@@ -17,7 +17,6 @@ from linefix.documents.limits import Limits
 from ..admission.budget import ByteAccount
 from ..errors import BodyTooSlowError, EncodingError, MediaTypeError
 from ..parsing.child import LARGE
-from ..telemetry.traces import stage
 from .exchange import JSON, Exchange, unless_hung_up
 
 T = TypeVar("T")
@@ -34,10 +33,9 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
     The deadline counts from the moment when the body is there.
     """
     async with receive(exchange) as data:
-        with stage("parse"):
-            if len(data) <= LARGE:
-                return reader(data, exchange.services.limits)
-            return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data), exchange.give_up)
+        if len(data) <= LARGE:
+            return reader(data, exchange.services.limits)
+        return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data), exchange.give_up)
 
 
 @asynccontextmanager

@@ -10,8 +10,6 @@ import logging
 import random
 import re
 import time
-from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING
 from unicodedata import category
 
 from starlette.requests import Request
@@ -24,9 +22,6 @@ from .connection import Connection
 from .exchange import KEY, Exchange, HangUpError
 from .problems import RAISED, as_ours, problem_or_defect
 from .services import Services
-
-if TYPE_CHECKING:
-    from opentelemetry.trace import Span
 
 logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
@@ -79,12 +74,7 @@ class RequestMiddleware:
         except (ServiceError, RequestError) as error:
             await self._refuse(error, exchange, connection, scope)
             return
-        traces = self._services.traces
-        traced: AbstractContextManager[Span | None] = (
-            nullcontext() if traces is None else traces.request(scope["headers"])
-        )
-        with traced as span:
-            await self._serve(exchange, connection, scope["method"], span)
+        await self._serve(exchange, connection, scope["method"])
 
     async def _refuse(self, error: Exception, exchange: Exchange, connection: Connection, scope: Scope) -> None:
         """Answer in place of the application; counted, and logged once a second."""
@@ -97,7 +87,7 @@ class RequestMiddleware:
         problem = problem_or_defect(error, exchange.request_id)
         await problem.response(exchange.request_id)(scope, connection.receive, connection.send)
 
-    async def _serve(self, exchange: Exchange, connection: Connection, method: str, span: Span | None) -> None:
+    async def _serve(self, exchange: Exchange, connection: Connection, method: str) -> None:
         scope, started = exchange.request.scope, time.perf_counter()
         try:
             await self._app(scope, connection.receive, connection.send)
@@ -112,18 +102,14 @@ class RequestMiddleware:
         finally:
             exchange.held.close()
             self._services.gate.leave(exchange.ticket)
-            self._report(exchange, method, connection.status, time.perf_counter() - started, span)
+            self._report(exchange, method, connection.status, time.perf_counter() - started)
 
-    def _report(self, exchange: Exchange, method: str, status: int, seconds: float, span: Span | None) -> None:
+    def _report(self, exchange: Exchange, method: str, status: int, seconds: float) -> None:
         """Count and log a request; status 0 is a client that hung up before it was answered."""
         route = getattr(exchange.request.scope.get("route"), "path", OTHER)
         self._services.metrics.observe_request(route, method, status, seconds)
         usual = {"method": method, "route": route, "status": status, "ms": round(1e3 * seconds, 3)}
         logger.info("request", extra={"request_id": exchange.request_id, **usual, **exchange.noted})
-        if span is not None:
-            span.update_name(f"{method} {route}")
-            span.set_attributes({"http.request.method": method, "http.route": route})
-            span.set_attributes({"http.response.status_code": status, "linefix.request_id": exchange.request_id})
 
 
 def _id_of(headers: list[tuple[bytes, bytes]]) -> str:

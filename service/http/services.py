@@ -12,7 +12,6 @@ from ..maps.lookup import MapLookup
 from ..parsing.child import Child
 from ..settings import Settings
 from ..telemetry.metrics import Metrics, RefusalTally
-from ..telemetry.traces import traces_of_environment
 from ..thread_pool import Threads
 from ..work.results import Associator
 from .readiness import Readiness
@@ -37,8 +36,6 @@ class Services:
         For large bodies.
     import_bounds : Bounds
         That reading a map of another tool is held to.
-    traces : Traces, or None
-        None where no traces are requested.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -74,7 +71,6 @@ class Services:
         self.parse_threads, self.store_threads, self.key_threads = (
             Threads(count, name) for count, name in ((2, "parse"), (4, "store"), (1, "keys"))
         )
-        self.traces = traces_of_environment()
         for name, what, read in (
             ("workers_ready", "Processes that take requests", lambda: self.readiness.takes_requests),
             ("searches_running", "Searches that run", lambda: self.gate.running),
@@ -110,5 +106,3 @@ class Services:
         for threads in (self.parse_threads, self.store_threads, self.key_threads, self.readiness):
             threads.close()
         self.store.close()
-        if self.traces is not None:
-            self.traces.close()

@@ -18,7 +18,6 @@ from linefix.operations import Json, Target, require_time
 from ..errors import StoreAwayError, UnknownMapError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMaps
-from ..telemetry.traces import queued, stage
 from ..work.job import Operation, begin, take_turn
 from .exchange import Exchange
 from .services import Services
@@ -86,16 +85,15 @@ async def index(exchange: Exchange, found: FoundMaps, *, oriented: bool | None) 
     `MapLookup.indexed`, and `DeadlinePassedError`.
     """
     services = exchange.services
-    with stage("index"):
-        require_time(exchange.deadline)
-        ready = services.lookup.cached(found, oriented=oriented)
-        if ready is not None:
-            return ready
-        build = partial(services.lookup.indexed, found, oriented=oriented, deadline=exchange.deadline)
-        with services.documents.account(exchange.ticket.holder) as account:
-            account.take(found.unread_bytes)
-            gate = services.indexing if services.lookup.takes_long(found) else services.gate
-            return await gate.run(queued(build), exchange.deadline, exchange.ticket)
+    require_time(exchange.deadline)
+    ready = services.lookup.cached(found, oriented=oriented)
+    if ready is not None:
+        return ready
+    build = partial(services.lookup.indexed, found, oriented=oriented, deadline=exchange.deadline)
+    with services.documents.account(exchange.ticket.holder) as account:
+        account.take(found.unread_bytes)
+        gate = services.indexing if services.lookup.takes_long(found) else services.gate
+        return await gate.run(build, exchange.deadline, exchange.ticket)
 
 
 async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:
@@ -119,7 +117,7 @@ async def ask_store(services: Services, call: Callable[[], T], deadline: Deadlin
 
 async def in_search_slot(exchange: Exchange, call: Callable[[], T]) -> T:
     """Run a part of this request in a slot of the gate; an admitted request is not refused later."""
-    return await exchange.services.gate.run(queued(call), exchange.deadline, exchange.ticket)
+    return await exchange.services.gate.run(call, exchange.deadline, exchange.ticket)
 
 
 async def in_search_slots(
@@ -160,7 +158,7 @@ async def in_turns(exchange: Exchange, operation: Operation, found: FoundMaps, *
     services, deadline = exchange.services, exchange.deadline
     ready = await index(exchange, found, oriented=oriented)
     # To read a request does not look at the deadline, so it takes no slot of a search.
-    beginning = queued(partial(begin, operation, ready, found, exchange))
+    beginning = partial(begin, operation, ready, found, exchange)
     turn = partial(take_turn, await services.indexing.run(beginning, deadline, exchange.ticket), deadline)
     answer, in_time = None, True
     while answer is None:

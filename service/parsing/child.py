@@ -39,8 +39,8 @@ END_SECONDS = 1.0
 LOOK_SECONDS = 0.05  # between two looks whether anybody waits
 MAPPED_BYTES = 1_000_000_000  # of address space in addition to the memory: libraries, and room that is never used
 MOST_OPEN = 64  # files
-# Variables of the environment for the service alone: keys, their paths, passwords of databases and of collectors.
-PRIVATE = ("LINEFIX_", "PG", "OTEL_")
+# Variables of the environment for the service alone: keys, their paths, passwords of databases.
+PRIVATE = ("LINEFIX_", "PG")
 SHARED = ("LINEFIX_KERNELS",)
 # By `python -m` what stands in the working folder would come first: another checkout, or anybody's `service.py`.
 PROGRAM = "import sys; sys.path[:] = {path!r}; from service.parsing import child; child.main(*sys.argv[1:])"

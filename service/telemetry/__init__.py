@@ -1,1 +1,1 @@
-"""Output for an operator: counts, the log, and traces."""
+"""Output for an operator: counts and the log."""

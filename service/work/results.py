@@ -20,7 +20,6 @@ from map_quality import check_map
 from ..importing.bounded import ReadFiles
 from ..maps.lookup import MapLookup, outline_of
 from ..telemetry.metrics import Metrics
-from ..telemetry.traces import stage
 from .job import Job
 
 
@@ -67,8 +66,7 @@ class Associator:
         watch: Stopwatch,
     ) -> Json:
         """Find a scan in a map; raises as `linefix.operations.find`."""
-        with stage("search"):
-            result, answer = find(target, sought, options, deadline, watch)
+        result, answer = find(target, sought, options, deadline, watch)
         seconds = 1e-3 * watch.milliseconds("search")
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
         return answer

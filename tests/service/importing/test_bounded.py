@@ -85,7 +85,7 @@ def test_where_the_extra_is_missing_it_is_named_and_no_secret_is_read(
         "raise ModuleNotFoundError('contourpy')"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    private = "LINEFIX_KEYS LINEFIX_KEYS_FILE LINEFIX_DATABASE_URL PGPASSWORD OTEL_EXPORTER_OTLP_HEADERS"
+    private = "LINEFIX_KEYS LINEFIX_KEYS_FILE LINEFIX_DATABASE_URL PGPASSWORD"
     for name in private.split():
         monkeypatch.setenv(name, "sesame")
     with pytest.raises(FormatsMissingError, match=r"lacks the extra `formats`"):
