@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from association import AssociationResult, Deadline, MapSet
-from map_quality import check_map, finished
+from association import AssociationResult, MapSet
+from map_quality import check_map
 
 from . import operations
 from .analyzing import Progress, look_on_all_cores
@@ -28,7 +28,7 @@ from .documents.requests import (
 )
 from .documents.updates import UpdateRequest
 from .driving import Explanation, explain_search, search
-from .operations import Json, Search, Steps, Stopwatch, Target, require_time
+from .operations import Json, Search, Stopwatch, Target, require_time, worked
 
 if TYPE_CHECKING:
     from formats import ImportedMap
@@ -108,7 +108,7 @@ class LocalService:
         drawn, reference = self._map_at(on)
         deadline = watch.deadline(asked.deadline_ms, self.deadline_ms)
         steps = operations.check_steps(inputs.index_of(drawn, oriented=True), drawn.oriented, asked, deadline)
-        return _sealed(watch, _worked(steps, watch, deadline), map=reference, client_ref=asked.client_ref)
+        return _sealed(watch, worked(steps, watch, deadline), map=reference, client_ref=asked.client_ref)
 
     def update_map(self, on: Json, document: Json) -> Json:
         """Return the answer of ``POST /v1/maps/{map_id}:update`` for the map of a request."""
@@ -117,7 +117,7 @@ class LocalService:
         old, reference = self._map_at(on)
         deadline = watch.deadline(asked.deadline_ms)
         steps = operations.update_steps(inputs.index_of(old), old, asked, deadline)
-        return _sealed(watch, _worked(steps, watch, deadline), based_on=reference, client_ref=asked.client_ref)
+        return _sealed(watch, worked(steps, watch, deadline), based_on=reference, client_ref=asked.client_ref)
 
     def check_import(self, imported: ImportedMap, watch: Stopwatch) -> Json:
         """Return the answer of ``POST /v1/maps:import`` for a map that was read."""
@@ -161,16 +161,6 @@ class LocalService:
     def _document_of(self, on: InlineMap | StoredMap) -> tuple[MapDocument, Json | None]:
         """Return a map, and the id and revision of a stored one."""
         return (on, None) if isinstance(on, InlineMap) else self.stored(on.map_id)
-
-
-def _worked(steps: Steps, watch: Stopwatch, deadline: Deadline) -> Json:
-    """Take all steps of an operation."""
-    next(steps)
-    watch.lap("decode")
-    require_time(deadline)
-    answer = finished(steps)
-    watch.lap("search")
-    return answer
 
 
 def _sealed(watch: Stopwatch, answer: Json, **given: Any) -> Json:

@@ -19,7 +19,7 @@ from association import (
     MapSet,
     Scan,
 )
-from map_quality import apply_changes, updating
+from map_quality import apply_changes, finished, updating
 from registration import InputError, Segments, register, register_estimating
 
 from .analyzing import looks
@@ -38,7 +38,7 @@ T = TypeVar("T")
 Json = dict[str, Any]
 Search = Callable[[MapIndex | MapSet, Scan, KnownOfMaps, AssociationOptions, Deadline], AssociationResult]
 Steps = Generator[None, None, Json]
-"""Work on an answer; between steps others may have their turn."""
+"""Work on an answer; the first step reads the request, and the others look at the deadline."""
 
 
 class Stopwatch:
@@ -156,8 +156,28 @@ def vectorized(asked: VectorizeRequest, watch: Stopwatch) -> Json:
     return results.vectorization_json(*found)
 
 
+def worked(steps: Steps, watch: Stopwatch, deadline: Deadline) -> Json:
+    """Take all steps of an operation, and return its answer.
+
+    Raises
+    ------
+    DeadlinePassedError
+        When the deadline passes before the request is read.
+    CancelledError
+        When the deadline was cancelled.
+    """
+    next(steps)
+    watch.lap("decode")
+    require_time(deadline)
+    answer = finished(steps)
+    watch.lap("search")
+    if deadline.cancelled:
+        raise CancelledError
+    return answer
+
+
 def analysis_steps(index: MapIndex, asked: AnalyzeRequest, deadline: Deadline) -> Steps:
-    """Analyze a map; of this and the following the first step reads the request, and the others look at the deadline.
+    """Return the steps of an analysis of a map.
 
     Raises
     ------

@@ -31,10 +31,6 @@ class NotHttpError(ServiceError):
     message = "the request is not valid HTTP/1.1 (RFC 9112), or has an unknown method; send it with an HTTP client"
 
 
-class ControlCharacterError(ServiceError):
-    """A control character in the path."""
-
-
 class BodyBrokenError(ServiceError):
     """The body ends before the length that its head announces, or its chunks are no chunks."""
 
@@ -73,12 +69,6 @@ class BodyTooSlowError(ServiceError):
 
     def __init__(self, seconds: float) -> None:
         super().__init__(f"the request did not arrive within {seconds:g} s; send it faster, or a smaller one")
-
-
-class RefusedError(ServiceError):
-    """Anything else that the framework refuses."""
-
-    message = "the request does not match the API; see /openapi.json for its form"
 
 
 class ParserEndedError(ServiceError):

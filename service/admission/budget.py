@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from ..errors import ShareHeldError, TooMuchHeldError
 from .keys import Holder
+
+Take = Callable[[int], None]
+"""Counts more bytes of one request as held; negative ones are given back. Raises `ShareHeldError`, `TooMuchHeldError`.
+"""
 
 
 class ByteBudget:
@@ -19,48 +23,34 @@ class ByteBudget:
     """
 
     def __init__(self, most: int, least_share: int = 0) -> None:
-        self.most = most
-        self.share = max(most // 2, least_share)
-        self.lock = threading.Lock()
-        self.held_by: Counter[Holder] = Counter()
+        self._most = most
+        self._share = max(most // 2, least_share)
+        self._lock = threading.Lock()
+        self._held_by: Counter[Holder] = Counter()
         self.held = 0
 
     @contextmanager
-    def account(self, holder: Holder = None) -> Iterator[ByteAccount]:
-        """Give the account of one request; its bytes are given back when the block ends."""
-        account = ByteAccount(self, holder)
+    def account(self, holder: Holder = None) -> Iterator[Take]:
+        """Give the function that counts the bytes of one request; they are given back when the block ends."""
+        taken = 0
+
+        def take(count: int) -> None:
+            nonlocal taken
+            self._take(holder, count)
+            taken += count
+
         try:
-            yield account
+            yield take
         finally:
-            account.take(-account.taken)
+            self._take(holder, -taken)
 
-
-class ByteAccount:
-    """The bytes that one request holds of the budget."""
-
-    def __init__(self, budget: ByteBudget, holder: Holder) -> None:
-        self._budget = budget
-        self._holder = holder
-        self.taken = 0
-
-    def take(self, count: int) -> None:
-        """Count more bytes as held; negative ones are given back.
-
-        Raises
-        ------
-        ShareHeldError
-            When the holder would have more than its share.
-        TooMuchHeldError
-            When all together would hold too many.
-        """
-        budget = self._budget
-        with budget.lock:
-            if count > 0 and budget.held_by[self._holder] + count > budget.share:
+    def _take(self, holder: Holder, count: int) -> None:
+        with self._lock:
+            if count > 0 and self._held_by[holder] + count > self._share:
                 raise ShareHeldError
-            if count > 0 and budget.held + count > budget.most:
+            if count > 0 and self.held + count > self._most:
                 raise TooMuchHeldError
-            budget.held += count
-            budget.held_by[self._holder] += count
-            self.taken += count
-            if not budget.held_by[self._holder]:
-                del budget.held_by[self._holder]
+            self.held += count
+            self._held_by[holder] += count
+            if not self._held_by[holder]:
+                del self._held_by[holder]

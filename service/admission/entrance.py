@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
-from urllib.parse import urlsplit
 
 from linefix.documents.errors import BodyTooLargeError
 
-from ..errors import ForeignHostError, ForeignOriginError, MissingRoleError, UnknownMapError
+from ..errors import ForeignHostError, ForeignOriginError, MissingRoleError, NotHttpError, UnknownMapError
 from .gate import Gate, Ticket
 from .keys import EVERY_ROLE, Grant, Keyring, Role
 
@@ -27,9 +26,9 @@ LIMITS = GUARDED + "limits"
 MAPS = GUARDED + "maps/"
 ROLES = {"GET": Role.READ, "HEAD": Role.READ, "POST": Role.ASSOCIATE, "PUT": Role.WRITE, "DELETE": Role.WRITE}
 """The role that a method requires. A POST searches, converts or checks its content, and never stores it."""
-_READ = frozenset((b"host", b"origin", b"sec-fetch-site"))
 _HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")
-_PORTS = {"http": 80, "https": 443}
+_TWO_LENGTHS = {b"transfer-encoding", b"content-length"}
+_PLAIN_HOST = re.compile(r"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 
 
 class Entrance:
@@ -53,6 +52,8 @@ class Entrance:
 
         Raises
         ------
+        NotHttpError
+            When two servers could read it in two ways.
         ForeignHostError, ForeignOriginError
             When the request may come from a web page in a browser, and the service has no keys.
         MissingKeyError, UnknownKeyError
@@ -65,22 +66,25 @@ class Entrance:
             When there is no place for a search.
         """
         method, path, headers = head["method"], head["path"], head["headers"]
+        # h11 has refused two hosts, two lengths, no host in HTTP/1.1, and codings other than chunked.
+        fields = {name: value.decode("latin-1").strip() for name, value in headers}
+        _require_plain(path, fields)
         if not self._keyring.guarded:  # a page of another site has no key
-            self._require_own_page(headers)
+            self._require_own_page(fields)
         grant, searches = Grant(), False
         if path.startswith(GUARDED):
             grant = self._keyring.grant(headers, head.get("client"))
             _require(grant, method, path)
             searches = method == "POST" or (path.endswith(":check") and method in ("GET", "HEAD"))
         if method in ("POST", "PUT"):
-            for name, value in headers:
-                if name == b"content-length" and value.isdigit() and int(value) > self._max_body_bytes:
-                    raise BodyTooLargeError(self._max_body_bytes)
+            length = fields.get(b"content-length", "0")
+            if length.isdecimal() and int(length) > self._max_body_bytes:
+                raise BodyTooLargeError(self._max_body_bytes)
         if searches:
             self._gate.require_place(grant.holder)
         return Ticket(grant.holder, grant.maps)
 
-    def _require_own_page(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
+    def _require_own_page(self, fields: Mapping[bytes, str]) -> None:
         """Refuse requests that the page of another site may have sent.
 
         Raises
@@ -91,18 +95,31 @@ class Entrance:
         ForeignOriginError
             When the browser's headers name another site's page as the sender.
         """
-        sent = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _READ}
-        host, origin = sent.get(b"host"), sent.get(b"origin")
-        if host is not None and not self._is_known(host):
+        host, origin = fields.get(b"host", "").lower(), fields.get(b"origin", "").lower()
+        if b"host" in fields and not self._is_known(host):
             raise ForeignHostError
         if origin in self._origins:
             return
-        if sent.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
+        # A browser leaves the usual port out of both; the scheme may be that of a proxy.
+        is_foreign = b"origin" in fields and origin.partition("://")[2] != host
+        if is_foreign or fields.get(b"sec-fetch-site", "").lower() == "cross-site":
             raise ForeignOriginError
 
     def _is_known(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
         return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
+
+
+def _require_plain(path: str, fields: Mapping[bytes, str]) -> None:
+    """Refuse control characters, and what two servers could read in two ways and ours takes: RFC 9112, 3.2 and 6.1.
+
+    A router that looks for the end of a line takes ``/metrics%0A`` for ``/metrics``; the rule of a proxy for that path
+    does not.
+    """
+    if fields.keys() >= _TWO_LENGTHS or not _PLAIN_HOST.fullmatch(fields.get(b"host", "")):
+        raise NotHttpError
+    if not path.isprintable():
+        raise NotHttpError("the path has a control character, or another one that is not printed; remove it")
 
 
 def _require(grant: Grant, method: str, path: str) -> None:
@@ -124,13 +141,3 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_same(origin: str, host: str | None) -> bool:
-    """Return whether a page's origin is the host of its request, whichever scheme a proxy before it speaks."""
-    try:
-        page, asked = urlsplit(origin), urlsplit(f"//{host or ''}")
-        usual = _PORTS.get(page.scheme)
-        return bool(page.hostname) and (page.hostname, page.port or usual) == (asked.hostname, asked.port or usual)
-    except ValueError:
-        return False

@@ -3,44 +3,42 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import zlib
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 from functools import partial
+from io import BytesIO
 from typing import TypeVar
-
-from starlette.requests import Request
 
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
 from linefix.documents.limits import Limits
 
-from ..admission.budget import ByteAccount
-from ..errors import BodyTooSlowError, EncodingError, MediaTypeError
+from ..admission.budget import Take
+from ..errors import BodyBrokenError, BodyTooSlowError, EncodingError, MediaTypeError
 from ..parsing.child import LARGE
-from .exchange import JSON, Exchange, unless_hung_up
+from .exchange import JSON, Exchange
 
 T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]
 """A function from JSON to a checked request; a module's function, so that another process can call it."""
 FORM = "multipart/form-data"
 _PIECE = 1 << 20  # bytes that are unpacked at a time
-_GZIP = zlib.MAX_WBITS | 16
 
 
 async def read(exchange: Exchange, reader: Reader[T]) -> T:
-    """Receive the body and check it, off the event loop where that takes long.
+    """Receive the body and check it, off the event loop where that takes long; raises as `receive`.
 
     The deadline counts from the moment when the body is there.
     """
-    async with receive(exchange) as data:
+    with exchange.services.bodies.account(exchange.ticket.holder) as take:
+        data = await receive(exchange, take)
         if len(data) <= LARGE:
             return reader(data, exchange.services.limits)
-        return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data), exchange.give_up)
+        return await exchange.unless_hung_up(parse(exchange, reader, data))
 
 
-@asynccontextmanager
-async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[bytearray]:
-    """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends.
+async def receive(exchange: Exchange, take: Take, taken: str = JSON) -> bytearray:
+    """Receive the body, of the media type that is `taken`, and unpack it; `take` counts its bytes as held.
 
     Raises
     ------
@@ -50,28 +48,33 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
         When it is larger than allowed.
     TooMuchHeldError, ShareHeldError
         When too much of all requests, or of this holder's, is in memory already.
-    BodyTooSlowError
-        When it does not come in time.
+    BodyBrokenError, BodyTooSlowError
+        When it does not come whole, or not in time.
     NotJsonError
         When it is not gzip as its head states.
     """
-    services, request, settings = exchange.services, exchange.request, exchange.services.settings
-    gzipped = is_gzip(request, form=form, guarded=settings.guarded)
-    with services.bodies.account(exchange.ticket.holder) as account:
-        seconds = settings.request_timeout_s
-        data = await receive_body(
-            request, exchange.arrived, account, max_bytes=settings.max_body_bytes, timeout=seconds
-        )
-        if request.method == "POST":
-            services.gate.enter(exchange.ticket)
-        exchange.begin()
-        if gzipped:
-            packed = data
-            call = partial(unpack, packed, settings.max_body_bytes, account.take)
-            data = await services.parsing.run(call, exchange.deadline, exchange.ticket)
-            account.take(-len(packed))
-            packed.clear()
-        yield data
+    services, settings = exchange.services, exchange.services.settings
+    gzipped, data, more = _is_gzip(exchange, taken), bytearray(), True
+    try:
+        async with asyncio.timeout_at(exchange.arrived + settings.request_timeout_s):
+            while more:
+                message = await exchange.receive()
+                if message["type"] != "http.request":  # from the server, malformed chunks look the same
+                    raise BodyBrokenError
+                piece, more = message.get("body", b""), message.get("more_body", False)
+                _require_within(len(data) + len(piece), settings.max_body_bytes)
+                take(len(piece))
+                data += piece
+    except TimeoutError:
+        raise BodyTooSlowError(settings.request_timeout_s) from None
+    if exchange.scope["method"] == "POST":
+        services.gate.enter(exchange.ticket)
+    exchange.begin()
+    if gzipped:
+        packed = data
+        data = await exchange.run(partial(unpack, packed, settings.max_body_bytes, take), services.parsing)
+        take(-len(packed))
+    return data
 
 
 async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray) -> T:
@@ -82,97 +85,53 @@ async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray) 
     services = exchange.services
     if len(data) <= LARGE:
         return reader(data, services.limits)
-    call = partial(services.parser.call, reader, data, services.limits)
-    return await services.parsing.run(call, exchange.deadline, exchange.ticket)
+    return await exchange.run(partial(services.parser.call, reader, data, services.limits), services.parsing)
 
 
-async def receive_body(
-    request: Request, arrived: float, account: ByteAccount, *, max_bytes: int, timeout: float
-) -> bytearray:
-    """Receive a body whole, so many seconds after its first byte had arrived; raises as `receive`."""
-    data = bytearray()
-    try:
-        async with asyncio.timeout_at(arrived + timeout):
-            async for piece in request.stream():
-                if len(data) + len(piece) > max_bytes:
-                    raise BodyTooLargeError(max_bytes)
-                account.take(len(piece))
-                data += piece
-    except TimeoutError:
-        raise BodyTooSlowError(timeout) from None
-    return data
-
-
-def unpack(packed: bytes | bytearray, max_bytes: int, take: Callable[[int], None]) -> bytearray:
-    """Return what one gzip member holds; takes a while for a large one.
-
-    Parameters
-    ----------
-    packed : bytes or bytearray
-    max_bytes : int
-        That it may unpack to; more is never held.
-    take : callable
-        Called with the number of further bytes, piece by piece; an exception from it ends this.
+def unpack(packed: bytearray, max_bytes: int, take: Take) -> bytearray:
+    """Return what gzip holds, never more than `max_bytes`; takes a while for a large one.
 
     Raises
     ------
     NotJsonError
-        When it is not gzip, is cut short, or something follows it.
+        When it is not gzip, or is cut short.
     BodyTooLargeError
         When it unpacks to more than is allowed.
     """
     unpacked = bytearray()
-    stream = zlib.decompressobj(wbits=_GZIP)
-    whole = memoryview(packed)
     try:
-        for begin in range(0, len(whole), _PIECE):
-            rest: bytes | memoryview = whole[begin : begin + _PIECE]
-            while rest and not stream.eof:
-                piece = stream.decompress(rest, min(_PIECE, max_bytes + 1 - len(unpacked)))
+        with gzip.GzipFile(fileobj=BytesIO(packed)) as stream:
+            while piece := stream.read(min(_PIECE, max_bytes + 1 - len(unpacked))):
                 take(len(piece))
                 unpacked += piece
-                rest = stream.unconsumed_tail
-                if len(unpacked) > max_bytes:
-                    raise BodyTooLargeError(max_bytes)
-            if stream.eof and (stream.unused_data or begin + _PIECE < len(whole)):
-                raise NotJsonError("more bytes follow the gzip body; expected a single gzip member")
-        unpacked += stream.flush()
-    except zlib.error:
+                _require_within(len(unpacked), max_bytes)
+    except EOFError:
+        raise NotJsonError("the gzip body is cut short; send it completely") from None
+    except (gzip.BadGzipFile, zlib.error):
         raise NotJsonError(
             "the body is not gzip, but Content-Encoding states it; send gzip, or omit the header"
         ) from None
-    if not stream.eof:
-        raise NotJsonError("the gzip body is cut short; send it completely")
     return unpacked
 
 
-def is_gzip(request: Request, *, form: bool, guarded: bool) -> bool:
+def _require_within(size: int, max_bytes: int) -> None:
+    if size > max_bytes:
+        raise BodyTooLargeError(max_bytes)
+
+
+def _is_gzip(exchange: Exchange, taken: str) -> bool:
     """Return whether a body is gzip; refuse media types and encodings that are not supported.
 
-    Parameters
-    ----------
-    request : Request
-    form : bool
-        True when it is to be a form with files; else it is to be JSON.
-    guarded : bool
-        True when the service has keys. Without them a POST has to name its media type. A browser that sends a POST for
-        the page of another site cannot name JSON without a preflight request.
-
-    Raises
-    ------
-    MediaTypeError, EncodingError
+    Without keys of the service, a POST has to name its media type. A browser that sends a POST for the page of
+    another site cannot name JSON without a preflight request.
     """
-    taken = FORM if form else JSON
-    content_type = request.headers.get("content-type", taken if guarded or request.method != "POST" else "")
-    media_type = content_type.split(";")[0].strip().lower()
-    if media_type != FORM if form else not _is_json(media_type):
+    headers = exchange.headers
+    unnamed = "" if exchange.scope["method"] == "POST" and not exchange.services.settings.guarded else taken
+    kind = headers.get("content-type", unnamed).partition(";")[0].strip().lower()
+    if kind != taken and not (taken == JSON and kind.startswith("application/") and kind.endswith("+json")):
         raise MediaTypeError(taken)
-    encodings = [part.strip().lower() for part in request.headers.get("content-encoding", "").split(",")]
+    encodings = [part.strip() for part in headers.get("content-encoding", "").lower().split(",")]
     encodings = [part for part in encodings if part not in ("", "identity")]
     if encodings not in ([], ["gzip"], ["x-gzip"]):
         raise EncodingError
     return bool(encodings)
-
-
-def _is_json(media_type: str) -> bool:
-    return media_type == JSON or (media_type.startswith("application/") and media_type.endswith("+json"))

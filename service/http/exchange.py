@@ -1,24 +1,29 @@
 """One request while it is served, from its head to its line in the log; routes get it by `Depends`.
 
 `middleware` makes and ends it, `bodies` reads its body, `stages` has its map looked up and searched, `respond` answers.
+
+A server that closes a connection with bytes unread has the system reset it, and the reset overtakes the answer: the
+client sees a broken connection in place of a refusal. So the rest of a body that no route reads is dropped first. Data
+that is handed to the server waits in its memory for as long as the client takes to read it: a large answer goes in
+pieces.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeVar
 
-from fastapi import Depends
-from starlette.requests import Request
+from fastapi import Depends, Request
+from starlette.datastructures import Headers
 from starlette.responses import Response
-from starlette.types import Receive, Scope
+from starlette.types import Message, Receive, Scope, Send
 
 from linefix.operations import Stopwatch
 
-from ..admission.gate import Ticket
+from ..admission.gate import Gate, Ticket
 from ..work.job import Job
 from .services import Services
 
@@ -27,31 +32,107 @@ KEY = "exchange"
 """Key of the exchange in the state of a request's scope."""
 JSON = "application/json"
 WATCH_AFTER = 0.02  # s until the connection is watched: most answers are ready earlier
-LARGE = 65_536  # bytes of an answer that are counted until the client has read them
+DROP_SECONDS = 3.0  # s that the rest of a body may take to come
+STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
+PIECE = 32_768  # bytes of an answer; the server holds a few pieces
+LARGE = 65_536  # bytes of an answer; a smaller one is handed over in one piece, a larger one counts until it was read
+BODY = {b"content-length", b"transfer-encoding"}
+ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
+CLOSE = (b"connection", b"close")
+
+
+class HangUpError(Exception):
+    """The client hung up; no answer can be sent."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Exchange(Job):
-    """One request.
+    """One request and its answer.
 
     Attributes
     ----------
     services : Services
         Of its application.
-    request : Request
+    scope : Scope
+    source, sink : callable
+        `receive` and `send` of the server.
     arrived : float
         When its head arrived, by the event loop's clock, seconds.
     ticket : Ticket
         Its admission.
     held : ExitStack
         Accounts of bytes that are given back when the exchange ends.
+    status : int
+        Of the answer; 0 until it begins.
+    unread : bool
+        True while parts of the body may come.
+    is_strangers : bool
+        True when the connection is to end with the answer.
     """
 
     services: Services
-    request: Request
+    scope: Scope
+    source: Receive
+    sink: Send
     arrived: float
     ticket: Ticket = field(default_factory=Ticket)
     held: ExitStack = field(default_factory=ExitStack)
+    status: int = 0
+    unread: bool = False
+    is_strangers: bool = False
+
+    def __post_init__(self) -> None:
+        names = {name for name, _ in self.scope["headers"]}
+        # A client that waits for "100 Continue" has sent nothing yet.
+        self.unread = not names.isdisjoint(BODY) and b"expect" not in names
+
+    @property
+    def headers(self) -> Headers:
+        """The headers of the request."""
+        return Headers(scope=self.scope)
+
+    async def receive(self) -> Message:
+        """Return the next message of the server."""
+        message = await self.source()
+        self.unread = message["type"] == "http.request" and message.get("more_body", False)
+        return message
+
+    async def send(self, message: Message) -> None:
+        """Send the head of an answer with the headers that all have, or a part of its body.
+
+        Raises
+        ------
+        HangUpError
+            When the client has taken no more of a large one for `request_timeout_s`.
+        """
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            await self._drop_rest()  # the server would read on without end
+            ends = (CLOSE,) if self.unread or self.is_strangers else ()
+            own = (b"x-request-id", self.request_id.encode("ascii"))
+            await self.sink({**message, "headers": [*message.get("headers", ()), own, *ALWAYS, *ends]})
+            return
+        body, more = memoryview(message.get("body", b"")), message.get("more_body", False)
+        if len(body) <= LARGE and not more:
+            await self.sink(message)
+            return
+        for begin in range(0, len(body), PIECE):
+            piece, rest = bytes(body[begin : begin + PIECE]), more or begin + PIECE < len(body)
+            try:
+                async with asyncio.timeout(self.services.settings.request_timeout_s):
+                    await self.sink({"type": "http.response.body", "body": piece, "more_body": rest})
+            except TimeoutError:
+                raise HangUpError from None  # the server ends the connection
+
+    async def _drop_rest(self) -> None:
+        """Read the rest of the body and drop it, as far as it comes soon and is not too much."""
+        if not self.unread:
+            return
+        dropped, most = 0, STRANGERS_BYTES if self.is_strangers else self.services.settings.max_body_bytes
+        with suppress(TimeoutError):
+            async with asyncio.timeout(DROP_SECONDS):
+                while self.unread and dropped <= most:
+                    dropped += len((await self.receive()).get("body", b""))
 
     def begin(self) -> None:
         """Start the watch, since the body has arrived, and the service's own deadline."""
@@ -62,13 +143,13 @@ class Exchange(Job):
         """Take the deadline of the request, at most the service's own; None: that."""
         self.deadline = self.watch.deadline(deadline_ms, self.services.settings.max_deadline_ms)
 
-    def give_up(self) -> None:
-        """Cancel the work."""
-        self.deadline.cancel()
+    async def run(self, call: Callable[[], T], gate: Gate | None = None) -> T:
+        """Run a part of this request in a slot of a gate, left out: that of the searches; it is not refused later."""
+        return await (gate or self.services.gate).run(call, self.deadline, self.ticket)
 
     async def respond(self, work: Coroutine[Any, Any, bytes]) -> Response:
         """Wait for the work of this request and return its JSON as a response; raises also `HangUpError`."""
-        return self.json(await unless_hung_up(self.request.receive, work, self.give_up))
+        return self.json(await self.unless_hung_up(work))
 
     def json(self, data: bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
         """Return JSON as a response. A large one counts as held until the client has taken it, all but the last few.
@@ -79,23 +160,53 @@ class Exchange(Job):
             When too much waits to be read already.
         """
         if len(data) > LARGE:
-            self.held.enter_context(self.services.answers.account(self.ticket.holder)).take(len(data))
+            self.held.enter_context(self.services.answers.account(self.ticket.holder))(len(data))
         return Response(data, status, headers, JSON)
 
+    async def unless_hung_up(self, work: Coroutine[Any, Any, T]) -> T:
+        """Wait for work, and cancel it when the client hangs up first; the body has been read before.
 
-def exchange_of(scope: Scope) -> Exchange:
-    """Return the exchange of a request, which the middleware has put into its scope."""
-    found = scope["state"][KEY]
+        The work stays in the task of the request, and the watch starts later: each would cost a request tens of
+        microseconds.
+
+        Raises
+        ------
+        HangUpError
+            When the client hung up.
+        """
+        watches: list[asyncio.Task[None]] = []
+
+        async def watch() -> None:
+            while (await self.receive())["type"] != "http.disconnect":
+                pass
+            limit.reschedule(0.0)
+
+        begin = asyncio.get_running_loop().call_later(WATCH_AFTER, lambda: watches.append(asyncio.create_task(watch())))
+        try:
+            async with asyncio.timeout(None) as limit:
+                try:
+                    return await work
+                except asyncio.CancelledError:
+                    self.deadline.cancel()
+                    raise
+        except TimeoutError:
+            if not limit.expired():
+                raise
+            raise HangUpError from None
+        finally:
+            begin.cancel()
+            for task in watches:
+                task.cancel()
+
+
+async def _any(request: Request) -> Exchange:
+    found = request.scope["state"][KEY]
     assert isinstance(found, Exchange)
     return found
 
 
-async def _any(request: Request) -> Exchange:
-    return exchange_of(request.scope)
-
-
 async def _searching(request: Request) -> Exchange:
-    exchange = exchange_of(request.scope)
+    exchange = await _any(request)
     exchange.services.readiness.require_warm()  # before the body is read
     return exchange
 
@@ -104,53 +215,3 @@ Admitted = Annotated[Exchange, Depends(_any)]
 """A request that was let in."""
 Searching = Annotated[Exchange, Depends(_searching)]
 """One that needs the kernels; `NotReadyError` when they are not there yet."""
-
-
-class HangUpError(Exception):
-    """The client hung up; no answer can be sent."""
-
-
-async def unless_hung_up(receive: Receive, work: Coroutine[Any, Any, T], give_up: Callable[[], None]) -> T:
-    """Wait for work, and cancel it when the client hangs up first.
-
-    The work stays in the task of the request, and the watch starts later: each would cost a request tens of
-    microseconds.
-
-    Parameters
-    ----------
-    receive : Receive
-        Of the server; the body has been read before.
-    work : coroutine
-    give_up : callable
-        Called when the work is cancelled, by this or by anything else.
-
-    Raises
-    ------
-    HangUpError
-        When the client hung up.
-    """
-    watches: list[asyncio.Task[None]] = []
-
-    async def watch() -> None:
-        while (await receive())["type"] != "http.disconnect":
-            pass
-        scope.reschedule(0.0)
-
-    beginning = asyncio.get_running_loop().call_later(
-        WATCH_AFTER, lambda: watches.append(asyncio.ensure_future(watch()))
-    )
-    try:
-        async with asyncio.timeout(None) as scope:
-            try:
-                return await work
-            except asyncio.CancelledError:
-                give_up()
-                raise
-    except TimeoutError:
-        if not scope.expired():
-            raise
-        raise HangUpError from None
-    finally:
-        beginning.cancel()
-        for task in watches:
-            task.cancel()

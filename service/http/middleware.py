@@ -10,17 +10,12 @@ import logging
 import random
 import re
 import time
-from unicodedata import category
 
-from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from linefix.documents.errors import RequestError
-
-from ..errors import ControlCharacterError, MissingKeyError, NotHttpError, ServiceError, ShareUsedError, UnknownKeyError
-from .connection import Connection
+from ..errors import MissingKeyError, NotHttpError, ShareUsedError, UnknownKeyError
 from .exchange import KEY, Exchange, HangUpError
-from .problems import RAISED, as_ours, problem_or_defect
+from .problems import as_ours, problem_or_defect
 from .services import Services
 
 logger = logging.getLogger("linefix")
@@ -29,9 +24,6 @@ LATER = 0.05  # s after which a holder that used its share is refused: refused a
 OTHER = "unmatched"
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
-CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
-TWO_LENGTHS = {b"transfer-encoding", b"content-length"}
-_HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
 _STORED = re.compile("^/v1/maps/[^/:]+")
 
@@ -49,67 +41,56 @@ class RequestMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        started, services = time.perf_counter(), self._services
         # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
-        request_id = _id_of(scope["headers"])
-        connection = Connection(scope, receive, send, self._services.settings, request_id)
         exchange = Exchange(
-            request_id=request_id,
-            services=self._services,
-            request=Request(inner, connection.receive),
+            request_id=_id_of(scope["headers"]),
+            services=services,
+            scope=inner,
+            source=receive,
+            sink=send,
             arrived=asyncio.get_running_loop().time(),
-            noted=connection.noted,
         )
         state = inner.setdefault("state", {})
         state[KEY] = exchange
         try:
-            await self._admit(exchange, connection, scope)
+            exchange.ticket = services.entrance.admit(inner)
+            await self._app(inner, exchange.receive, exchange.send)
+        except HangUpError:
+            exchange.status = CLIENT_CLOSED_REQUEST
+        except Exception as error:
+            await self._refuse(error, exchange)
         finally:
-            del state[KEY]  # the exchange refers to the request: heads would wait for the garbage collector
+            del state[KEY]  # each refers to the other: heads would wait for the garbage collector
+            exchange.held.close()
+            services.gate.leave(exchange.ticket)
+            self._report(exchange, scope["method"], time.perf_counter() - started)
 
-    async def _admit(self, exchange: Exchange, connection: Connection, scope: Scope) -> None:
-        try:
-            _require_plain(scope)
-            exchange.ticket = self._services.entrance.admit(scope)
-        except (ServiceError, RequestError) as error:
-            await self._refuse(error, exchange, connection, scope)
-            return
-        await self._serve(exchange, connection, scope["method"])
-
-    async def _refuse(self, error: Exception, exchange: Exchange, connection: Connection, scope: Scope) -> None:
-        """Answer in place of the application; counted, and logged once a second."""
+    async def _refuse(self, error: Exception, exchange: Exchange) -> None:
+        """Answer with a problem; a defect after the answer has begun can only end the connection."""
+        problem = problem_or_defect(as_ours(error, exchange.scope), exchange.request_id)
+        if exchange.status:
+            raise error
         if isinstance(error, ShareUsedError):
             await asyncio.sleep(LATER)
-        kind, route = RAISED[type(error)], _STORED.sub("/v1/maps/{map_id}", scope["path"])
-        route = route if route in self._routes else OTHER
-        self._services.refusals.count(route, scope["method"], kind.code, kind.status)
-        connection.is_strangers = isinstance(error, STRANGERS)
-        problem = problem_or_defect(error, exchange.request_id)
-        await problem.response(exchange.request_id)(scope, connection.receive, connection.send)
+        exchange.note(code=problem.kind.code)
+        exchange.is_strangers = isinstance(error, STRANGERS)
+        await problem.response(exchange.request_id)(exchange.scope, exchange.receive, exchange.send)
 
-    async def _serve(self, exchange: Exchange, connection: Connection, method: str) -> None:
-        scope, started = exchange.request.scope, time.perf_counter()
-        try:
-            await self._app(scope, connection.receive, connection.send)
-        except HangUpError:
-            connection.status = CLIENT_CLOSED_REQUEST
-        except Exception as error:
-            problem = problem_or_defect(as_ours(error, exchange.request), exchange.request_id)
-            if connection.status:
-                raise
-            exchange.note(code=problem.kind.code)
-            await problem.response(exchange.request_id)(scope, connection.receive, connection.send)
-        finally:
-            exchange.held.close()
-            self._services.gate.leave(exchange.ticket)
-            self._report(exchange, method, connection.status, time.perf_counter() - started)
+    def _report(self, exchange: Exchange, method: str, seconds: float) -> None:
+        """Count and log a request; status 0 is a client that hung up before it was answered.
 
-    def _report(self, exchange: Exchange, method: str, status: int, seconds: float) -> None:
-        """Count and log a request; status 0 is a client that hung up before it was answered."""
-        route = getattr(exchange.request.scope.get("route"), "path", OTHER)
-        self._services.metrics.observe_request(route, method, status, seconds)
-        usual = {"method": method, "route": route, "status": status, "ms": round(1e3 * seconds, 3)}
-        logger.info("request", extra={"request_id": exchange.request_id, **usual, **exchange.noted})
+        Requests that reach no route are logged at the level debug: a flood brings thousands of refusals a second, and
+        their lines would take time from the searches.
+        """
+        found = exchange.scope.get("route")
+        path = _STORED.sub("/v1/maps/{map_id}", exchange.scope["path"]) if found is None else found.path
+        route = path if path in self._routes else OTHER
+        self._services.metrics.observe_request(route, method, exchange.status, seconds)
+        usual = {"method": method, "route": route, "status": exchange.status, "ms": round(1e3 * seconds, 3)}
+        level = logging.DEBUG if found is None else logging.INFO
+        logger.log(level, "request", extra={"request_id": exchange.request_id, **usual, **exchange.noted})
 
 
 def _id_of(headers: list[tuple[bytes, bytes]]) -> str:
@@ -118,19 +99,3 @@ def _id_of(headers: list[tuple[bytes, bytes]]) -> str:
         if name == b"x-request-id" and _ID.match(value):
             return value.decode("ascii")
     return f"{random.getrandbits(128):032x}"  # unique, and no secret
-
-
-def _require_plain(scope: Scope) -> None:
-    """Refuse control characters, and what two servers could read in two ways and ours takes: RFC 9112, 3.2 and 6.1.
-
-    A router that looks for the end of a line takes ``/metrics%0A`` for ``/metrics``; the rule of a proxy for that path
-    does not.
-    """
-    fields = dict(scope["headers"])  # h11 has refused two hosts, none in HTTP/1.1, and codings other than chunked
-    if fields.keys() >= TWO_LENGTHS or not _HOST.fullmatch(fields.get(b"host", b"")):
-        raise NotHttpError
-    if not scope["path"].isprintable():
-        for character in scope["path"]:
-            if category(character) in CONTROL:
-                found = f"the path has the control character U+{ord(character):04X}"
-                raise ControlCharacterError(f"{found}; expected none; remove it")

@@ -1,4 +1,4 @@
-"""The contract as OpenAPI: what FastAPI derives, and errors, bodies and headers that the routes declare by this."""
+"""The contract as OpenAPI: what FastAPI derives, and errors and bodies that the routes declare by this."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from linefix.documents.errors import Fault
-
 from ..admission.entrance import GUARDED
-from . import answers
+from .answers import Problem
 from .exchange import JSON
-from .problems import KINDS, MEDIA_TYPE, Kind, Problem
+from .problems import MEDIA_TYPE
 
 DESCRIPTION = """
 Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
@@ -28,69 +26,38 @@ has the causes.
 * A scan without a usable pose is 200 with a `status`; 4xx states that the request is not valid.
 """
 _REF = "#/components/schemas/{model}"
-EVERYWHERE = ("invalid_http", "unauthorized", "forbidden", "internal")
-READS_BODY = ("invalid_json", "request_timeout", "too_large", "unsupported_media_type", "invalid_request")
-SEARCHES = ("not_ready", "overloaded", "rate_limited", "deadline_exceeded")
-
-REQUEST_ID: dict[str, Any] = {
-    "X-Request-Id": {"description": "Taken over from the request or made", "schema": {"type": "string"}}
-}
-_RETRY: dict[str, Any] = {"Retry-After": {"description": "seconds", "schema": {"type": "string"}}}
-_TAKEN: dict[str, type[BaseModel]] = {}  # models of the bodies that the routes read by themselves
-
-
-def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
-    """Return the documentation of a route's errors."""
-    by_status: dict[int | str, list[Kind]] = {}
-    for code in codes:
-        by_status.setdefault(KINDS[code].status, []).append(KINDS[code])
-    return {
-        status: {
-            "description": "; ".join(f"`{kind.code}`: {kind.title}" for kind in kinds),
-            "headers": REQUEST_ID | (_RETRY if status in (429, 503) else {}),
-            "content": {
-                MEDIA_TYPE: {
-                    "schema": {"$ref": _REF.format(model="Problem")},
-                    "examples": {kind.code: {"value": _example(kind)} for kind in kinds},
-                }
-            },
-        }
-        for status, kinds in by_status.items()
+PROBLEM: dict[int | str, dict[str, Any]] = {
+    "default": {
+        "description": "A problem, named by its `code`; with 429 and 503, `Retry-After` has the seconds to wait",
+        "content": {MEDIA_TYPE: {"schema": {"$ref": _REF.format(model="Problem")}}},
     }
+}
+"""The documentation of the errors of every route."""
+_READ: dict[str, type[BaseModel]] = {}  # models of the bodies that the routes read by themselves
 
 
 def takes(model: type[BaseModel], examples: Mapping[str, Any]) -> dict[str, Any]:
     """Return the documentation of a body that the route itself reads."""
-    _TAKEN[model.__name__] = model
-    return {
-        "requestBody": {
-            "required": True,
-            "description": "May be gzip (Content-Encoding). Metres and radians.",
-            "content": {
-                JSON: {
-                    "schema": {"$ref": _REF.format(model=model.__name__)},
-                    "examples": {name: {"value": value} for name, value in examples.items()},
-                }
-            },
-        }
+    _READ[model.__name__] = model
+    content = {
+        "schema": {"$ref": _REF.format(model=model.__name__)},
+        "examples": {name: {"value": value} for name, value in examples.items()},
     }
+    return takes_content(JSON, content, "May be gzip (Content-Encoding). Metres and radians.")
 
 
-def _example(kind: Kind) -> dict[str, object]:
-    faults = [Fault("/scan/segments/3", "expected 4 numbers, found 3")] if kind.code == "invalid_request" else []
-    return Problem(kind, kind.title, faults).as_json("0f1e2d3c4b5a69788796a5b4c3d2e1f0")
+def takes_content(media_type: str, content: dict[str, Any], description: str) -> dict[str, Any]:
+    """Return the documentation of a body of a media type."""
+    return {"requestBody": {"required": True, "description": description, "content": {media_type: content}}}
 
 
 def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
     """Return the OpenAPI document of an application; `guarded`: its routes require keys."""
-    document = get_openapi(
-        title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
-    )
-    _, asked = models_json_schema([(model, "validation") for model in _TAKEN.values()], ref_template=_REF)
-    _, failed = models_json_schema([(answers.Problem, "serialization")], ref_template=_REF)
-    components = document.setdefault("components", {})
-    schemas = components.setdefault("schemas", {})
-    schemas |= asked["$defs"] | failed["$defs"]
+    document = get_openapi(title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes)
+    _, read = models_json_schema([(model, "validation") for model in _READ.values()], ref_template=_REF)
+    _, failed = models_json_schema([(Problem, "serialization")], ref_template=_REF)
+    components = document["components"]
+    components["schemas"] |= read["$defs"] | failed["$defs"]
     components["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
     if guarded:
         for path, item in document["paths"].items():

@@ -14,9 +14,10 @@ from typing import NoReturn
 import orjson
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Match
+from starlette.types import Scope
 
 from association import CancelledError
 from linefix.documents.errors import (
@@ -42,8 +43,6 @@ MAX_MESSAGE = 200
 MAX_DETAIL = 400
 MAX_POINTER = 120
 NAMED_BY_CALLER = "/map_weights"  # an object whose fields are ids of maps
-CLOSE = {"Connection": "close"}
-"""Of an answer that is given before the body was read: its rest is of no use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +55,7 @@ class Kind:
     raised_as: tuple[type[Exception], ...] = ()
 
 
-NOT_HTTP = (errors.NotHttpError, errors.ControlCharacterError, errors.BodyBrokenError)
+NOT_HTTP = (errors.NotHttpError, errors.BodyBrokenError)
 STRANGE = (errors.UnknownKeyError, errors.ForeignHostError, errors.ForeignOriginError)
 WRONG_KIND = (errors.MediaTypeError, errors.EncodingError, errors.FormatsMissingError, errors.UnknownFormatError)
 BUSY = (errors.QueueFullError, errors.TooMuchHeldError, errors.BusyStoreError)
@@ -76,7 +75,7 @@ TABLE = (
     Kind("revision_conflict", 412, "The precondition on the map's revision failed", (errors.RevisionConflictError,)),
     Kind("too_large", 413, "The request exceeds a limit", TOO_LARGE),
     Kind("unsupported_media_type", 415, "The media type is not supported", WRONG_KIND),
-    Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, errors.RefusedError)),
+    Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError)),
     Kind("rate_limited", 429, "This key exceeds its part of the queue", SHARES),
     Kind("internal", 500, "The service has a defect"),
     Kind("not_ready", 503, "The service is not ready", (errors.NotReadyError, errors.StoreAwayError, CancelledError)),
@@ -133,17 +132,15 @@ def problem_of(error: Exception) -> Problem | None:
     kind = next((RAISED[base] for base in type(error).__mro__ if base in RAISED), None)
     if kind is None:
         return None
+    faults: Sequence[Fault] = ()
     match error:
-        case CancelledError():
-            return Problem(kind, errors.ENDING)
         case InputError():
-            fault = fault_of(error)
-            return Problem(kind, str(fault), (fault,))
+            faults = [fault_of(error)]
         case InvalidRequestError():
-            return Problem(kind, str(error), error.faults)
+            faults = error.faults
         case TooManyError(pointer=pointer) if pointer:
-            return Problem(kind, str(error), (Fault(pointer, str(error)),))
-    return Problem(kind, str(error), headers=_headers_of(error))
+            faults = [Fault(pointer, str(error))]
+    return Problem(kind, errors.ENDING if isinstance(error, CancelledError) else str(error), faults, _headers_of(error))
 
 
 def problem_or_defect(error: Exception, request_id: str) -> Problem:
@@ -159,22 +156,17 @@ async def pass_on(request: Request, error: Exception) -> NoReturn:
     raise error
 
 
-def as_ours(error: Exception, request: Request) -> Exception:
+def as_ours(error: Exception, scope: Scope) -> Exception:
     """Return an exception of ours for what FastAPI and Starlette refuse by themselves."""
     match error:
         case RequestValidationError():
             return InvalidRequestError(faults_of(error.errors()))
-        case ClientDisconnect():  # while the body was received; from the server, malformed chunks look the same
-            return errors.BodyBrokenError()
-        case HTTPException(status_code=404):
-            return errors.NotFoundError()
         case HTTPException(status_code=405):  # the framework names the methods of one route only
-            routes = request.scope["app"].routes
-            matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
-            methods = {method for route in matching for method in getattr(route, "methods", ())}
+            matching = (route for route in scope["app"].routes if route.matches(scope)[0] is not Match.NONE)
+            methods = {method for route in matching for method in getattr(route, "methods", ("GET",))}
             return errors.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
         case HTTPException():
-            return errors.RefusedError()
+            return errors.NotFoundError()
     return error
 
 
@@ -187,8 +179,6 @@ def _headers_of(error: Exception) -> Mapping[str, str]:
     match error:
         case errors.MissingKeyError():
             return {"WWW-Authenticate": 'Bearer realm="linefix"'}
-        case BodyTooLargeError() | errors.TooMuchHeldError() | errors.ShareHeldError() | errors.BodyTooSlowError():
-            return CLOSE
         case errors.RevisionConflictError(revision=int(revision)):
             return {"ETag": etag(revision)}
         case errors.MethodNotAllowedError(allowed=allowed):

@@ -15,7 +15,7 @@ from linefix.documents.reading import read_model
 
 from .bodies import Reader, read
 from .exchange import Exchange, Searching
-from .openapi import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from .openapi import takes
 
 Work = Callable[[Exchange, Any], Coroutine[Any, Any, bytes]]
 """Answers a checked request with JSON."""
@@ -35,7 +35,6 @@ def searching(
     model: type[BaseModel],
     answer: type[BaseModel],
     examples: Mapping[str, Any],
-    *codes: str,
     reader: Reader[Any] | None = None,
 ) -> Callable[[Work], Work]:
     """Return a decorator that makes a route of the work on a request.
@@ -47,8 +46,6 @@ def searching(
     model, answer : type of BaseModel
         The request, and the answer; for the contract.
     examples : mapping
-    *codes : str
-        Of further problems.
     reader : callable, optional
         Makes the request of JSON; left out: the model does.
     """
@@ -67,7 +64,6 @@ def searching(
             response_model=answer,
             tags=_TAG.findall(path),
             dependencies=[Depends(_of_map)] if "{map_id}" in path else [],
-            responses=problems(*EVERYWHERE, *SEARCHES, *codes, *READS_BODY),
             openapi_extra=takes(model, examples),
         )
         return work

@@ -11,7 +11,7 @@ from ..maps import IndexCache, MapStore
 from ..maps.lookup import MapLookup
 from ..parsing.child import Child
 from ..settings import Settings
-from ..telemetry.metrics import Metrics, RefusalTally
+from ..telemetry.metrics import Metrics
 from ..thread_pool import Threads
 from ..work.results import Associator
 from .readiness import Readiness
@@ -27,8 +27,9 @@ class Services:
     ----------
     gate : Gate
         Slots of searches.
-    parsing, indexing, importing : Gate
-        Slots to parse large bodies, in another process; to index large maps; to read maps of other tools.
+    parsing, indexing, operations, importing : Gate
+        Slots to parse large bodies, in another process; to index large maps; to check, analyze and update maps, which
+        may take half a minute; to read maps of other tools.
     bodies, answers, documents : ByteBudget
         Bytes of bodies that are being received or parsed, of large answers that are being read, and of stored maps that
         wait to be indexed.
@@ -43,11 +44,11 @@ class Services:
         self.settings = settings
         self.limits = settings.limits()
         self.metrics = Metrics()
-        self.refusals = RefusalTally(self.metrics)
         self.gate = Gate(searches, searches + settings.share(settings.queue))
         # The number that waits there is bounded by their bytes.
         self.parsing = Gate(1, None, "parsing", long_per_slot=0)
         self.indexing = Gate(searches, None, "indexing", INDEXING_NICE, 0, waits=False)
+        self.operations = Gate(searches, None, "operation")
         # A second one when the first takes long, and not for the same key: each takes memory.
         self.importing = Gate(1, None, "importing", long_per_slot=1)
         self.import_bounds = Bounds(
@@ -76,6 +77,7 @@ class Services:
             ("searches_running", "Searches that run", lambda: self.gate.running),
             ("searches_waiting", "Searches that wait", lambda: self.gate.waiting),
             ("indexing_running", "Large maps that are indexed", lambda: self.indexing.running),
+            ("operations_running", "Maps that are checked, analyzed or updated", lambda: self.operations.running),
             ("bodies_bytes", "Bytes of requests held", lambda: self.bodies.held),
             ("map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes),
             ("map_cache_maps", "Indexed maps held", lambda: len(cache)),
@@ -89,7 +91,7 @@ class Services:
 
     @property
     def _gates(self) -> tuple[Gate, ...]:
-        return self.gate, self.parsing, self.indexing, self.importing
+        return self.gate, self.parsing, self.indexing, self.operations, self.importing
 
     def give_up(self) -> None:
         """Cancel everything that runs, and wait no longer for functions that do not check for it."""
@@ -98,7 +100,6 @@ class Services:
 
     def close(self) -> None:
         """Give up what still runs and give everything back."""
-        self.refusals.report()
         self.give_up()
         for gate in self._gates:
             gate.close()

@@ -1,29 +1,25 @@
-"""The stages of a request after its body: its maps are looked up and indexed, and searched in slots of the gate."""
+"""The stages of a request after its body: its maps are looked up and indexed, and searched in slots of a gate."""
 
 from __future__ import annotations
 
 import asyncio
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
-from association import CancelledError, Deadline
 from linefix.documents.errors import DeadlinePassedError
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import AssociateRequest, BatchRequest
-from linefix.operations import Json, Target, require_time
+from linefix.operations import Target, require_time
 
 from ..errors import StoreAwayError, UnknownMapError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMaps
-from ..work.job import Operation, begin, take_turn
 from .exchange import Exchange
-from .services import Services
 
 T = TypeVar("T")
-NO_DEADLINE = Deadline()
 STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others for some seconds
 
 
@@ -47,17 +43,17 @@ async def look_up_map(exchange: Exchange, asked: InlineMap | StoredMap, *, orien
         return FoundMaps({None: asked})
     if not asked.map_id.startswith(exchange.ticket.maps):
         raise UnknownMapError
-    services, deadline = exchange.services, exchange.deadline
+    services = exchange.services
     record = services.store.record_at_once(asked.map_id)
     if record is None:
-        record = await ask_store(services, partial(services.store.record, asked.map_id), deadline)
+        record = await ask_store(exchange, partial(services.store.record, asked.map_id))
     found = FoundMaps({None: record})
     if services.lookup.is_cached(found, oriented=oriented):
         return found
-    account = exchange.held.enter_context(services.documents.account(exchange.ticket.holder))
-    account.take(record.size)
-    stored = await ask_store(services, partial(services.store.load, asked.map_id), deadline)
-    account.take(stored.record.size - record.size)  # another revision may have come
+    take = exchange.held.enter_context(services.documents.account(exchange.ticket.holder))
+    take(record.size)
+    stored = await ask_store(exchange, partial(services.store.load, asked.map_id))
+    take(stored.record.size - record.size)  # another revision may have come
     return FoundMaps({None: stored.record}, stored.document)
 
 
@@ -73,7 +69,7 @@ async def look_up_maps(exchange: Exchange, asked: AssociateRequest | BatchReques
         ):
             raise UnknownMapError
         find = partial(services.lookup.find_together, asked.maps, prefix)
-        found = await ask_store(services, find, exchange.deadline)
+        found = await ask_store(exchange, find)
     ready = await index(exchange, found, oriented=oriented)
     return Target(ready.maps, ready.frames, found.references, asked.map_weights)
 
@@ -90,13 +86,13 @@ async def index(exchange: Exchange, found: FoundMaps, *, oriented: bool | None) 
     if ready is not None:
         return ready
     build = partial(services.lookup.indexed, found, oriented=oriented, deadline=exchange.deadline)
-    with services.documents.account(exchange.ticket.holder) as account:
-        account.take(found.unread_bytes)
+    with services.documents.account(exchange.ticket.holder) as take:
+        take(found.unread_bytes)
         gate = services.indexing if services.lookup.takes_long(found) else services.gate
-        return await gate.run(build, exchange.deadline, exchange.ticket)
+        return await exchange.run(build, gate)
 
 
-async def ask_store(services: Services, call: Callable[[], T], deadline: Deadline = NO_DEADLINE) -> T:
+async def ask_store(exchange: Exchange, call: Callable[[], T]) -> T:
     """Return what the store returns, in one of its threads.
 
     Raises
@@ -107,64 +103,10 @@ async def ask_store(services: Services, call: Callable[[], T], deadline: Deadlin
     DeadlinePassedError
         When the deadline passes first.
     """
+    deadline = exchange.deadline
     left = math.inf if deadline.at is None else max(0.0, deadline.at - time.monotonic())
     try:
         async with asyncio.timeout(min(left, STORE_SECONDS)):
-            return await services.store_threads.run(call)
+            return await exchange.services.store_threads.run(call)
     except TimeoutError:
         raise (DeadlinePassedError if left < STORE_SECONDS else StoreAwayError) from None
-
-
-async def in_search_slot(exchange: Exchange, call: Callable[[], T]) -> T:
-    """Run a part of this request in a slot of the gate; an admitted request is not refused later."""
-    return await exchange.services.gate.run(call, exchange.deadline, exchange.ticket)
-
-
-async def in_search_slots(
-    exchange: Exchange, calls: Sequence[Callable[[], T]], failed: Callable[[int, Exception], T]
-) -> list[T]:
-    """Run parts of this request, as many at once as there are slots; other requests get slots in between.
-
-    `failed` returns what stands in the place of a part that raised, given its number, or raises: then all end.
-    """
-    results: dict[int, T] = {}
-    todo = iter(enumerate(calls))
-
-    async def work_through() -> None:
-        for number, call in todo:
-            try:
-                results[number] = await in_search_slot(exchange, call)
-            except CancelledError:
-                raise
-            except Exception as error:
-                results[number] = failed(number, error)
-
-    tasks = [asyncio.ensure_future(work_through()) for _ in range(min(exchange.services.gate.slots, len(calls)))]
-    try:
-        await asyncio.gather(*tasks)
-    except BaseException:
-        exchange.give_up()
-        for task in tasks:
-            task.cancel()
-        raise
-    return [results[number] for number in range(len(calls))]
-
-
-async def in_turns(exchange: Exchange, operation: Operation, found: FoundMaps, *, oriented: bool | None) -> Json:
-    """Return the answer of an operation on a map, whose steps go on one core, in slots of `TURN_SECONDS`.
-
-    The other cores, and the time between two turns, are left to searches that robots wait for.
-    """
-    services, deadline = exchange.services, exchange.deadline
-    ready = await index(exchange, found, oriented=oriented)
-    # To read a request does not look at the deadline, so it takes no slot of a search.
-    beginning = partial(begin, operation, ready, found, exchange)
-    turn = partial(take_turn, await services.indexing.run(beginning, deadline, exchange.ticket), deadline)
-    answer, in_time = None, True
-    while answer is None:
-        try:
-            answer = await (in_search_slot(exchange, turn) if in_time else services.parse_threads.run(turn))
-        except DeadlinePassedError:
-            in_time = False  # for the rest, which then searches nothing
-        await asyncio.sleep(0)
-    return answer

@@ -1,12 +1,10 @@
-"""Metrics for Prometheus, and the count of refusals."""
+"""Metrics for Prometheus."""
 
 from __future__ import annotations
 
 import asyncio
-import logging
 import os
 import time
-from collections import Counter as Tally
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,12 +12,10 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 
 from ..version import VERSION
 
-logger = logging.getLogger("linefix")
 _SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
 _METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH"))
 _DIRECTORY = "PROMETHEUS_MULTIPROC_DIR"
 REFRESH_SECONDS = 0.5
-REPORT_SECONDS = 1.0  # between two reports of refusals
 EXPOSITION_SECONDS = 0.2  # between two texts; one takes 10 ms of the event loop, more of several workers
 
 
@@ -111,30 +107,6 @@ class Metrics:
         together = CollectorRegistry()
         multiprocess.MultiProcessCollector(together, directory)  # type: ignore[no-untyped-call]
         return generate_latest(together)
-
-
-class RefusalTally:
-    """Counts and logs, once a second, the refusals that the application never sees; belongs to one event loop.
-
-    Under a flood there are thousands a second. A line in the log for each would take time from the searches.
-    """
-
-    def __init__(self, metrics: Metrics) -> None:
-        self._metrics = metrics
-        self._refused: Tally[tuple[str, str, str, int]] = Tally()
-
-    def count(self, route: str, method: str, code: str, status: int) -> None:
-        """Count one, and have it reported soon."""
-        if not self._refused:
-            asyncio.get_running_loop().call_later(REPORT_SECONDS, self.report)
-        self._refused[route, method, code, status] += 1
-
-    def report(self) -> None:
-        """Count and log the refusals since the last time."""
-        for (route, method, code, status), count in self._refused.items():
-            self._metrics.requests.labels(route, method, str(status)).inc(count)
-            logger.warning("refused", extra={"route": route, "code": code, "count": count})
-        self._refused.clear()
 
 
 def _resident_bytes() -> float:

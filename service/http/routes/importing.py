@@ -20,11 +20,9 @@ from ...work.results import answer_import, answer_scans, index_import
 from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM, parse, receive
 from ..exchange import Exchange, Searching
-from ..openapi import EVERYWHERE, READS_BODY, SEARCHES, problems
-from ..stages import in_search_slot
+from ..openapi import PROBLEM, takes_content
 
-router = APIRouter(tags=["maps"])
-_PROBLEMS = problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES)
+router = APIRouter(tags=["maps"], responses=PROBLEM)
 
 
 def _takes(form: type[MapForm | ScansForm]) -> dict[str, Any]:
@@ -41,11 +39,10 @@ def _takes(form: type[MapForm | ScansForm]) -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {"file": content, **fields},
     }
-    description = "A form with files. May be gzip (Content-Encoding)."
-    return {"requestBody": {"required": True, "description": description, "content": {FORM: {"schema": schema}}}}
+    return takes_content(FORM, {"schema": schema}, "A form with files. May be gzip (Content-Encoding).")
 
 
-@router.post("/v1/maps:import", response_model=ImportAnswer, responses=_PROBLEMS, openapi_extra=_takes(MapForm))
+@router.post("/v1/maps:import", response_model=ImportAnswer, openapi_extra=_takes(MapForm))
 async def import_map(exchange: Searching) -> Response:
     """Read the map of another tool.
 
@@ -53,18 +50,18 @@ async def import_map(exchange: Searching) -> Response:
     """
 
     async def work(read: ReadFiles) -> bytes:
-        """Index the map in a slot of its own, and check it in one of a search; searches go before both."""
+        """Index the map in a slot of its own, and check it in one of an operation; searches go before both."""
         exchange.watch.lap("read")
-        services, deadline = exchange.services, exchange.deadline
+        services = exchange.services
         line_map = await parse(exchange, partial(read_model, InlineMap), read.content)
-        indexing = partial(index_import, services.lookup, line_map, deadline)
-        index = await services.indexing.run(indexing, deadline, exchange.ticket)
-        return await in_search_slot(exchange, partial(answer_import, index, line_map, read, exchange))
+        indexing = partial(index_import, services.lookup, line_map, exchange.deadline)
+        index = await exchange.run(indexing, services.indexing)
+        return await exchange.run(partial(answer_import, index, line_map, read, exchange), services.operations)
 
     return await _import(exchange, work)
 
 
-@router.post("/v1/scans:import", response_model=ScansAnswer, responses=_PROBLEMS, openapi_extra=_takes(ScansForm))
+@router.post("/v1/scans:import", response_model=ScansAnswer, openapi_extra=_takes(ScansForm))
 async def import_scans(exchange: Searching) -> Response:
     """Read scans of a log.
 
@@ -72,7 +69,7 @@ async def import_scans(exchange: Searching) -> Response:
     """
 
     async def work(read: ReadFiles) -> bytes:
-        return await in_search_slot(exchange, partial(answer_scans, read, exchange))
+        return await exchange.run(partial(answer_scans, read, exchange), exchange.services.operations)
 
     return await _import(exchange, work, scans=True)
 
@@ -82,12 +79,13 @@ async def _import(
 ) -> Response:
     """Have a form read in a slot of imports, and answer with what `work` makes of its files."""
     services = exchange.services
-    async with receive(exchange, form=True) as content:
-        deadline, kind = exchange.deadline, exchange.request.headers.get("content-type", "")
-        reading = partial(read_apart, content, kind, services.import_bounds, deadline, scans=scans)
+    with services.bodies.account(exchange.ticket.holder) as take:
+        content = await receive(exchange, take, FORM)
+        kind = exchange.headers.get("content-type", "")
+        reading = partial(read_apart, content, kind, services.import_bounds, exchange.deadline, scans=scans)
 
         async def whole() -> bytes:
-            return await work(await services.importing.run(reading, deadline, exchange.ticket))
+            return await work(await exchange.run(reading, services.importing))
 
         try:
             return await exchange.respond(whole())

@@ -15,26 +15,23 @@ from linefix.documents.reading import read_map
 from ...maps.lookup import outline_of
 from ..answers import MapList, MapSummaryAnswer
 from ..bodies import read
-from ..etags import demands_of, etag, is_unchanged
+from ..etags import demands_of, etag
 from ..exchange import Admitted
-from ..openapi import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
+from ..openapi import PROBLEM, takes
 from ..searching import MapIdPath
 from ..stages import ask_store
 
-router = APIRouter(tags=["maps"])
-STORE = ("overloaded", "read_only", "not_ready")
-ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
+router = APIRouter(tags=["maps"], responses=PROBLEM)
+ETAG: dict[str, Any] = {"ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
+DEMANDS = {
+    "If-Match": "revisions, one of which must be the present one; * for any",
+    "If-None-Match": "revisions, none of which may be the present one; * for none at all",
+}
 
 
-def _conditional(*names: str) -> list[dict[str, Any]]:
-    about = {
-        "If-Match": "revisions, one of which must be the present one; * for any",
-        "If-None-Match": "revisions, none of which may be the present one; * for none at all",
-    }
-    return [
-        {"name": name, "in": "header", "required": False, "description": about[name], "schema": {"type": "string"}}
-        for name in names
-    ]
+def _conditional(*names: str) -> dict[str, Any]:
+    text = {"in": "header", "required": False, "schema": {"type": "string"}}
+    return {"parameters": [{"name": name, "description": DEMANDS[name], **text} for name in names]}
 
 
 @router.put(
@@ -43,24 +40,20 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
     responses={
         200: {"description": "A new revision", "headers": ETAG},
         201: {"description": "A new map", "headers": ETAG, "model": MapSummaryAnswer},
-        **problems(*EVERYWHERE, *READS_BODY, *STORE, "unknown_map", "revision_conflict", "storage_full", "map_corrupt"),
     },
-    openapi_extra={
-        **takes(MapDocument, {"a room": examples.MAP}),
-        "parameters": _conditional("If-Match", "If-None-Match"),
-    },
+    openapi_extra={**takes(MapDocument, {"a room": examples.MAP}), **_conditional("If-Match", "If-None-Match")},
 )
 async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Store a map.
 
     Store a map durably: after the answer it survives the loss of process and power.
     """
-    demands = demands_of(exchange.request)
+    demands = demands_of(exchange.headers)
     services = exchange.services
     asked, document = await read(exchange, read_map)
     outline = await services.parse_threads.run(partial(outline_of, asked))
     put = partial(services.store.put, map_id, document, outline, demands, exchange.ticket.maps)
-    revision, created = await ask_store(services, put)
+    revision, created = await ask_store(exchange, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
     answer = encode(outline.as_json(map_id, revision))
@@ -73,9 +66,8 @@ async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     responses={
         200: {"description": "The map as it was stored, to the bit", "headers": ETAG},
         304: {"description": "The caller has this revision", "headers": ETAG},
-        **problems(*EVERYWHERE, *STORE, "unknown_map", "map_corrupt", "invalid_request"),
     },
-    openapi_extra={"parameters": _conditional("If-None-Match")},
+    openapi_extra=_conditional("If-None-Match"),
 )
 async def get_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Get a map.
@@ -83,19 +75,15 @@ async def get_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     Return a map as it was stored.
     """
     services = exchange.services
-    if "if-none-match" in exchange.request.headers:
-        record = await ask_store(services, partial(services.store.record, map_id))
-        if is_unchanged(exchange.request, record.revision):
+    if known := exchange.headers.get("if-none-match"):
+        record = await ask_store(exchange, partial(services.store.record, map_id))
+        if known.strip() == "*" or etag(record.revision) in known:
             return Response(status_code=304, headers={"ETag": etag(record.revision)})
-    stored = await ask_store(services, partial(services.store.load, map_id))
+    stored = await ask_store(exchange, partial(services.store.load, map_id))
     return exchange.json(stored.document, headers={"ETag": etag(stored.record.revision)})
 
 
-@router.get(
-    "/v1/maps",
-    response_model=MapList,
-    responses=problems(*EVERYWHERE, *STORE, "map_corrupt", "invalid_request"),
-)
+@router.get("/v1/maps", response_model=MapList)
 async def list_maps(
     exchange: Admitted,
     limit: Annotated[int, Query(ge=1, le=1000, description="maps on one page")] = 100,
@@ -108,25 +96,17 @@ async def list_maps(
     List the stored maps, by id.
     """
     services = exchange.services
-    page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
+    page = await ask_store(exchange, partial(services.store.list, limit, cursor, exchange.ticket.maps))
     items = [record.as_json() for record in page.maps]
     return exchange.json(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 
-@router.delete(
-    "/v1/maps/{map_id}",
-    status_code=204,
-    response_model=None,
-    responses=problems(
-        *EVERYWHERE, *STORE, "unknown_map", "revision_conflict", "invalid_request", "storage_full", "map_corrupt"
-    ),
-    openapi_extra={"parameters": _conditional("If-Match")},
-)
+@router.delete("/v1/maps/{map_id}", status_code=204, response_model=None, openapi_extra=_conditional("If-Match"))
 async def delete_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Delete a map."""
-    demands = demands_of(exchange.request)
+    demands = demands_of(exchange.headers)
     services = exchange.services
-    await ask_store(services, partial(services.store.delete, map_id, demands))
+    await ask_store(exchange, partial(services.store.delete, map_id, demands))
     services.metrics.map_changes.labels("deleted").inc()
     exchange.note(map={"map_id": map_id})
     return Response(status_code=204)

@@ -7,13 +7,13 @@ from fastapi import APIRouter, Response
 from ...version import VERSION
 from ..answers import LIMITS, Limits, Live, Version
 from ..exchange import JSON, Admitted
-from ..openapi import EVERYWHERE, problems
+from ..openapi import PROBLEM
 
-router = APIRouter(tags=["operations"])
+router = APIRouter(tags=["operations"], responses=PROBLEM)
 OK = b'{"status":"ok"}'
 
 
-@router.get("/livez", response_model=Live, responses=problems("internal"))
+@router.get("/livez", response_model=Live)
 async def livez() -> Response:
     """Report that the process is alive.
 
@@ -22,7 +22,7 @@ async def livez() -> Response:
     return Response(OK, media_type=JSON)
 
 
-@router.get("/readyz", response_model=Live, responses=problems("internal", "not_ready", "read_only"))
+@router.get("/readyz", response_model=Live)
 async def readyz(exchange: Admitted) -> Response:
     """Report whether the service is ready for requests.
 
@@ -32,7 +32,7 @@ async def readyz(exchange: Admitted) -> Response:
     return Response(OK, media_type=JSON)
 
 
-@router.get("/version", response_model=Version, responses=problems("internal"))
+@router.get("/version", response_model=Version)
 async def version() -> dict[str, str]:
     """Return the version.
 
@@ -41,7 +41,7 @@ async def version() -> dict[str, str]:
     return {"name": "linefix", "version": VERSION, "api": "v1"}
 
 
-@router.get("/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE))
+@router.get("/v1/limits", response_model=Limits)
 async def limits(exchange: Admitted) -> dict[str, float]:
     """Return the limits of requests.
 
@@ -57,10 +57,7 @@ async def limits(exchange: Admitted) -> dict[str, float]:
 @router.get(
     "/metrics",
     response_class=Response,
-    responses={
-        200: {"description": "Prometheus text", "content": {"text/plain": {"schema": {"type": "string"}}}},
-        **problems("internal"),
-    },
+    responses={200: {"description": "Prometheus text", "content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 async def metrics(exchange: Admitted) -> Response:
     """Return the counts for Prometheus.

@@ -16,20 +16,20 @@ from linefix.documents.checks import CheckAnswer
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import NO_SAMPLES, CheckRequest
 from linefix.documents.updates import UpdateAnswer, UpdateRequest
-from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps
+from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps, worked
 
 from ...maps.lookup import FoundMaps
-from ...work.job import Operation
 from ..exchange import Exchange, Searching
-from ..openapi import EVERYWHERE, SEARCHES, problems
+from ..openapi import PROBLEM
 from ..searching import MapIdPath, searching
-from ..stages import in_search_slot, in_turns, look_up_map
+from ..stages import index, look_up_map
 
-router = APIRouter()
-_STORED = ("unknown_map", "map_corrupt", "read_only")
+router = APIRouter(responses=PROBLEM)
+Operation = Callable[[MapIndex, FoundMaps], Steps]
+"""Give the steps of an operation on a map, with its index."""
 
 
-@searching(router, "/v1/maps/{map_id}:analyze", AnalyzeRequest, AnalyzeAnswer, {"a robot": examples.ANALYZE}, *_STORED)
+@searching(router, "/v1/maps/{map_id}:analyze", AnalyzeRequest, AnalyzeAnswer, {"a robot": examples.ANALYZE})
 async def analyze_map(exchange: Exchange, asked: AnalyzeRequest) -> bytes:
     """Analyze a stored map.
 
@@ -38,7 +38,7 @@ async def analyze_map(exchange: Exchange, asked: AnalyzeRequest) -> bytes:
     return await _analyze(exchange, _stored(exchange), asked)
 
 
-@searching(router, "/v1/analyze", MapAnalyzeRequest, AnalyzeAnswer, {"a room": examples.ANALYZE_ROOM}, *_STORED)
+@searching(router, "/v1/analyze", MapAnalyzeRequest, AnalyzeAnswer, {"a room": examples.ANALYZE_ROOM})
 async def analyze(exchange: Exchange, asked: MapAnalyzeRequest) -> bytes:
     """Analyze a map that comes with the request.
 
@@ -54,12 +54,7 @@ async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: Analyze
     return await _answer(exchange, on, steps, asked, {"places": lambda found: found["summary"]["places"]})
 
 
-@router.get(
-    "/v1/maps/{map_id}:check",
-    tags=["maps"],
-    response_model=CheckAnswer,
-    responses=problems(*EVERYWHERE, *SEARCHES, *_STORED, "invalid_request"),
-)
+@router.get("/v1/maps/{map_id}:check", tags=["maps"], response_model=CheckAnswer)
 async def check_map(
     exchange: Searching,
     map_id: MapIdPath,
@@ -77,7 +72,7 @@ async def check_map(
     return await exchange.respond(_check(exchange, asked))
 
 
-@searching(router, "/v1/maps/{map_id}:check", CheckRequest, CheckAnswer, {"two scans": examples.CHECK}, *_STORED)
+@searching(router, "/v1/maps/{map_id}:check", CheckRequest, CheckAnswer, {"two scans": examples.CHECK})
 async def check_map_with_scans(exchange: Exchange, asked: CheckRequest) -> bytes:
     """Check a map with sample scans.
 
@@ -96,7 +91,7 @@ async def _check(exchange: Exchange, asked: CheckRequest) -> bytes:
     return await _answer(exchange, _stored(exchange), steps, asked, noted, oriented=True)
 
 
-@searching(router, "/v1/maps/{map_id}:update", UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE}, *_STORED)
+@searching(router, "/v1/maps/{map_id}:update", UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE})
 async def update_map(exchange: Exchange, asked: UpdateRequest) -> bytes:
     """Propose changes of a stored map.
 
@@ -122,12 +117,12 @@ async def apply_changes(exchange: Exchange, asked: ApplyRequest) -> bytes:
     def work() -> bytes:
         return exchange.encoded({**applied(asked, exchange.watch), "client_ref": asked.client_ref}, changes=accepted)
 
-    return await in_search_slot(exchange, work)
+    return await exchange.run(work)
 
 
 def _stored(exchange: Exchange) -> StoredMap:
     """Return the map that the path names, which has been checked."""
-    return StoredMap(map_id=exchange.request.path_params["map_id"])
+    return StoredMap(map_id=exchange.scope["path_params"]["map_id"])
 
 
 async def _answer(
@@ -143,10 +138,13 @@ async def _answer(
     """Answer with an operation on a map; `noted` are fields of the log, `name` is that of the map's reference."""
     exchange.limit(asked.deadline_ms)
     source = await look_up_map(exchange, on, oriented=oriented)
-    found = await in_turns(exchange, operation, source, oriented=oriented)
-    exchange.watch.lap("search")
+    ready = await index(exchange, source, oriented=oriented)
     reference = source.references[None]
-    answer = {**found, name: reference, "client_ref": asked.client_ref}
-    fields = {field: read(found) for field, read in noted.items()}
-    run = exchange.services.parse_threads.run
-    return await run(lambda: exchange.encoded(answer, map=reference, **fields))
+
+    def work() -> bytes:
+        assert isinstance(ready.maps, MapIndex)
+        found = worked(operation(ready.maps, source), exchange.watch, exchange.deadline)
+        fields = {field: read(found) for field, read in noted.items()}
+        return exchange.encoded({**found, name: reference, "client_ref": asked.client_ref}, map=reference, **fields)
+
+    return await exchange.run(work, exchange.services.operations)

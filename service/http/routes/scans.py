@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from functools import partial
 
 from fastapi import APIRouter
 
+from association import CancelledError
 from linefix.documents import examples
 from linefix.documents.encoding import encode, encode_list
 from linefix.documents.found import AssociateAnswer
@@ -14,24 +16,23 @@ from linefix.documents.replies import RegisterAnswer, VectorizeAnswer
 from linefix.documents.requests import AssociateRequest, BatchItem, BatchRequest, RegisterRequest, VectorizeRequest
 from linefix.operations import registered, vectorized
 
-from ...errors import ShareHeldError, TooMuchHeldError
 from ...work.results import BatchResult, batch_done
 from ..answers import BatchAnswer
 from ..exchange import Exchange
+from ..openapi import PROBLEM
 from ..problems import problem_or_defect
 from ..searching import searching
-from ..stages import in_search_slot, in_search_slots, look_up_maps
+from ..stages import look_up_maps
 
-router = APIRouter()
+router = APIRouter(responses=PROBLEM)
 _EXAMPLES = {
     "a room": examples.ASSOCIATE,
     "a stored map": examples.ASSOCIATE_STORED,
     "several maps": examples.ASSOCIATE_SEVERAL,
 }
-_STORED = ("unknown_map", "map_corrupt")
 
 
-@searching(router, "/v1/associate", AssociateRequest, AssociateAnswer, _EXAMPLES, *_STORED)
+@searching(router, "/v1/associate", AssociateRequest, AssociateAnswer, _EXAMPLES)
 async def associate(exchange: Exchange, asked: AssociateRequest) -> bytes:
     """Find the pose without knowing correspondences.
 
@@ -39,12 +40,10 @@ async def associate(exchange: Exchange, asked: AssociateRequest) -> bytes:
     """
     exchange.limit(asked.options.deadline_ms)
     target = await look_up_maps(exchange, asked)
-    return await in_search_slot(exchange, partial(exchange.services.associator.answer, asked, target, exchange))
+    return await exchange.run(partial(exchange.services.associator.answer, asked, target, exchange))
 
 
-@searching(
-    router, "/v1/associate:batch", BatchRequest, BatchAnswer, {"two scans": examples.BATCH}, *_STORED, reader=read_batch
-)
+@searching(router, "/v1/associate:batch", BatchRequest, BatchAnswer, {"two scans": examples.BATCH}, read_batch)
 async def associate_batch(exchange: Exchange, read: tuple[BatchRequest, list[BatchItem | Exception]]) -> bytes:
     """Find several scans in one map.
 
@@ -55,21 +54,29 @@ async def associate_batch(exchange: Exchange, read: tuple[BatchRequest, list[Bat
     services, deadline = exchange.services, exchange.deadline
     target = await look_up_maps(exchange, asked)
     exchange.watch.lap("decode")
-    with services.answers.account(exchange.ticket.holder) as account:
+    free = asyncio.Semaphore(services.gate.slots)  # other requests get slots in between
+    with services.answers.account(exchange.ticket.holder) as take:
 
-        def find(number: int, item: BatchItem | Exception) -> BatchResult:
-            found = services.associator.find_for_batch(target, number, item, asked.options, deadline)
-            account.take(len(found.body))  # beyond the limit, the remaining scans are not searched
-            return found
+        async def one(number: int, item: BatchItem | Exception) -> BatchResult:
+            async with free:
+                try:
+                    find = partial(services.associator.find_for_batch, target, number, item, asked.options, deadline)
+                    found = await exchange.run(find)
+                except CancelledError:
+                    raise
+                except Exception as error:
+                    found = _refused(number, error, exchange.request_id)
+                take(len(found.body))  # beyond the limit, the remaining scans are not searched
+                return found
 
-        def failed(number: int, error: Exception) -> BatchResult:
-            if isinstance(error, ShareHeldError | TooMuchHeldError):
-                raise error
-            return _refused(number, error, exchange.request_id)
-
-        calls = [partial(find, number, item) for number, item in enumerate(items)]
-        results = await in_search_slots(exchange, calls, failed)
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(one(number, item)) for number, item in enumerate(items)]
+        except ExceptionGroup as raised:
+            deadline.cancel()
+            raise raised.exceptions[0] from None
         exchange.watch.lap("search")
+        results = [task.result() for task in tasks]
         return await services.parse_threads.run(partial(batch_done, asked, target, results, exchange))
 
 
@@ -95,7 +102,7 @@ async def register(exchange: Exchange, asked: RegisterRequest) -> bytes:
 
     Lay scan segments on the map segments that they are known to belong to.
     """
-    return await in_search_slot(exchange, lambda: exchange.encoded(registered(asked, exchange.watch, encode_list)))
+    return await exchange.run(lambda: exchange.encoded(registered(asked, exchange.watch, encode_list)))
 
 
 @searching(router, "/v1/vectorize", VectorizeRequest, VectorizeAnswer, {"a corner": examples.VECTORIZE})
@@ -104,4 +111,4 @@ async def vectorize(exchange: Exchange, asked: VectorizeRequest) -> bytes:
 
     Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points.
     """
-    return await in_search_slot(exchange, lambda: exchange.encoded(vectorized(asked, exchange.watch)))
+    return await exchange.run(lambda: exchange.encoded(vectorized(asked, exchange.watch)))

@@ -75,7 +75,6 @@ def test_too_many_are_told_to_come_back_before_they_send(busy: RunningService) -
     until(lambda: busy.count(RUNNING) == 0.0)
     assert busy.client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
     until(lambda: busy.count(counted) == before + 4.0)
-    until(lambda: '"message":"refused","route":"/v1/register","code":"overloaded","count":' in busy.log())
 
 
 def test_a_client_that_hangs_up_frees_its_place(busy: RunningService) -> None:

@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 
-from association import Deadline
 from linefix.documents import examples
-from service.http.exchange import WATCH_AFTER, HangUpError, unless_hung_up
+from service.http.exchange import WATCH_AFTER, Exchange, HangUpError
 from tests.running import RunningService, asked_again, client_of, until
 from tests.service.conftest import empty_database
 from tests.service.lines import Line
@@ -91,7 +90,7 @@ def test_the_work_for_a_client_that_hung_up_ends(ends: tuple[str, ...]) -> None:
     """A hang-up at the moment of the result cancels nothing later."""
 
     async def scenario() -> None:
-        loop, deadline, ended = asyncio.get_running_loop(), Deadline(), list[str]()
+        loop, ended = asyncio.get_running_loop(), list[str]()
         futures = {name: loop.create_future() for name in ("gone", "result")}
 
         async def receive() -> dict[str, Any]:
@@ -104,13 +103,15 @@ def test_the_work_for_a_client_that_hung_up_ends(ends: tuple[str, ...]) -> None:
             finally:
                 ended.append("ended")
 
+        head: dict[str, Any] = {"scope": {"headers": []}, "source": receive, "sink": receive, "services": None}
+        exchange = Exchange(request_id="x", arrived=0.0, **head)
         loop.call_later(2.0 * WATCH_AFTER, lambda: [futures[name].set_result("done") for name in ends])
         if "result" in ends:
-            assert await unless_hung_up(receive, work(), deadline.cancel) == "done"
+            assert await exchange.unless_hung_up(work()) == "done"
         else:
             with pytest.raises(HangUpError):
-                await unless_hung_up(receive, work(), deadline.cancel)
-            assert (deadline.cancelled, ended) == (True, ["ended"])
+                await exchange.unless_hung_up(work())
+            assert (exchange.deadline.cancelled, ended) == (True, ["ended"])
         await asyncio.sleep(0)  # and this task goes on
 
     asyncio.run(asyncio.wait_for(scenario(), 10.0))

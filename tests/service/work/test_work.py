@@ -1,21 +1,18 @@
-"""Work in turns at the gate, and the stages of an import after its reading."""
+"""Operations whose client hangs up, and the stages of an import after its reading."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from association import CancelledError, Deadline, MapIndex
 from linefix.documents.analysis import AnalyzeRequest
 from linefix.documents.errors import DeadlinePassedError
-from linefix.operations import Json, Steps, analysis_steps
+from linefix.operations import Steps, Stopwatch, analysis_steps, worked
 from service.app import create_app
 from service.settings import Settings
-from service.work import job
-from service.work.job import take_turn
 from service.work.results import index_import
 from simulation import rectangle_room
 from tests.service.maps.stores import Lookup, inline
@@ -24,53 +21,19 @@ BOX = [[-2.5, -1.5, -2.5, 0.0], [-2.5, 0.0, -1.0, 0.0], [-1.0, 0.0, -1.0, -1.5],
 ASKED = AnalyzeRequest.model_validate({"spacing": 2.5, "drive": 2.0, "landmark": BOX, "laser": {"beams": 180}})
 
 
-@pytest.fixture
-def short_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """End each turn after one step."""
-    monkeypatch.setattr(job, "TURN_SECONDS", 0.0)
-
-
-def analysis(deadline: Deadline) -> Steps:
-    """Analyze a room in which no drive helps, and with a box that does."""
-    index = MapIndex.build(rectangle_room().segments, 0.0)
-    return analysis_steps(index, ASKED, deadline)
-
-
-def places(found: Json) -> list[dict[str, Any]]:
-    assert found["complete"]
-    return found["places"]
-
-
-@pytest.mark.usefixtures("short_turns")
-def test_others_have_their_turn_within_a_drive() -> None:
-    steps, turns = analysis(Deadline()), 1
-    while (found := take_turn(steps, Deadline())) is None:
-        turns += 1
-    free = places(found)
-    assert len(free) > 2
-    assert turns > 4 * len(free)
-    assert any(one["with_landmark"] is not None and one["with_landmark"]["usable"] for one in free)
-
-
-def test_turns_do_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = []
-    for seconds in (0.0, 600.0):
-        monkeypatch.setattr(job, "TURN_SECONDS", seconds)
-        steps = analysis(Deadline())
-        while (found := take_turn(steps, Deadline())) is None:
-            pass
-        answers.append(places(found))
-    assert answers[0] == answers[1]
-
-
-@pytest.mark.usefixtures("short_turns")
 def test_who_hangs_up_within_a_drive_ends_it() -> None:
     deadline = Deadline()
-    steps = analysis(deadline)
-    assert take_turn(steps, deadline) is None
-    deadline.cancel()
+    steps = analysis_steps(MapIndex.build(rectangle_room().segments, 0.0), ASKED, deadline)
+
+    def left_after(count: int) -> Steps:
+        for _ in range(count):
+            yield next(steps)
+        deadline.cancel()
+        return (yield from steps)
+
     with pytest.raises(CancelledError):
-        take_turn(steps, deadline)
+        worked(left_after(4), Stopwatch(), deadline)
+    assert list(steps) == []
 
 
 def test_an_import_is_indexed_until_its_deadline_or_its_client_is_gone(lookup: Lookup) -> None:
