@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import FormatError, MalformedFileError
 from ...files import read_bounded
 from ...limits import MAX_MAP_BYTES
 from ..drawing import Drawing
-from .shapes import SHAPES, Measure, Points
+from .shapes import SHAPES, Measure
 from .visible import Visible
 from .xml import kind_of, parse_xml
 
@@ -57,14 +55,9 @@ def _read_shapes(root: Element, drawing: Drawing) -> None:
             continue
         kind = kind_of(element)
         for points, closed in SHAPES[kind](Measure(element, place.viewport)):
-            lines = _placed(points, place.matrix)
+            places = place.applied(points)
+            if not place.shows(places):
+                drawing.notes.add_assumed("outside", "lines that extend beyond the picture are used whole", 1)
+            lines = places * (1.0, -1.0)
             drawing.add(lines, closed=closed, width=place.width, layers=place.layers, groups=place.groups)
         drawing.notes.add_read(f"element_{kind}", f"{kind} elements", 1)
-
-
-def _placed(points: Points, matrix: Any) -> NDArray[np.float64]:
-    """Return points in the root's units, y pointing up."""
-    p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    x = matrix.a * p[:, 0] + matrix.c * p[:, 1] + matrix.e
-    y = matrix.b * p[:, 0] + matrix.d * p[:, 1] + matrix.f
-    return np.stack([x, -y], axis=1)

@@ -38,6 +38,12 @@ class Viewport:
     width: float = math.nan
     height: float = math.nan
 
+    @property
+    def corners(self) -> Points:
+        """Its four corners."""
+        right, bottom = self.x + self.width, self.y + self.height
+        return [(self.x, self.y), (right, self.y), (right, bottom), (self.x, bottom)]
+
     def of_axis(self, axis: str) -> float:
         """Return what 100 % is along ``x``, along ``y``, or of a length in any direction."""
         if axis == "x":
@@ -119,12 +125,14 @@ def _line(measure: Measure) -> Polylines:
 def _rect(measure: Measure) -> Polylines:
     x, y = measure.length("x", "x"), measure.length("y", "y")
     w, h = measure.length("width", "x"), measure.length("height", "y")
-    if w != 0.0 and h != 0.0:  # else it is not drawn
-        yield [(x, y), (x + w, y), (x + w, y + h), (x, y + h)], True
+    if w > 0.0 and h > 0.0:  # else it is not drawn
+        yield Viewport(x, y, w, h).corners, True
 
 
 def _polyline(measure: Measure) -> Polylines:
     numbers = measure.numbers("points")
+    if len(numbers) % 2:
+        raise measure.refused("points", f"a list of {len(numbers)}", "numbers, two for each point")
     yield list(zip(numbers[::2], numbers[1::2], strict=False)), kind_of(measure.element) == "polygon"
 
 

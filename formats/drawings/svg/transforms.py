@@ -2,36 +2,58 @@
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import svgelements
+import tinycss2
+from svgelements import Matrix as Plane
 
 from ...errors import MalformedFileError
 from ...report import shown
 from ..drawing import Drawing
-from .shapes import Viewport
+from .shapes import UNITS, Viewport
 
-FUNCTION = re.compile(r"([a-zA-Z]\w*)\s*\(([^)]*)\)")
-WORDS = {"left": ("x", 0.0), "right": ("x", 100.0), "top": ("y", 0.0), "bottom": ("y", 100.0), "center": ("", 50.0)}
-
+WORDS = {
+    "left": ("x", "0%"),
+    "right": ("x", "100%"),
+    "top": ("y", "0%"),
+    "bottom": ("y", "100%"),
+    "center": ("", "50%"),
+}
 WHERE = ("transform", "transform-origin", "scale", "rotate", "translate")
+SCALES = UNITS | {"deg": 1.0, "grad": 0.9, "rad": math.degrees(1.0), "turn": 360.0}
 
 Matrix = Any
-Arguments = list[str]
 
-# Functions of CSS in space, as those of the plane; what turns out of the plane is not among them.
-FLAT: dict[str, Callable[[Arguments], str]] = {
-    "translatez": lambda a: "",
-    "scale3d": lambda a: f"scale({a[0]}, {a[1]})",
-    "scalez": lambda a: "",
-    "rotatez": lambda a: f"rotate({a[0]})",
-    "matrix3d": lambda a: f"matrix({', '.join((a[0], a[1], a[4], a[5], a[12], a[13]))})",
+
+def _turned(angle: float, x: float = 0.0, y: float = 0.0) -> Matrix:
+    return Plane.translate(-x, -y) * Plane.rotate(math.radians(angle)) * Plane.translate(x, y)
+
+
+def _skewed(x: float, y: float = 0.0) -> Matrix:
+    return Plane(1.0, math.tan(math.radians(y)), math.tan(math.radians(x)), 1.0, 0.0, 0.0)
+
+
+# Functions of CSS, those in space as what they do in the plane; what turns out of the plane is not among them.
+FUNCTIONS: dict[str, Callable[..., Matrix]] = {
+    "matrix": lambda a, b, c, d, e, f: Plane(a, b, c, d, e, f),
+    "matrix3d": lambda *m: Plane(m[0], m[1], m[4], m[5], m[12], m[13]),
+    "translate": lambda x, y=0.0, _z=0.0: Plane.translate(x, y),
+    "translatex": lambda x: Plane.translate(x, 0.0),
+    "translatey": lambda y: Plane.translate(0.0, y),
+    "scale": lambda x, y=None, _z=1.0: Plane.scale(x, x if y is None else y),
+    "scalex": lambda x: Plane.scale(x, 1.0),
+    "scaley": lambda y: Plane.scale(1.0, y),
+    "rotate": _turned,
+    "rotatez": _turned,
+    "skew": _skewed,
+    "skewx": _skewed,
+    "skewy": lambda y: _skewed(0.0, y),
+    "translatez": lambda _z: Plane(),
+    "scalez": lambda _z: Plane(),
 }
-OF_SVG = {
-    "matrix", "translate", "translatex", "translatey", "scale", "scalex", "scaley", "rotate", "skew", "skewx", "skewy",
-}  # fmt: skip
+FUNCTIONS |= {"translate3d": FUNCTIONS["translate"], "scale3d": FUNCTIONS["scale"]}
 
 
 def matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) -> Matrix | None:
@@ -45,56 +67,58 @@ def matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) ->
     drawing : Drawing
         Its notes take what is not applied.
     """
-    try:
-        return _matrix_of(style, viewport, drawing)
-    except (ValueError, LookupError) as error:
-        told = "; ".join(f"{key}: {style[key]}" for key in WHERE if key in style)
-        raise MalformedFileError(
-            f"has a transform that cannot be read, '{shown(told)}'; expected numbers. Apply the transforms, or save it "
-            "as plain SVG"
-        ) from error
-
-
-def _matrix_of(style: Mapping[str, str], viewport: Viewport, drawing: Drawing) -> Matrix | None:
-    parts = [_transform(style.get("transform", "none"), viewport, drawing)]
-    for name, function in (("scale", "scale"), ("rotate", "rotate"), ("translate", "translate")):
+    texts = [style.get("transform", "")]
+    for name in ("scale", "rotate", "translate"):
         words = style.get(name, "none").split()
-        if name == "scale":
-            words = [f"{float(word[:-1]) / 100.0}" if word.endswith("%") else word for word in words]
         if name == "rotate" and len(words) > 1:  # about an axis: z, or 0 0 1
-            words = words[-1:] if words[:-1] in (["z"], ["0", "0", "1"]) else ["none"]
-        if words not in ([], ["none"]):
-            parts.append(_transform(f"{function}({', '.join(words)})", viewport, drawing))
-    matrices = [part for part in parts if part is not None]
-    if not matrices:
+            name = "rotatez" if words[:-1] in (["z"], ["0", "0", "1"]) else "rotate3d"
+            words = words[-1:]
+        texts.append("" if words in ([], ["none"]) else f"{name}({' '.join(words)})")
+    if all(text.lower() in ("", "none") for text in texts):
         return None
     if style.get("transform-box", "view-box").lower() != "view-box":
         drawing.notes.add_assumed("transform_box", "transform-origin refers to the viewBox, not to transform-box", 1)
-    x, y = _origin(style, viewport)
-    matrix = svgelements.Matrix.translate(-x, -y)
-    for one in (*matrices, svgelements.Matrix.translate(x, y)):
-        matrix = matrix * one
+    try:
+        x, y = _origin(style, viewport)
+        matrix = Plane.translate(-x, -y)
+        for text in texts:
+            matrix = matrix * _transform(text, viewport, drawing)
+        return matrix * Plane.translate(x, y)
+    except (ValueError, LookupError, TypeError, AttributeError) as error:  # the last: calc() has no value
+        told = "; ".join(f"{key}: {style[key]}" for key in WHERE if key in style)
+        raise MalformedFileError(
+            f"has a transform that cannot be read, '{shown(told)}'; expected functions of numbers. Apply the "
+            "transforms, or save it as plain SVG"
+        ) from error
+
+
+def _transform(text: str, viewport: Viewport, drawing: Drawing) -> Matrix:
+    """Return the matrix of a list of functions."""
+    matrix = Plane()
+    if text.lower() == "none":
+        return matrix
+    if text.count("(") != text.count(")"):
+        raise ValueError(text)
+    for node in tinycss2.parse_component_value_list(text, skip_comments=True):
+        if node.type == "whitespace" or node == ",":
+            continue
+        if node.type != "function":
+            raise ValueError(text)
+        name = node.lower_name
+        if name not in FUNCTIONS:
+            drawing.notes.add_assumed("transform", f"transforms that are not applied, such as {shown(name)}", 1)
+            continue
+        axes = "y" if name == "translatey" else "xyz" if name.startswith("translate") else ""
+        values = [one for one in node.arguments if one.type != "whitespace" and one != ","]
+        matrix = FUNCTIONS[name](*(_number(one, axes[k : k + 1], viewport) for k, one in enumerate(values))) * matrix
     return matrix
 
 
-def _transform(text: str, viewport: Viewport, drawing: Drawing) -> Matrix | None:
-    if text.strip().lower() in ("", "none"):
-        return None
-    flat = []
-    text = re.sub(r"translate3d\s*\(([^,)]+),([^,)]+),[^)]*\)", r"translate(\1,\2)", text, flags=re.IGNORECASE)
-    for name, inner in FUNCTION.findall(text):
-        arguments, lower = [word for word in re.split(r"[\s,]+", inner.strip()) if word], name.lower()
-        if lower in FLAT:
-            flat.append(FLAT[lower](arguments))
-        elif lower not in OF_SVG:
-            drawing.notes.add_assumed("transform", f"transforms that are not applied, such as {shown(name)}", 1)
-        elif lower.startswith("translate"):
-            axes = "y" if lower == "translatey" else "xy"
-            told = (str(viewport.length(word, axis)) for word, axis in zip(arguments, axes, strict=False))
-            flat.append(f"{name}({', '.join(told)})")
-        else:
-            flat.append(f"{name}({', '.join(arguments)})")
-    return svgelements.Matrix(" ".join(flat))
+def _number(node: Any, axis: str, viewport: Viewport) -> float:
+    """Return an argument: lengths in user units, angles in degrees, percentages of an axis or as fractions."""
+    if node.type == "percentage":
+        return float(node.value) / 100.0 * (viewport.of_axis(axis) if axis else 1.0)
+    return float(node.value) * (SCALES[node.lower_unit] if node.type == "dimension" else 1.0)
 
 
 def _origin(style: Mapping[str, str], viewport: Viewport) -> tuple[float, float]:
@@ -106,12 +130,6 @@ def _origin(style: Mapping[str, str], viewport: Viewport) -> tuple[float, float]
         words = ["center", words[0]] if words[0] in ("top", "bottom") else [words[0], "center"]
     elif WORDS.get(words[0], ("x",))[0] == "y" or WORDS.get(words[1], ("y",))[0] == "x":
         words.reverse()
-    starts = {"x": viewport.x, "y": viewport.y}
-    places = []
-    for axis, word in zip("xy", words, strict=True):
-        if word in WORDS or word.endswith("%"):
-            percent = WORDS[word][1] if word in WORDS else float(word[:-1])
-            places.append(starts[axis] + percent / 100.0 * viewport.of_axis(axis))
-        else:
-            places.append(viewport.length(word, axis))
-    return places[0], places[1]
+    told = [WORDS[word][1] if word in WORDS else word for word in words]
+    x, y = (viewport.length(word, axis) for word, axis in zip(told, "xy", strict=True))
+    return x + viewport.x * told[0].endswith("%"), y + viewport.y * told[1].endswith("%")

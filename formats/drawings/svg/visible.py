@@ -10,10 +10,12 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import svgelements
+from numpy.typing import NDArray
+from tinycss2.color4 import parse_color
 
 from ...limits import MAX_UNITS
 from ..drawing import Drawing
-from .shapes import SHAPES, Measure, Viewport
+from .shapes import SHAPES, Measure, Points, Viewport
 from .styles import Styles
 from .transforms import matrix_of
 from .xml import Bounds, kind_of
@@ -27,8 +29,7 @@ NOT_DRAWN = {
 GROUPS = {"g", "a"}
 CONDITIONS = {"systemLanguage", "requiredExtensions"}  # of a child of switch that is passed over
 FLOORS = ("data-level", "data-floor")
-NOTHING = {"none", "transparent"}  # as a stroke or a fill
-WHOLE = 1e-3  # of the picture; a background covers all but that
+WHOLE = 1e-3  # of the picture; a background covers all but that, and what is inside extends no farther
 
 Matrix = Any
 
@@ -51,6 +52,8 @@ class Place:
     visible : bool
     stroked, filled : bool or None
         True if lines, and areas, are painted; None: not specified.
+    frames : tuple of (2, 2)
+        Least and greatest x and y of the picture and of the nested ones around the element, the root's units.
     copied : tuple of Element
         The targets of the enclosing use elements.
     """
@@ -64,6 +67,7 @@ class Place:
     visible: bool = True
     stroked: bool | None = None
     filled: bool | None = None
+    frames: tuple[NDArray[np.float64], ...] = ()
     copied: tuple[Element, ...] = ()
 
     @property
@@ -71,6 +75,24 @@ class Place:
         """Of a line, the root's units."""
         m = self.matrix
         return self.stroke_width * math.sqrt(abs(m.a * m.d - m.b * m.c))
+
+    def applied(self, points: Points) -> NDArray[np.float64]:
+        """Return points in the root's units, (n, 2)."""
+        p, m = np.asarray(points, dtype=np.float64).reshape(-1, 2), self.matrix
+        x, y = m.a * p[:, 0] + m.c * p[:, 1] + m.e, m.b * p[:, 0] + m.d * p[:, 1] + m.f
+        return np.stack([x, y], axis=1)
+
+    def framed(self, box: Viewport) -> Place:
+        """Return the place of what is in a picture; one whose size is not known hides nothing."""
+        corners = self.applied(box.corners)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        slack = WHOLE * float((high - low).max())
+        frame = np.stack([low - slack, high + slack])
+        return self if np.isnan(frame).any() else replace(self, frames=(*self.frames, frame))
+
+    def shows(self, places: NDArray[np.float64]) -> bool:
+        """Tell whether all of some points, (n, 2) the root's units, are within the pictures."""
+        return all(bool((low <= places).all() and (places <= high).all()) for low, high in self.frames)
 
 
 class Visible:
@@ -97,7 +119,8 @@ class Visible:
         style = self._styles.of(self._root)
         if not self._displayed(self._root, style):
             return
-        place = replace(self._inherited(self._root, Place(viewport=self._whole), style), layers=(), groups=())
+        outer = Place(viewport=self._whole)
+        place = replace(self._inherited(self._root, outer, style), layers=(), groups=()).framed(self._whole)
         for child in self._root:
             yield from self._drawn(child, place, 1)
 
@@ -156,8 +179,8 @@ class Visible:
             dashes=style.get("stroke-dasharray", outer.dashes),
             stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
             visible=visibility == "visible" if visibility else outer.visible,
-            stroked=_paints(style.get("stroke"), style.get("stroke-opacity"), outer.stroked),
-            filled=_paints(style.get("fill"), style.get("fill-opacity"), outer.filled),
+            stroked=_paints(style, "stroke", outer.stroked),
+            filled=_paints(style, "fill", outer.filled),
         )
 
     def _painted(self, element: Element, kind: str, place: Place) -> bool:
@@ -176,14 +199,12 @@ class Visible:
     def _covers_all(self, element: Element, place: Place) -> bool:
         if element.get("width", "").strip() == element.get("height", "").strip() == "100%":
             return True
-        if math.isnan(self._whole.width + self._whole.height):
-            return False
         (points, _), *_ = [*SHAPES["rect"](Measure(element, place.viewport)), ([(0.0, 0.0)], False)]
-        corners = np.array([tuple(place.matrix.point_in_matrix_space(point)) for point in points], dtype=np.float64)
-        low, size = np.array([self._whole.x, self._whole.y]), np.array([self._whole.width, self._whole.height])
-        slack = WHOLE * size.max()
-        begins, ends = corners.min(axis=0) <= low + slack, corners.max(axis=0) >= low + size - slack
-        return bool(begins.all() and ends.all())
+        corners, picture = place.applied(points), self._whole
+        slack = WHOLE * max(picture.width, picture.height)
+        begins = corners.min(axis=0) <= np.array([picture.x, picture.y]) + slack
+        ends = corners.max(axis=0) >= np.array([picture.x + picture.width, picture.y + picture.height]) - slack
+        return bool(begins.all() and ends.all())  # False where the size is not known
 
     def _viewport_of_root(self) -> Viewport:
         measure = Measure(self._root, Viewport())
@@ -210,6 +231,7 @@ class Visible:
                 self._drawing.notes.add_dropped("hidden", "elements that are not displayed", 1)
                 return
             viewport = Viewport(0.0, 0.0, width, height)
+            outer = replace(outer, matrix=matrix).framed(viewport)
             if box is not None:
                 matrix = _fitted(box, viewport, element.get("preserveAspectRatio", "")) * matrix
                 viewport = box
@@ -262,16 +284,19 @@ def _fitted(box: Viewport, into: Viewport, aspect: str) -> Matrix:
 
 def _is_zero(value: str | None) -> bool:
     try:
-        return value is not None and float(value.removesuffix("%")) == 0.0
+        return value is not None and float(value.rstrip("%px")) == 0.0
     except ValueError:
         return False
 
 
-def _paints(paint: str | None, opacity: str | None, inherited: bool | None) -> bool | None:
+def _paints(style: Mapping[str, str], key: str, inherited: bool | None) -> bool | None:
     """Tell whether a stroke or a fill paints anything; None if not specified."""
-    if _is_zero(opacity):
+    if _is_zero(style.get(f"{key}-opacity")) or _is_zero(style.get(f"{key}-width")):
         return False
-    return inherited if paint is None else paint.lower() not in NOTHING
+    if key not in style:
+        return inherited
+    colour = parse_color(style[key])
+    return style[key].lower() != "none" and getattr(colour, "alpha", 1.0) != 0.0
 
 
 def _stroke_width(told: str | None, inherited: float) -> float:
