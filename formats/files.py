@@ -12,12 +12,30 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
-from .errors import IncompleteFileError, MalformedFileError, TooLargeError
+from .errors import IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError
 from .limits import MAX_DEPTH, MAX_JSON_VALUES, MAX_YAML_VALUES
 from .report import shown
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
 MANY = 10**100  # YAML has integers that no float can hold
+# Beginnings of files that have the ending of another format, or were never what they are called: what to do.
+BEGINNINGS = {
+    b"\x1f\x8b": "is compressed with gzip; unpack it first",
+    b"\x28\xb5\x2f\xfd": "is compressed as a whole; decompress it first with zstd -d",
+    b"PK\3\4": "is a ZIP archive, as of a spreadsheet; unpack it, or save the sheet as CSV",
+    b"%PDF": "is a PDF; export the drawing as DXF or SVG",
+    b"AC10": "is a DWG, which is not supported; save it as DXF",
+    b"AutoCAD DXB": "is a DXB, which is not supported; save it as DXF",
+    b"ISO-10303-21": "is a model in IFC or STEP; export the plan of a floor as DXF",
+    b"version https://git-lfs": "is a pointer of Git LFS and not the file; run git lfs pull",
+    b"<!DOCTYPE html": "is a web page, as of a login; download the file again",
+    b"<html": "is a web page, as of a login; download the file again",
+    b"# .PCD": "is a point cloud; expected lines or a grid",
+    b"ply\n": "is a point cloud; expected lines or a grid",
+    b"#ROSBAG V2.0": "is a bag of ROS 1; its name has to end in .bag",
+    b"\x89MCAP": "is an MCAP file; its name has to end in .mcap",
+    b"SQLite format 3": "is a bag of ROS 2 in SQLite; its name has to end in .db3",
+}
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 
 
@@ -49,6 +67,22 @@ def kind_of(value: Any) -> str:
         case dict():
             return "an object"
     return f"a {type(value).__name__}"
+
+
+def require_content(path: Path, *, but: str = "") -> None:
+    """Refuse a file that begins as one of another format; `but` is a suffix whose own beginning is right.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        With what to do.
+    """
+    if path.is_file():
+        with path.open("rb") as file:
+            begin = file.read(max(map(len, BEGINNINGS)))
+        what = next((what for other, what in BEGINNINGS.items() if begin.startswith(other)), "")
+        if what and not (but and what.endswith(but)):
+            raise UnsupportedFormatError(what)
 
 
 def read_bounded(path: Path, limit: int) -> bytes:

@@ -14,7 +14,7 @@ from .drawings.own_json import read_json
 from .drawings.svg.reading import read_svg
 from .drawings.walls.to_map import to_map
 from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError, naming
-from .files import ending_of, name_of
+from .files import ending_of, name_of, require_content
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
@@ -83,6 +83,7 @@ def read_map(
     suffix = file.suffix.lower()
     with naming(name_of(file)):
         _require_use(options, suffix)
+        require_content(file, but=suffix)
         if suffix in (".yaml", ".yml"):
             grid, files = read_grid(file, options, notes, pictures)
             return _imported(grid, "map", options.surface, notes, "map_server", files)
@@ -116,6 +117,7 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPT
     """
     file = Path(path)
     with naming(name_of(file)):
+        require_content(file, but=file.suffix.lower())
         if is_bag(file):
             return read_bag(file, options)
         if file.suffix.lower() in TEXTS:

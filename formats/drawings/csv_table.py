@@ -89,8 +89,9 @@ def read_csv(path: Path, drawing: Drawing) -> None:
             wrong = next(k for k in table.wanted if k >= len(row) or _number(row[k]) is None)
             found = f"'{shown(row[wrong])}' in column {wrong + 1}" if wrong < len(row) else f"{len(row)} cells"
             raise MalformedFileError(f"line {line}: expected rows of x1, y1, x2, y2, found {found}")
-        if not table.names and sum(_number(cell) is not None for cell in row) > len(COLUMNS):
-            raise _unclear(row, line)
+        most = len(table.names) or len(COLUMNS)
+        if sum(_number(cell) is not None for cell in row) > most:
+            raise _unclear(row, line, most)
         commas += any("," in row[k] for k in table.wanted)
         properties = {table.names[k]: row[k] for k in others if k < len(row)}
         layer = properties.get("layer", texts[0] if texts and not table.names else None)
@@ -102,6 +103,8 @@ def read_csv(path: Path, drawing: Drawing) -> None:
             layers = (layer,) if layer else ()
             drawing.add([(x1, y1, z1), (x2, y2, z2)], layers=layers, properties=properties, groups=layers)
     drawing.add_segments(loose)
+    if not table.names:
+        drawing.notes.add_assumed("columns", "columns are assumed to be x1, y1, x2, y2, because the file names none")
     if commas:
         drawing.notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
 
@@ -111,6 +114,11 @@ def _table(lines: list[str]) -> Table:
     kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip(" \t\r\n,;|") and not line.startswith(COMMENTS)]
     told = re.fullmatch(r"\"?sep=(.)\"?\s*", kept[0][1]) if kept else None
     kept = kept[1:] if told else kept
+    named = [line for line in lines[: kept[0][0] - 1] if line.startswith(COMMENTS)] if kept else []
+    named = [line.lstrip("#%/ ") for line in named]  # numpy and Matlab put the names of columns into a comment
+    header_line = next((line for line in named if any(_columns(_cells(line, one))[2] for one in DELIMITERS)), "")
+    if header_line:
+        kept.insert(0, (kept[0][0], header_line))
     first = kept[0][1] if kept else ""
     likely = next((one for one in DELIMITERS if one in first), ",")
     for delimiter in (told[1],) if told else (*DELIMITERS, likely):
@@ -169,9 +177,10 @@ def _number(cell: str) -> float | None:
     return float(cell) if NUMBER.fullmatch(cell) else None
 
 
-def _unclear(row: list[str], line: int) -> IncompleteFileError:
+def _unclear(row: list[str], line: int, most: int) -> IncompleteFileError:
     numbers = sum(_number(cell) is not None for cell in row)
     return IncompleteFileError(
-        f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected four: x1, y1, x2, y2. An index, z, "
-        "or decimal commas make more. Delete the others, or name the columns in a first row: x1,y1,x2,y2 among others"
+        f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected {most}, as x1, y1, x2, y2. An "
+        "index, z, or decimal commas make more. Delete the others, or name all columns in a first row, x1,y1,x2,y2 "
+        "among them"
     )

@@ -225,6 +225,6 @@ class Drawing:
 
     def without_lines(self) -> MalformedFileError:
         """Return the error for a drawing without lines: it names what is there instead."""
-        found = [f"{note.message} ({note.count})" for note in self.notes.dropped.values()]
+        found = [note.message + (f" ({note.count})" if note.count else "") for note in self.notes.dropped.values()]
         what = f"; the file has: {'; '.join(found)}" if found else ""
         return MalformedFileError(f"has no lines that could be walls{what}")

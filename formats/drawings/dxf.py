@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING
 
 from ezdxf import path as ezpath
 from ezdxf import recover
+from ezdxf.audit import AuditError
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.entities.polyline import Polyline
 from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
 
-from ..errors import FormatError, MalformedFileError, TooLargeError, UnsupportedFormatError
+from ..errors import FormatError, MalformedFileError, TooLargeError
 from ..files import read_bounded
-from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
+from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES, MAX_TEXT
 from ..options import US_FOOT
-from ..report import Notes, shown
+from ..report import Notes, first_of, shown
 from .drawing import Drawing
 from .dxf_blocks import Expansion, Placed, shown_parts
 from .selection import walls_among
@@ -51,6 +52,7 @@ SAGITTA = 0.01  # m; how far a chord may lie from its arc
 CURVE, FRAME = 8, 16  # flags of a vertex of a POLYLINE that was smoothed: of the curve, or a control point
 
 BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
+_END = re.compile(rb"\n[ \t]*0\r?\n[ \t]*EOF\s*$")
 _OBJECT = re.compile(rb"\n[ \t]*0\r?\n")  # group code 0 begins an entity, an object or a section
 BROKEN = (DXFError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError, struct.error)
 PROXIES = ("ACAD_PROXY", "AEC_", "ACDBZOMBIE")  # beginnings of the kinds of entities of other programs
@@ -73,7 +75,7 @@ def read_dxf(path: Path, drawing: Drawing) -> None:
         if not options.layers and not options.where:
             drawing.walls = walls_among(expansion.layers(document.modelspace()), drawing.notes)
         for placed in expansion.visible(document.modelspace()):
-            if not drawing.takes(placed.layers, _properties(placed)):
+            if not drawing.takes(placed.layers, _properties(placed, expansion.broken)):
                 continue
             before = len(drawing.polylines)
             _add(placed, drawing, SAGITTA / metres)
@@ -90,8 +92,6 @@ def read_dxf(path: Path, drawing: Drawing) -> None:
 
 def _document(path: Path, notes: Notes) -> Document:
     content = read_bounded(path, MAX_MAP_BYTES)
-    if content[:4] == b"AC10":
-        raise UnsupportedFormatError("is a DWG, which is not supported; save it as DXF")
     if not content.strip():
         raise MalformedFileError("is empty, expected a DXF")
     if sum(1 for _ in islice(_OBJECT.finditer(content), MAX_DXF_OBJECTS + 1)) > MAX_DXF_OBJECTS:
@@ -105,9 +105,15 @@ def _document(path: Path, notes: Notes) -> Document:
         else:
             document, auditor = recover.read(io.BytesIO(content))
     except (OSError, *BROKEN) as error:
-        raise MalformedFileError("is not a DXF") from error
-    if auditor.fixes or auditor.errors:
-        notes.add_assumed("repairs", "errors of the file that were repaired", len(auditor.fixes) + len(auditor.errors))
+        raise MalformedFileError("is not a DXF; check whether it is cut off") from error
+    entries = [*auditor.fixes, *auditor.errors]
+    if wrong := [one.message for one in entries if one.code == AuditError.INVALID_FLOATING_POINT_VALUE]:
+        raise MalformedFileError(f"has numbers that cannot be read, expected decimal points: {first_of(wrong)}")
+    if entries:
+        told = first_of([one.message for one in entries])
+        notes.add_assumed("repairs", f"errors of the file that were repaired: {told}", len(entries))
+    if not content.startswith(BINARY) and not _END.search(content[-MAX_TEXT:]):
+        notes.add_dropped("cut_off", "the file is cut off: it does not end in EOF, and what follows is missing", 0)
     return document
 
 
@@ -128,9 +134,10 @@ def _width(entity: DXFEntity) -> float:
     return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
 
 
-def _properties(placed: Placed) -> dict[str, str]:
+def _properties(placed: Placed, broken: set[str]) -> dict[str, str]:
     """Return what the option where may name."""
-    return {
+    gaps = {"linetype with gaps": placed.linetype} if placed.linetype.casefold() in broken else {}
+    return gaps | {
         "layer": placed.layers[-1],
         "block": "/".join(placed.blocks),
         "entity": placed.entity.dxftype(),

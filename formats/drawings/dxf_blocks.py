@@ -73,6 +73,8 @@ class Expansion:
         Layers by name, casefolded.
     linetypes : mapping of str to str
         Of the layers.
+    broken : set of str
+        Linetypes with gaps and without symbols, casefolded.
     drawing : Drawing
         Whose notes take what was done.
     """
@@ -80,6 +82,7 @@ class Expansion:
     frozen: set[str]
     off: set[str]
     linetypes: Mapping[str, str]
+    broken: set[str]
     drawing: Drawing
     _hidden: Counter[str] = field(default_factory=Counter)
     _external: Counter[str] = field(default_factory=Counter)
@@ -93,7 +96,8 @@ class Expansion:
         frozen = {layer.dxf.name.casefold() for layer in layers if layer.is_frozen()}
         off = {layer.dxf.name.casefold() for layer in layers if layer.is_off()}
         linetypes = {layer.dxf.name.casefold(): str(layer.dxf.get("linetype", "Continuous")) for layer in layers}
-        return cls(frozen, off, linetypes, drawing)
+        broken = {one.dxf.name.casefold() for one in document.linetypes if len(one.simplified_line_pattern()) > 1}
+        return cls(frozen, off, linetypes, broken, drawing)
 
     def visible(self, entities: Iterable[Any]) -> Iterator[Placed]:
         """Yield the visible entities with their layers; notes are complete when it ends.

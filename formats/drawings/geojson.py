@@ -56,7 +56,8 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
             raise MalformedFileError(f"expected every feature to be an object, found {kind_of(feature)} as feature {k}")
         _read_feature(feature, drawing, k)
     if told.get("metres") is not True:
-        require_lengths(root.get("crs", root.get("coordRefSys")), drawing)
+        members = [one[key] for one in (root, *features) for key in ("crs", "coordRefSys") if key in one]
+        require_lengths(members[0] if members else None, drawing)
 
 
 def _loaded(content: bytes) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import MalformedFileError, TooLargeError
 from ..files import kind_of, load_json, read_bounded
 from ..limits import MAX_MAP_BYTES, MAX_POINTS
-from ..report import shown
+from ..report import first_of, shown
 from .drawing import Drawing
 
 OWN_FIELDS = {"segments", "sigma", "oriented", "frame_id", "meta", "points", "points_sigma"}
@@ -28,7 +28,9 @@ def read_json(path: Path, drawing: Drawing) -> None:
     root = load_json(read_bounded(path, MAX_MAP_BYTES))
     told = {"segments": root} if isinstance(root, list) else root
     if not isinstance(told, dict) or not isinstance(told.get("segments"), list):
-        found = f"segments that are {kind_of(told.get('segments'))}" if isinstance(told, dict) else kind_of(told)
+        found = kind_of(told)
+        if isinstance(told, dict):
+            found = f"{kind_of(told['segments'])}" if "segments" in told else f"an object with {first_of(list(told))}"
         if isinstance(told, dict) and "features" in told:
             found += ", as in GeoJSON: rename the file to .geojson" if "type" in told else "; convert it to GeoJSON"
         raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}')

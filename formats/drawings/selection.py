@@ -53,7 +53,7 @@ NOT_SEEN = {
     "natural": ("water", "wood", "grassland", "scrub", "tree_row"),
     "leisure": ("park", "pitch", "garden", "playground"),
     "linetype": ("*dash*", "*hidden*", "*strichl*", "*verdeckt*", "acad_iso0[234]*"),  # above the head, or covered
-    "stroke-dasharray": "*",
+    **dict.fromkeys(("linetype with gaps", "stroke-dasharray"), "*"),  # axes, too
     "feature_type": ("geofence", "section", "venue", "relationship", "occupant", "address", *KINDS),
 }
 SEEN = (*TYPES, "indoor", "barrier", "building", "feature_type")  # name what an entity is

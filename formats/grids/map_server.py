@@ -18,7 +18,7 @@ from PIL import Image, UnidentifiedImageError
 from registration import RigidTransform
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError, naming
-from ..files import kind_of, load_yaml, name_of, read_bounded, text_of
+from ..files import kind_of, load_yaml, name_of, read_bounded, require_content, text_of
 from ..limits import (
     MAX_CELLS,
     MAX_MAP_BYTES,
@@ -28,7 +28,7 @@ from ..limits import (
     MIN_RESOLUTION,
 )
 from ..options import ImportOptions
-from ..report import Notes, shown
+from ..report import Notes, first_of, shown
 from .cells import Grid
 from .tuning import UNKNOWN_GREYS
 
@@ -37,6 +37,8 @@ OTHERS = {
     b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF",
     b"Pf": "a PFM", b"PF": "a PFM",
 }  # fmt: skip
+TEXT_MODE = re.compile(rb"P[56](\s+(#[^\n]*\n\s*)*\d+){3}\r\n")
+COLOURED = 64  # of 255, the difference between the colours of a cell; that of grey ones in a JPEG is less
 NAN = re.compile(r"[-+]?\.?nan(\(ind\)|\(snan\))?", re.IGNORECASE)
 WORDS = {"no": 0, "false": 0, "off": 0, "yes": 1, "true": 1, "on": 1}  # of YAML 1.1, as ROS reads it
 MAX_YAW = 1.01 * math.tau  # rad; a turn that was rounded
@@ -106,7 +108,7 @@ def read_grid(
             f"names the picture {shown(told.image)}, but there is no such file in its folder; copy the picture there"
         )
     with naming(name_of(picture)):
-        pixels, alpha = read_picture(picture)
+        pixels, alpha = read_picture(picture, notes)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
         told.resolution,
@@ -138,7 +140,8 @@ def read_description(path: Path, notes: Notes) -> Description:
         )
     missing = [key for key in ("image", "resolution", "origin") if key not in values]
     if missing:
-        raise IncompleteFileError(f"has no {' and no '.join(missing)}; add it")
+        found = first_of(list(map(str, values)))
+        raise IncompleteFileError(f"has no {' and no '.join(missing)}, as the YAML file of a grid has; found {found}")
     mode = str(values.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise UnsupportedFormatError(
@@ -222,7 +225,7 @@ def _origin(value: Any, notes: Notes) -> RigidTransform:
     return RigidTransform(*map(float, told))
 
 
-def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+def read_picture(path: Path, notes: Notes) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     """Read a picture.
 
     Returns
@@ -239,7 +242,12 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
     TooLargeError
         When it has too many pixels.
     """
+    require_content(path)
     content = read_bounded(path, MAX_MAP_BYTES)
+    if TEXT_MODE.match(content):
+        raise MalformedFileError(
+            "was transferred as text: its header has line ends of Windows, which shift all cells. Transfer it as binary"
+        )
     kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), None)
     try:
         if kind is not None:
@@ -251,7 +259,7 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
                     raise TooLargeError(
                         f"expected at most {MAX_CELLS} pixels, found {picture.width} x {picture.height}; crop the map"
                     )
-                return _pixels(picture)
+                return _pixels(picture, notes)
     except FormatError:
         raise
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
@@ -265,20 +273,22 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
         ) from error
 
 
-def _pixels(picture: Image.Image) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+def _pixels(picture: Image.Image, notes: Notes) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     if picture.mode in ("I", "I;16", "I;16B"):
         values = np.asarray(picture, dtype=np.float32)
         hidden = picture.info.get("transparency")
         alpha = np.where(values == hidden, np.float32(0), np.float32(1)) if isinstance(hidden, int) else None
         return values / np.float32(65535), alpha
-    if picture.has_transparency_data:
-        colours = np.asarray(picture.convert("RGBA"), dtype=np.float32) / np.float32(255)
-        opaque = bool((colours[..., 3] == 1.0).all())
-        return colours[..., :3].mean(axis=2, dtype=np.float32), None if opaque else colours[..., 3]
-    if picture.mode in ("1", "L"):
+    if picture.mode in ("1", "L") and not picture.has_transparency_data:
         return np.asarray(picture.convert("L"), dtype=np.float32) / np.float32(255), None
-    colours = np.asarray(picture.convert("RGB"), dtype=np.float32) / np.float32(255)
-    return colours.mean(axis=2, dtype=np.float32), None
+    rgba = np.asarray(picture.convert("RGBA"))
+    colours, alpha = rgba[..., :3], rgba[..., 3].astype(np.float32) / np.float32(255)
+    if coloured := int((np.ptp(colours, axis=2) > COLOURED).sum()):
+        told = "cells have a colour, as zones of a map editor; they count by their brightness, as in map_server"
+        notes.add_assumed("coloured", told, coloured)
+    if hidden := int((alpha < 1.0).sum()):
+        notes.add_assumed("transparent", "cells that are not opaque are unknown", hidden)
+    return colours.mean(axis=2, dtype=np.float32) / np.float32(255), alpha if hidden else None
 
 
 def _occupancy(

@@ -10,17 +10,19 @@ from functools import partial
 from pathlib import Path
 
 from registration import InputError, RigidTransform
-from vectorization import LaserScan
+from vectorization import LaserScan, require_angle_max
 
 from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
 from ..files import BYTE_ORDER_MARK, WIDE, name_of
 from ..limits import MAX_LINE_BYTES
 from ..report import Notes
+from .lasers import note_far
 from .scan import Log, LoggedScan, LogOptions, Stamps, none_usable
 
 SIMPLE = ("FLASER", "RLASER")
 KINDS = (*SIMPLE, "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")
 MESSAGES = {"ODOM", "TRUEPOS", "PARAM", "SYNC", "NMEAGGA", "NMEARMC", *KINDS}
+TRAILING = 9  # words behind the ranges of a simple message: two poses, two times and a host
 NO_RETURN = 80.0  # m; what the range finders of these logs read, or more, where nothing came back
 
 # Field of view, degrees, by the number of beams: SICK LMS 200 at 100 degrees, LMS 5xx at 190, Hokuyo URG-04LX, LMS 1xx,
@@ -88,14 +90,16 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
             continue
         except (ValueError, LookupError, OverflowError):
-            first = first or f"line {number} is broken"
+            first = first or f"line {number} is no {kind} message: check the number of its ranges, and decimal points"
             notes.add_dropped("broken_line", f"broken lines, the last at {number}", 1)
             continue
+        note_far(scan.laser, notes)
         stamps.of(scan.stamp_ns)
         notes.add_read("scans", f"{kind} scans", 1)
         moves = _moves(path, kind, settings) if moves is None else moves
-        if scan.pose is not None and not moves:
-            notes.add_assumed("no_odometry", "no odometry was found: in all scans the robot is at 0, 0, 0")
+        if not moves:
+            told = "in all scans the robot is at 0, 0, 0" if scan.pose is not None else f"{kind} messages have no pose"
+            notes.add_assumed("no_odometry", f"no odometry was found: {told}")
             scan = replace(scan, pose=None, pose_frame="")
         yield stamps.placed(scan)
     if "scans" not in notes.read and first:
@@ -114,7 +118,7 @@ def _moves(path: Path, kind: str, settings: Settings) -> bool:
             scan = _scan_of(words, settings, Notes())
         except (InputError, ValueError, LookupError, OverflowError):
             continue
-        if scan.pose is None or scan.pose != scan.mount:
+        if scan.pose != scan.mount:
             return True
     return False
 
@@ -146,6 +150,8 @@ def _simple(words: list[str], settings: Settings, notes: Notes) -> LoggedScan:
     n = _count(words[1])
     ranges = [float(w) for w in words[2 : 2 + n]]
     rest = words[2 + n :]
+    if len(rest) > TRAILING:
+        raise ValueError(f"found {len(rest)} words after the ranges, expected at most {TRAILING}")
     laser, robot = _pose(rest[0:3]), _pose(rest[3:6])
     side = "rear" if words[0] == "RLASER" else "front"
     most = _setting(settings, f"robot_{side}_laser_max") or NO_RETURN
@@ -195,7 +201,9 @@ def _setting(settings: Settings, name: str) -> float | None:
 def _full(words: list[str]) -> LoggedScan:
     """``ROBOTLASER1 type start fov step max accuracy mode n r.. m remission.. laser(3) robot(3) (5) time ..``."""
     angles = _Angles(float(words[2]), float(words[4]), float(words[5]))
-    n = _count(words[8])
+    n, field = _count(words[8]), float(words[3])
+    if field > 0.0:
+        require_angle_max(angles.first, angles.first + field, angles.step, n)
     ranges = [float(w) for w in words[9 : 9 + n]]
     rest = words[9 + n :]
     rest = rest[1 + _count(rest[0]) :]

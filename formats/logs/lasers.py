@@ -53,10 +53,15 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
     if high == math.inf:
         ranges = np.where(np.isinf(ranges), math.nan, ranges)
     scan = LaserScan(first, step, ranges, low, high)
-    if not np.isfinite(scan.cleaned).any() and np.isfinite(ranges).any():
-        told = f"range_min {low:g} m and range_max {high:g} m"
-        notes.add_assumed("no_range_within", f"scans without any range between {told}", 1)
+    note_far(scan, notes)
     return scan
+
+
+def note_far(scan: LaserScan, notes: Notes) -> None:
+    """Note a scan whose ranges are all too near or too far, as those in another unit are."""
+    if not np.isfinite(scan.cleaned).any() and np.isfinite(scan.ranges).any():
+        told = f"range_min {scan.range_min:g} m and range_max {scan.range_max:g} m"
+        notes.add_assumed("no_range_within", f"scans without any range between {told}", 1)
 
 
 def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:

@@ -19,8 +19,8 @@ from mcap.records import Channel, Chunk, ChunkIndex, Footer, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 
-from ..errors import MalformedFileError, UnsupportedFormatError
-from ..files import name_of
+from ..errors import MalformedFileError
+from ..files import name_of, require_content
 from ..limits import MAX_CHUNK_BYTES
 from .recording import Connection, Received, ros_type
 
@@ -30,7 +30,6 @@ BROKEN = (
     MemoryError, zstandard.ZstdError,
 )  # fmt: skip
 
-ZSTD = b"\x28\xb5\x2f\xfd"
 MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -70,6 +69,7 @@ class McapFile:
         self._cut = False
         self._broken: set[int] = set()  # chunks, by where they begin in the file
         self._limit = path.stat().st_size
+        require_content(path, but=".mcap")
         self._file = _WholeReads(FileIO(path))
         try:
             self._begin()
@@ -118,8 +118,6 @@ class McapFile:
             magic = self._file.read(len(MAGIC))
         except EndOfFile:
             magic = b""
-        if magic.startswith(ZSTD):
-            raise UnsupportedFormatError("is compressed as a whole; decompress it first with zstd -d")
         if magic != MAGIC:
             raise MalformedFileError("is not an mcap: its first bytes are not those of the format")
 

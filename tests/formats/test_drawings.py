@@ -117,11 +117,12 @@ def test_geojson_is_read_as_metres_by_an_explicit_flag_alone(tmp_path: Path) -> 
 def test_lines_drawn_twice_are_merged_and_specks_dropped(tmp_path: Path) -> None:
     imported = read_map(written(tmp_path, "a.csv", "0,0,4,0\n4,0,0,0\n0,0,4,0\n1,1,1,1.001\n"))
     assert rows(imported) == [[0, 0, 4, 0]]
-    assert counts(imported) == {"doubles": 2, "short": 1, "segments": 1, "directions": 0}
+    read = {"unit": 0, "segments": 1, "columns": 0}
+    assert counts(imported) == read | {"doubles": 2, "short": 1, "directions": 0}
 
 
 def test_centre_lines_become_two_faces_apart_by_the_thickness(tmp_path: Path) -> None:
-    path = written(tmp_path, "a.csv", "0,0,4,0\n")
+    path = written(tmp_path, "a.csv", "x1,y1,x2,y2\n0,0,4,0\n")
     imported = read_map(path, ImportOptions(drawn="centres", thickness=0.2))
     # Free space on the left of each: the upper face runs along +x, the lower one back, and both ends are closed.
     assert rows(imported) == [[0, 0.1, 4, 0.1], [4, -0.1, 0, -0.1], [0, -0.1, 0, 0.1], [4, 0.1, 4, -0.1]]
@@ -175,7 +176,8 @@ Lines = Sequence[Sequence[float]]
 
 
 def csv(tmp_path: Path, lines: Lines) -> Path:
-    return written(tmp_path, "plan.csv", "".join(",".join(map(str, line)) + "\n" for line in lines))
+    rows = "".join(",".join(map(str, line)) + "\n" for line in lines)
+    return written(tmp_path, "plan.csv", f"x1,y1,x2,y2\n{rows}")
 
 
 def assumed(imported: ImportedMap) -> list[str]:

@@ -25,8 +25,8 @@ from .reading import counts, notes
 
 FLASER = "FLASER 4 1.0 2.0 81.91 3.0 10 20 1.5 9 20 0 100.25 host 100.25\n"
 ROBOTLASER = (
-    "ROBOTLASER1 0 -1.5 3.0 0.5 30 0.01 0 3 1 2 30 2 7 8 1 2 0.5 1 2 0.5 0 0 0 0 0 50.5 host 50.5\n"
-    "RAWLASER1 0 -1.5 3.0 0.5 30 0.01 0 3 1 2 30 0 51.5 host 51.5\n"
+    "ROBOTLASER1 0 -1.5 1.0 0.5 30 0.01 0 3 1 2 30 2 7 8 1 2 0.5 1 2 0.5 0 0 0 0 0 50.5 host 50.5\n"
+    "RAWLASER1 0 -1.5 1.0 0.5 30 0.01 0 3 1 2 30 0 51.5 host 51.5\n"
 )
 
 

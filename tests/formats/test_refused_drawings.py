@@ -27,7 +27,7 @@ LINE = b'{"type": "LineString", "coordinates": %s}'
         ("a.dxf", "nothing of the kind", MalformedFileError, "is not a DXF"),
         ("a.dxf", "AC1032\0\0\0", UnsupportedFormatError, "save it as DXF"),
         ("a.svg", "<svg", MalformedFileError, "is not XML"),
-        ("a.svg", "<html/>", MalformedFileError, "expected an svg element"),
+        ("a.svg", "<kml/>", MalformedFileError, "expected an svg element"),
         ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
         ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
         ("a.svg", SVG.format('<path d="' + "M0 0" * 1_100_000 + '"/>'), TooLargeError, "characters of paths"),

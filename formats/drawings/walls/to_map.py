@@ -47,12 +47,12 @@ def to_map(drawing: Drawing) -> LineMap:
     options = drawing.options
     metres = options.metres or drawing.metres
     drawing.leave_out_others()
+    if not drawing.polylines:
+        raise drawing.without_lines()
     if metres is None:
         doubt = drawing.notes.assumed.get("unknown_unit")
         why = f": {doubt.message}" if doubt is not None else ""
         raise IncompleteFileError(f"does not state its unit{why}; set the option units, for example to mm or m")
-    if not drawing.polylines:
-        raise drawing.without_lines()
     drawing.require_plan()
     drawing.polylines = on_level(drawing, metres)
     endpoints = np.vstack([one.ends for one in drawing.polylines]) * metres
@@ -64,8 +64,7 @@ def to_map(drawing: Drawing) -> LineMap:
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
         endpoints, widths = endpoints[near], widths[near]
-        if drawing.format in ("dxf", "svg"):
-            _note_unit(endpoints, metres, drawing)
+        _note_unit(endpoints, metres, drawing)
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
     if are_centres(endpoints, drawing):
         endpoints, oriented = _with_faces(endpoints, widths, drawing), True
