@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from vectorization import Motion
 from ..report import Notes, shown
 from .tracks import NS, Floats, Known, Track
 from .transforms import Transforms, planar
-from .trees import ODOM, OdometryTopic
+from .trees import MOVING, ODOM
 from .tuning import COMPARED_NS, DIFFERENT, JITTER, MOVED, SAMPLES
 
 BASES = ("base_link", "base_footprint")
@@ -31,47 +30,35 @@ class Odometry:
         Frame that the poses are in.
     source : str
         ``tf``, or the topic of the Odometry messages.
-    moving : tuple of Track
-        The transforms that are not fixed.
+    tracks : tuple of Track
+        The transforms from the frame outwards, and the poses of the messages.
     """
 
     outer: str
     source: str
-    _tree: Transforms
-    _path: Sequence[str]  # from the frame outwards: to `outer`, or to the frame that the messages are of
-    _messages: Track | None = None
-    moving: tuple[Track, ...] = field(default=(), repr=False)
+    tracks: tuple[Track, ...] = field(repr=False)
     _contradicted: tuple[tuple[int, int], ...] = ()  # stamps, begin and end
-
-    @classmethod
-    def of_tree(cls, tree: Transforms, path: Sequence[str]) -> Odometry:
-        """Return the poses of the first frame of a path in the last one."""
-        return cls(path[-1], "tf", tree, path, None, tuple(_moving(tree, path)))
-
-    @classmethod
-    def of_messages(cls, tree: Transforms, path: Sequence[str], topic: OdometryTopic) -> Odometry:
-        """Return the poses of the first frame of a path, by messages that have those of the last one."""
-        moving = (*_moving(tree, path), *((topic.track,) if topic.track.moves else ()))
-        return cls(topic.outer, topic.topic, tree, path, topic.track, moving)
 
     @property
     def name(self) -> str:
         """The topic, or the frame of transforms: as an option chooses it."""
-        return self.source if self._messages is not None else self.outer
+        return self.outer if self.source == MOVING else self.source
 
     @property
-    def stands(self) -> bool:
-        """True where all poses are equal."""
-        return not self.moving
+    def moving(self) -> tuple[Track, ...]:
+        """The transforms that are not fixed; none where all poses are equal."""
+        return tuple(one for one in self.tracks if one.moves)
 
     def known(self, stamp: int, received: int) -> Known | None:
         """Return outer_from_frame of something with a stamp and a time of reception, nanoseconds; None if unknown."""
-        found = self._tree.known(self._path, stamp, received)
-        if found is not None and self._messages is not None:
-            outer = self._messages.known(stamp, received)
-            found = None if outer is None else outer.after(found)
-        if found is None or any(begin <= stamp <= end for begin, end in self._contradicted):
+        if any(begin <= stamp <= end for begin, end in self._contradicted):
             return None
+        found = Known(np.eye(4))
+        for track in self.tracks:
+            step = track.known(stamp, received)
+            if step is None:
+                return None
+            found = step.after(found)
         return replace(found, part=(*found.part, sum(end < stamp for _, end in self._contradicted)))
 
     def compared(self, other: Odometry, notes: Notes) -> Odometry:
@@ -113,19 +100,13 @@ class Odometry:
         received : int
             When the scan was received.
         """
-        windows = [track.window(begin, end, received) for track in self.moving]
-        known = [one for one in windows if one is not None]
-        if len(known) < len(windows):
-            return None
-        first = max((one[0] for one in known), default=begin)
-        last = min((one[1] for one in known), default=end)
-        if last <= first:
-            return None
-        a, b = self.known(first, received + first - begin), self.known(last, received + last - begin)
-        if a is None or b is None or a.part != b.part:
-            return None
-        step, _ = planar(np.linalg.inv(a.matrix @ mount) @ b.matrix @ mount)
-        return _motion(increment, step, (last - first) / NS)
+        # At the ends of the log: the speed just before the scan, or just after it.
+        for first, last in ((begin, end), (2 * begin - end, begin), (end, 2 * end - begin)):
+            a, b = self.known(first, received + first - begin), self.known(last, received + last - begin)
+            if last > first and a is not None and b is not None and a.part == b.part:
+                step, _ = planar(np.linalg.inv(a.matrix @ mount) @ b.matrix @ mount)
+                return _motion(increment, step, (last - first) / NS)
+        return None
 
     def note_doubts(self, notes: Notes) -> None:
         """Note where odometry contradicts itself, or begins again."""
@@ -206,21 +187,11 @@ def moves(tree: Transforms, path: Sequence[str], names: Sequence[str] = BASES) -
 
 
 def _moves(tree: Transforms, path: Sequence[str], *, turning: bool) -> bool:
-    stamps = sorted({stamp for track in _moving(tree, path) for stamp in track.stamps})
+    stamps = sorted({stamp for track in tree.tracks(path) if track.moves for stamp in track.stamps})
     places = (tree.along(path, stamp) for stamp in stamps[:: max(1, len(stamps) // SAMPLES)])
-    first: RigidTransform | None = None
-    for place in places:
-        if place is None:
-            continue
-        pose, _ = planar(place)
-        first = first or pose
-        if math.hypot(pose.x - first.x, pose.y - first.y) > MOVED:
-            return True
-        if turning and abs(wrap_angle(pose.theta - first.theta)) > MOVED:
-            return True
-    return False
-
-
-def _moving(tree: Transforms, path: Sequence[str]) -> Iterator[Track]:
-    tracks = (tree.track(parent, child) for child, parent in pairwise(path))
-    return (track for track in tracks if track.moves)
+    poses = [planar(place)[0] for place in places if place is not None]
+    return any(
+        math.hypot(pose.x - poses[0].x, pose.y - poses[0].y) > MOVED
+        or (turning and abs(wrap_angle(pose.theta - poses[0].theta)) > MOVED)
+        for pose in poses
+    )

@@ -20,7 +20,7 @@ from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
 from .tracks import NS, Floats
 from .transforms import Transforms, planar
-from .trees import BagFrames, OdometryTopic
+from .trees import MOVING, BagFrames, OdometryTopic
 from .tuning import FASTEST, MOST_TILT, SAID_TILT
 
 NAMELESS = "'', the empty frame_id of the scans: set it in the driver"
@@ -229,7 +229,7 @@ class Sensors:
         fitting = self._frames.odometry_of(topic, namespace, above, base)
         others = [self._of_messages(tree, frame, one) for one in fitting]
         if moving is not None:
-            return self._doubted(Odometry.of_tree(tree, moving), others)
+            return self._doubted(Odometry(moving[-1], MOVING, tree.tracks(moving)), others)
         if not fitting:
             self._note_missing(tree, frame, paths)
             return None
@@ -239,7 +239,7 @@ class Sensors:
 
     def _of_messages(self, tree: Transforms, frame: str, topic: OdometryTopic) -> Odometry:
         child = topic.child or base_of(tree.above(frame), self._bases) or frame
-        return Odometry.of_messages(tree, tree.path(child, frame) or [frame], topic)
+        return Odometry(topic.outer, topic.topic, (*tree.tracks(tree.path(child, frame) or [frame]), topic.track))
 
     def _chosen(self, source: str, tree: Transforms, frame: str) -> Odometry:
         """Return the odometry of a topic, or in a frame."""
@@ -253,7 +253,7 @@ class Sensors:
                 f"no odometry from {shown(source)}: expected a topic of Odometry messages or a frame above "
                 f"{shown(frame)}, found {there}; correct the option odometry (--odom)"
             )
-        return Odometry.of_tree(tree, path)
+        return Odometry(path[-1], MOVING, tree.tracks(path))
 
     def _doubted(self, found: Odometry, others: Sequence[Odometry] = ()) -> Odometry:
         for other in others:
@@ -284,7 +284,7 @@ class Sensors:
             self._notes.add_assumed(
                 "odometry", f"odometry is that of {shown(found.source)}; not used: {', '.join(map(shown, others))}"
             )
-        if found.stands:
+        if not found.moving:
             self._notes.add_assumed("odometry_stands", f"the robot never moves according to {shown(found.source)}")
 
 

@@ -269,31 +269,6 @@ class Track:
             part.settle()
         return max(part.longest for part in self._parts)
 
-    def window(self, begin: int, end: int, received: int | None = None) -> tuple[int, int] | None:
-        """Return two times in or around a scan between which the values give its speed; None where none do.
-
-        Parameters
-        ----------
-        begin, end : int
-            Of the scan, nanoseconds.
-        received : int, optional
-            As of `at`.
-        """
-        stamps = self._parts[self._number(begin, received)].stamps
-        first = max(0, bisect.bisect_right(stamps, begin) - 1)
-        last = min(len(stamps) - 1, bisect.bisect_left(stamps, end))
-        if first == last:
-            first, last = max(0, first - 1), min(len(stamps) - 1, last + (first == 0))
-        a, b = stamps[first], stamps[last]
-        if (
-            not 0 < b - a <= tuning.WINDOW_NS + end - begin
-            or a > end + tuning.WINDOW_NS
-            or b < begin - tuning.WINDOW_NS
-        ):
-            return None
-        within = max(a, begin), min(b, end)
-        return within if 2 * (within[1] - within[0]) >= end - begin else (a, b)
-
     def _number(self, stamp: int, received: int | None) -> int:
         """Return the part whose values were received as long after their stamps as what has this stamp."""
         if received is None or len(self._parts) == 1:

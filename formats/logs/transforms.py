@@ -16,7 +16,7 @@ from registration.limits import MAX_COORDINATE
 from ..errors import MalformedFileError, TooLargeError
 from ..limits import MAX_TRANSFORMS
 from ..report import shown
-from .tracks import NS, Floats, Known, Track
+from .tracks import NS, Floats, Track
 from .tuning import UNIT
 
 MAX_FRAMES = 1000
@@ -150,25 +150,19 @@ class Transforms:
             frame = came_from[frame]
         return back[::-1]
 
+    def tracks(self, path: Sequence[str]) -> tuple[Track, ...]:
+        """Return the values of the transforms along a path, the innermost first."""
+        return tuple(self.track(parent, child) for child, parent in pairwise(path))
+
     def along(self, path: Sequence[str], stamp: int, received: int | None = None) -> Floats | None:
         """Return the transform from the first frame of a path to its last, (4, 4); None where it is not known then."""
         matrix = np.eye(4)
-        for child, parent in pairwise(path):
-            step = self._parents[child][parent].at(stamp, received)
+        for track in self.tracks(path):
+            step = track.at(stamp, received)
             if step is None:
                 return None
             matrix = step @ matrix
         return matrix
-
-    def known(self, path: Sequence[str], stamp: int, received: int | None) -> Known | None:
-        """Return `along` where each step is known as odometry."""
-        known = Known(np.eye(4))
-        for child, parent in pairwise(path):
-            step = self._parents[child][parent].known(stamp, received)
-            if step is None:
-                return None
-            known = step.after(known)
-        return known
 
     def _outwards(self, frame: str) -> dict[str, str | None]:
         """Return each frame above one, and the frame below from which it is reached first; nearest first."""

@@ -12,7 +12,6 @@ PART_NS = 300_000_000  # a stamp that is so far before the last one begins a new
 CLOCKS_APART_NS = 500_000_000  # by which times from stamp to reception differ where clocks do; buffers delay by less
 JITTER = 0.1  # m and rad that two values may differ at any times: stamps of one batch
 STALE_NS = 500_000_000  # a moving transform holds no longer than this before its first and after its last value
-WINDOW_NS = 500_000_000  # between the values that a speed is taken from, the duration of the scan aside
 FASTEST = 10.0  # m/s and rad/s; a robot indoors that seems to be faster has odometry that jumps
 MOST_TILT = math.radians(20.0)  # of a scan plane; beyond, ranges say little of walls: cos(20 degrees) is 6 %
 SAID_TILT = math.radians(2.0)  # of a scan plane, from which on it is reported: mounts are not more exact
