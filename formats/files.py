@@ -28,10 +28,12 @@ BEGINNINGS = {
     b"AutoCAD DXB": "is a DXB, which is not supported; save it as DXF",
     b"ISO-10303-21": "is a model in IFC or STEP; export the plan of a floor as DXF",
     b"version https://git-lfs": "is a pointer of Git LFS and not the file; run git lfs pull",
-    b"<!DOCTYPE html": "is a web page, as of a login; download the file again",
-    b"<html": "is a web page, as of a login; download the file again",
-    b"# .PCD": "is a point cloud; expected lines or a grid",
-    b"ply\n": "is a point cloud; expected lines or a grid",
+    **dict.fromkeys((b"<!DOCTYPE html", b"<html"), "is a web page, as of a login; download the file again"),
+    **dict.fromkeys((b"# .PCD", b"ply\n"), "is a point cloud; expected lines or a grid"),
+    **dict.fromkeys((b"II*\0", b"MM\0*"), "is a TIFF; save it as PNG"),
+    b"GIF8": "is a GIF; save it as PNG",
+    b"RIFF": "is a WebP; save it as PNG",
+    **dict.fromkeys((b"Pf\n", b"PF\n"), "is a PFM; save it as PNG"),
     b"#ROSBAG V2.0": "is a bag of ROS 1; its name has to end in .bag",
     b"\x89MCAP": "is an MCAP file; its name has to end in .mcap",
     b"SQLite format 3": "is a bag of ROS 2 in SQLite; its name has to end in .db3",
@@ -70,13 +72,15 @@ def kind_of(value: Any) -> str:
 
 
 def require_content(path: Path, *, but: str = "") -> None:
-    """Refuse a file that begins as one of another format; `but` is a suffix whose own beginning is right.
+    """Refuse a file that is missing, or begins as one of another format; `but` is a suffix of its own.
 
     Raises
     ------
-    UnsupportedFormatError
+    IncompleteFileError, UnsupportedFormatError
         With what to do.
     """
+    if not path.exists():
+        raise IncompleteFileError("there is no such file; check the path and the working folder")
     if path.is_file():
         with path.open("rb") as file:
             begin = file.read(max(map(len, BEGINNINGS)))
@@ -96,8 +100,6 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
     Raises
     ------
-    IncompleteFileError
-        When there is no such file.
     MalformedFileError
         When it cannot be read.
     TooLargeError
@@ -107,8 +109,6 @@ def read_bounded(path: Path, limit: int) -> bytes:
         with path.open("rb") as file:
             content = file.read(limit + 1)
             size = max(len(content), os.fstat(file.fileno()).st_size)
-    except FileNotFoundError as error:
-        raise IncompleteFileError("there is no such file; check the path and the working folder") from error
     except OSError as error:
         raise MalformedFileError(f"cannot be read: {error.strerror}") from error
     if len(content) > limit:

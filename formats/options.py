@@ -26,6 +26,10 @@ UNITS = {
 }
 
 
+def _is_place(place: tuple[float, ...]) -> bool:
+    return len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)
+
+
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
     """Values that a file lacks; a grid needs none.
@@ -90,21 +94,14 @@ class ImportOptions:
             ("thickness", self.thickness is None or 0.0 <= self.thickness <= 10.0, "from 0 to 10 m"),
             ("unknown", self.unknown in (None, "none") or grey, "none, or a grey value from 0 to 255"),
             ("surface", self.surface is None or 0.0 <= self.surface <= 10.0, "from 0 to 10 cells"),
+            ("where", all(one.partition("=")[0].strip() and "=" in one for one in self.where), "property=value"),
+            ("point", all(map(_is_place, self.point)), f"two numbers up to {MAX_COORDINATE:g} m"),
         ]
         for argument, good, what in checks:
             if not good:
                 value = getattr(self, argument)
                 found = "another name" if isinstance(value, str) else repr(value)
                 raise InvalidOptionError(f"expected {what}, found {found}", argument=argument)
-        for one in self.where:
-            if not one.partition("=")[0].strip() or "=" not in one:
-                raise InvalidOptionError("expected property=value, found none", argument="where")
-        for place in self.point:
-            if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
-                found = "one that is too large or not finite" if len(place) == 2 else f"{len(place)} numbers"
-                raise InvalidOptionError(
-                    f"expected two numbers up to {MAX_COORDINATE:g} m, found {found}", argument="point"
-                )
 
     @property
     def metres(self) -> float | None:

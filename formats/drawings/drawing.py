@@ -197,15 +197,6 @@ class Drawing:
             raise MalformedFileError(f"has a coordinate that is not a number up to {MAX_UNITS:g}")
         return array
 
-    @property
-    def extent(self) -> str:
-        """The extent of the lines, for messages, units of the drawing; empty where there are none."""
-        if not self.polylines:
-            return ""
-        corners = np.vstack([one.ends for one in self.polylines]).reshape(-1, 2)
-        (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
-        return f" from ({left:g}, {bottom:g}) to ({right:g}, {top:g})"
-
     def require_plan(self) -> None:
         """Refuse a section or an elevation, which lies in the x-z or y-z plane; raises `MalformedFileError`."""
         corners = np.vstack([one.ends for one in self.polylines]).reshape(-1, 2)

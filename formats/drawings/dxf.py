@@ -11,8 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ezdxf import bbox, recover
 from ezdxf import path as ezpath
-from ezdxf import recover
 from ezdxf.audit import AuditError
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.lwpolyline import LWPolyline
@@ -199,16 +199,14 @@ def _note_paper_space(document: Document, drawing: Drawing) -> None:
         kinds = Counter(entity.dxftype() for entity in layout if entity.dxftype() != "VIEWPORT")
         if not kinds:
             continue
-        sheet = Drawing(drawing.name, "dxf", Notes())
-        for entity in islice(layout, MAX_CURVE_POINTS):
-            try:
-                _add(Placed(entity, ("",)), sheet, SAGITTA)
-            except FormatError:
-                continue
+        box = bbox.extents(
+            (entity for entity in islice(layout, MAX_CURVE_POINTS) if entity.dxftype() in LINES), fast=True
+        )
+        where = "" if box.is_empty else " from ({:g}, {:g}) to ({:g}, {:g})".format(*box.extmin.vec2, *box.extmax.vec2)
         drawing.notes.add_dropped(
             f"paper_space_{shown(layout.name)}",
             f"entities in paper space, layout {shown(layout.name)}: "
-            f"{', '.join(f'{count} {shown(kind)}' for kind, count in kinds.most_common(3))}{sheet.extent}; move walls "
+            f"{', '.join(f'{count} {shown(kind)}' for kind, count in kinds.most_common(3))}{where}; move walls "
             "to the model space (CHSPACE)",
             kinds.total(),
         )

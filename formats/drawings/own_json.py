@@ -34,15 +34,18 @@ def read_json(path: Path, drawing: Drawing) -> None:
         if isinstance(told, dict) and "features" in told:
             found += ", as in GeoJSON: rename the file to .geojson" if "type" in told else "; convert it to GeoJSON"
         raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}')
-    rows = told["segments"]
-    wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, 4, f"segment {k}"))), None)
-    if wrong is not None:
-        raise MalformedFileError(f"expected every segment to be [x1, y1, x2, y2], found {wrong}")
     drawing.metres = 1.0
     _take_properties(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
         drawing.notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
-    drawing.add_segments(rows)
+    drawing.add_segments(_rows(told["segments"], "segment", "[x1, y1, x2, y2]", 4))
+
+
+def _rows(rows: list[Any], kind: str, form: str, width: int) -> list[Any]:
+    wrong = next((fault for k, row in enumerate(rows) if (fault := _fault_of_row(row, width, f"{kind} {k}"))), None)
+    if wrong is not None:
+        raise MalformedFileError(f"expected every {kind} to be {form}, found {wrong}")
+    return rows
 
 
 def _fault_of_row(row: Any, width: int, named: str) -> str | None:
@@ -73,10 +76,8 @@ def _take_properties(told: dict[str, Any], drawing: Drawing) -> None:
         if not is_good(values.get(key)):
             found = kind_of(values[key])
             raise MalformedFileError(f"expected {key} to be {what}, found {found}")
-    points, sigma, points_sigma = values["points"], values["sigma"], values["points_sigma"]
-    wrong = next((fault for k, row in enumerate(points) if (fault := _fault_of_row(row, 2, f"point {k}"))), None)
-    if wrong is not None:
-        raise MalformedFileError(f"expected every point to be [x, y], found {wrong}")
+    points, sigma = _rows(values["points"], "point", "[x, y]", 2), values["sigma"]
+    points_sigma = values["points_sigma"]
     if len(points) > MAX_POINTS:
         raise TooLargeError(f"expected at most {MAX_POINTS} points, found {len(points)}")
     drawing.oriented, drawing.sigma = values["oriented"], None if sigma is None else float(sigma)

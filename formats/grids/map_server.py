@@ -6,7 +6,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -33,10 +33,6 @@ from .cells import Grid
 from .tuning import UNKNOWN_GREYS
 
 PICTURES = ("PPM", "PNG", "BMP", "JPEG")  # what Pillow may take a picture for
-OTHERS = {
-    b"II*\0": "a TIFF", b"MM\0*": "a TIFF", b"GIF8": "a GIF", b"RIFF": "a WebP", b"\0\0\0": "a HEIF or AVIF",
-    b"Pf": "a PFM", b"PF": "a PFM",
-}  # fmt: skip
 TEXT_MODE = re.compile(rb"P[56](\s+(#[^\n]*\n\s*)*\d+){3}\r\n")
 COLOURED = 64  # of 255, the difference between the colours of a cell; that of grey ones in a JPEG is less
 NAN = re.compile(r"[-+]?\.?nan(\(ind\)|\(snan\))?", re.IGNORECASE)
@@ -115,7 +111,7 @@ def read_grid(
         told.origin,
         told.occupied_thresh,
         told.free_thresh,
-        _shades(told),
+        _levels(UNKNOWN_GREYS if not told.negate else (*UNKNOWN_GREYS, *(255 - grey for grey in UNKNOWN_GREYS)), told),
         _given(options, told),
         () if told.mode == "raw" else (0, 255) if told.negate else (255, 0),
     )
@@ -248,10 +244,7 @@ def read_picture(path: Path, notes: Notes) -> tuple[NDArray[np.float32], NDArray
         raise MalformedFileError(
             "was transferred as text: its header has line ends of Windows, which shift all cells. Transfer it as binary"
         )
-    kind = next((kind for begin, kind in OTHERS.items() if content.startswith(begin)), None)
     try:
-        if kind is not None:
-            raise UnidentifiedImageError
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
@@ -265,8 +258,7 @@ def read_picture(path: Path, notes: Notes) -> tuple[NDArray[np.float32], NDArray
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise TooLargeError(f"expected at most {MAX_CELLS} pixels, found many more; crop the map") from error
     except UnidentifiedImageError as error:
-        said = f"is {kind or 'not a picture'}; expected PGM, PNG, BMP or JPEG. Save it as PNG"
-        raise MalformedFileError(said) from error
+        raise MalformedFileError("is not a picture; expected PGM, PNG, BMP or JPEG. Save it as PNG") from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(
             f"is a broken picture: {shown(str(error))}; expected a whole PGM, PNG, BMP or JPEG. Save it again"
@@ -302,20 +294,14 @@ def _occupancy(
     return occupancy if alpha is None else np.where(alpha == 1.0, occupancy, np.float32(np.nan))
 
 
-def _shades(told: Description) -> tuple[int, ...]:
-    """Return the levels of occupancy that tools write for unknown cells; in mode raw these have no occupancy."""
-    if told.mode == "raw":
-        return ()
-    inverted = tuple(255 - grey for grey in UNKNOWN_GREYS)
-    # A picture with negate is inverted as a whole, or its unknown cells are left as they were.
-    return tuple(dict.fromkeys((*inverted, *UNKNOWN_GREYS))) if told.negate else inverted
+def _levels(greys: Sequence[int], told: Description) -> tuple[int, ...]:
+    """Return the levels of occupancy that cells of some grey values have; those without an occupancy have none."""
+    occupancy = _occupancy(np.array(greys, dtype=np.float32) / np.float32(255), None, told)
+    return tuple(np.rint(255.0 * occupancy[~np.isnan(occupancy)]).astype(int).tolist())
 
 
 def _given(options: ImportOptions, told: Description) -> tuple[int, ...] | None:
     """Return the levels of occupancy that the caller declares as unknown; None by default."""
-    if options.unknown is None or options.unknown == "none":
-        return None if options.unknown is None else ()
-    grey = int(options.unknown)
-    if told.mode == "raw":
-        return (round(grey / RAW_UNKNOWN * 255),) if grey <= RAW_UNKNOWN else None
-    return (grey if told.negate else 255 - grey,)
+    if options.unknown == "none":
+        return ()
+    return None if options.unknown is None else _levels([options.unknown], told) or None

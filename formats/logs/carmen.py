@@ -55,12 +55,10 @@ def read_carmen(path: Path, options: LogOptions) -> Log:
     Raises
     ------
     IncompleteFileError
-        When there is no such file; while iterating, when no scan is in it, or none that is whole.
+        While iterating, when no scan is in it, or none that is whole.
     TooLargeError
         While iterating, when a line is too long.
     """
-    if not path.is_file():
-        raise IncompleteFileError("there is no such file; check the path and the working folder")
     return Log("carmen", name_of(path), partial(_scans, path, options))
 
 

@@ -15,7 +15,8 @@ SUFFIXES = (".bag", *FOLDER_SUFFIXES)
 METADATA = "metadata.yaml"
 PACKED = ".zstd"  # what rosbag2 appends where it compresses whole files
 PACKED_SUFFIXES = tuple(f"{kind}{packed}" for kind in FOLDER_SUFFIXES for packed in (PACKED, ".zst"))
-OLD_SUFFIXES = (".bag", ".bag.active")  # of ROS 1
+ACTIVE = ".bag.active"
+OLD_SUFFIXES = (".bag", ACTIVE)  # of ROS 1
 _NUMBER = re.compile(r"_\d+$")  # of a file among those that one recording was split into
 
 
@@ -23,7 +24,7 @@ def is_bag(path: Path) -> bool:
     """Tell whether a path is a recording: by its ending, or as a folder with such files."""
     if path.is_dir():
         return (path / METADATA).is_file() or bool(_ending(path, *FOLDER_SUFFIXES, *PACKED_SUFFIXES, *OLD_SUFFIXES))
-    return path.suffix.lower() in SUFFIXES or _hint(path) is not None
+    return path.name.lower().endswith((*SUFFIXES, ACTIVE))
 
 
 def recorded_files(path: Path, notes: Notes) -> list[Path]:
@@ -41,12 +42,9 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     FormatError
         When there is none that can be read.
     """
-    if not path.exists():
-        raise IncompleteFileError("there is no such file; check the path and the working folder")
     if not path.is_dir():
-        hint = _hint(path)
-        if hint is not None:
-            raise UnsupportedFormatError(hint)
+        if path.name.lower().endswith(ACTIVE):
+            raise UnsupportedFormatError("was not closed by the recorder; rosbag reindex makes a .bag of it")
         return [path]
     listed = _listed(path, notes) if (path / METADATA).is_file() else None
     if listed is None:
@@ -118,15 +116,3 @@ def _refuse_packed(folder: Path) -> None:
         raise UnsupportedFormatError(
             f"is not a bag of ROS 2, and has {first_of([file.name for file in old])}; choose one file"
         )
-
-
-def _hint(path: Path) -> str | None:
-    """Return what to do with a file that is a recording once something was done to it."""
-    lower = path.name.lower()
-    if lower.endswith(tuple(f"{kind}{packed}" for kind in SUFFIXES for packed in (PACKED, ".zst"))):
-        return "is compressed as a whole; decompress it first with zstd -d"
-    if lower.endswith(tuple(f"{kind}.gz" for kind in SUFFIXES)):
-        return "is compressed as a whole; unpack it first, by gunzip"
-    if lower.endswith(".bag.active"):
-        return "was not closed by the recorder; rosbag reindex makes a .bag of it"
-    return None

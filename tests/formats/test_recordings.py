@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -290,10 +291,16 @@ def test_a_folder_that_was_unpacked_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("a.mcap.zstd", "zstd -d"), ("a.db3.zst", "zstd -d"), ("a.bag.gz", "gunzip"), ("a.bag.active", "rosbag reindex")],
+    [
+        ("a.mcap.zstd", "zstd -d"),
+        ("a.db3.zst", "zstd -d"),
+        ("a.bag.gz", "unpack"),
+        ("a.bag.active", "rosbag reindex"),
+    ],
 )
 def test_a_file_to_which_something_has_to_be_done_first(tmp_path: Path, name: str, message: str) -> None:
-    (tmp_path / name).write_bytes(b"")
+    packed = {".gz": gzip.compress(b"a"), ".active": b""}.get(Path(name).suffix, zstandard.compress(b"a"))
+    (tmp_path / name).write_bytes(packed)
     with pytest.raises(UnsupportedFormatError, match=message):
         read(tmp_path / name)
 
