@@ -258,16 +258,17 @@ class Track:
     @property
     def jumps(self) -> list[Jump]:
         """The steps that are not possible."""
-        for part in self._parts:
-            part.settle()
-        return [jump for part in self._parts for jump in part.jumps]
+        return [jump for part in self._settled() for jump in part.jumps]
 
     @property
     def longest_gap(self) -> int:
         """The longest time within a part in which odometry is not known, nanoseconds."""
+        return max(part.longest for part in self._settled())
+
+    def _settled(self) -> list[_Part]:
         for part in self._parts:
             part.settle()
-        return max(part.longest for part in self._parts)
+        return self._parts
 
     def _number(self, stamp: int, received: int | None) -> int:
         """Return the part whose values were received as long after their stamps as what has this stamp."""

@@ -131,6 +131,7 @@ def test_lines_with_gaps_are_no_walls_whatever_their_name(tmp_path: Path) -> Non
         ("{}<rect width='3' height='2' fill='none' stroke='rgb(0 0 0 / 0)'/>", [[0, 0, 4, 0]]),
         ("{}<line x2='3' y2='3' stroke='#0000'/>", [[0, 0, 4, 0]]),
         ("{}<line x2='3' y2='3' stroke='black' stroke-width='0px'/>", [[0, 0, 4, 0]]),
+        ("<g stroke-width='0'><g stroke-width='1'>{}</g><path d='M0 0 4 4' fill='none'/></g>", [[0, 0, 4, 0]]),
     ],
 )
 def test_shapes_of_an_svg_where_a_browser_draws_them(tmp_path: Path, shape: str, expected: list[list[float]]) -> None:

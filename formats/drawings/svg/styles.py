@@ -12,7 +12,7 @@ import cssselect2
 import tinycss2
 
 from ...errors import TooLargeError
-from ...limits import MAX_STYLE_RULES
+from ...limits import MAX_STYLE_BYTES, MAX_STYLE_RULES
 from .xml import kind_of
 
 # Those by which it is decided what is drawn, and where.
@@ -33,6 +33,9 @@ class Styles:
     def __init__(self, root: Element) -> None:
         self._matched: dict[Element, list[Declared]] = {}
         sheets = [element.text for element in root.iter() if kind_of(element) == "style" and element.text]
+        length = sum(map(len, sheets))
+        if length > MAX_STYLE_BYTES:
+            raise TooLargeError(f"expected at most {MAX_STYLE_BYTES} characters of style elements, found {length}")
         matcher, count = cssselect2.Matcher(), 0
         for sheet in sheets:
             for selector, declared in _rules(sheet):

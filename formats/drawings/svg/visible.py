@@ -48,7 +48,7 @@ class Place:
         From the element's units to the root's.
     viewport : Viewport
     stroke_width : float
-        The element's own units.
+        The element's own units; nan where it is not known.
     visible : bool
     stroked, filled : bool or None
         True if lines, and areas, are painted; None: not specified.
@@ -62,7 +62,7 @@ class Place:
     groups: tuple[str, ...] = ()
     matrix: Matrix = field(default_factory=svgelements.Matrix)
     viewport: Viewport = field(default_factory=Viewport)
-    stroke_width: float = 0.0
+    stroke_width: float = math.nan
     dashes: str = ""
     visible: bool = True
     stroked: bool | None = None
@@ -74,7 +74,7 @@ class Place:
     def width(self) -> float:
         """Of a line, the root's units."""
         m = self.matrix
-        return self.stroke_width * math.sqrt(abs(m.a * m.d - m.b * m.c))
+        return 0.0 if math.isnan(self.stroke_width) else self.stroke_width * math.sqrt(abs(m.a * m.d - m.b * m.c))
 
     def applied(self, points: Points) -> NDArray[np.float64]:
         """Return points in the root's units, (n, 2)."""
@@ -188,7 +188,7 @@ class Visible:
         notes = self._drawing.notes
         if not place.visible:
             notes.add_dropped("hidden", "elements that are not displayed", 1)
-        elif place.stroked is False and (kind == "line" or place.filled is False):
+        elif (place.stroked is False or place.stroke_width == 0.0) and (kind == "line" or place.filled is False):
             notes.add_dropped("not_painted", "elements with neither stroke nor fill", 1)
         elif kind == "rect" and not place.stroked and place.filled and self._covers_all(element, place):
             notes.add_dropped("background", "filled rectangles without a stroke that cover the whole picture", 1)
@@ -291,7 +291,7 @@ def _is_zero(value: str | None) -> bool:
 
 def _paints(style: Mapping[str, str], key: str, inherited: bool | None) -> bool | None:
     """Tell whether a stroke or a fill paints anything; None if not specified."""
-    if _is_zero(style.get(f"{key}-opacity")) or _is_zero(style.get(f"{key}-width")):
+    if _is_zero(style.get(f"{key}-opacity")):
         return False
     if key not in style:
         return inherited
@@ -300,11 +300,11 @@ def _paints(style: Mapping[str, str], key: str, inherited: bool | None) -> bool 
 
 
 def _stroke_width(told: str | None, inherited: float) -> float:
-    """Return how wide lines are drawn; what is no plain number, such as a share of the picture, is taken for none."""
+    """Return how wide lines are drawn; what is no plain number, such as a share of the picture, is not known."""
     if told is None:
         return inherited
     try:
         width = float(told.strip().lower().removesuffix("px"))
     except ValueError:
-        return 0.0
-    return width if 0.0 <= width <= MAX_UNITS else 0.0
+        return math.nan
+    return width if 0.0 <= width <= MAX_UNITS else math.nan

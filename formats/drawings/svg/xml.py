@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from xml.parsers import expat
 
 from ...errors import FormatError, MalformedFileError, TooLargeError
-from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES, MAX_STYLE_BYTES
+from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 CHUNK = 64 * 2**10  # bytes that are parsed at a time
@@ -52,7 +52,7 @@ class _Builder:
         self.tree = TreeBuilder(element_factory=Node)
         self.parser = expat.ParserCreate(namespace_separator="}")
         self.bounds = Bounds()
-        self.depth = self.style_bytes = 0
+        self.depth = 0
         self.in_style = False
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
@@ -72,14 +72,8 @@ class _Builder:
         self.tree.end("{" + tag if "}" in tag else tag)
 
     def text(self, data: str) -> None:
-        if not self.in_style:
-            return
-        self.style_bytes += len(data)
-        if self.style_bytes > MAX_STYLE_BYTES:
-            raise TooLargeError(
-                f"expected at most {MAX_STYLE_BYTES} characters of style elements, found {self.style_bytes} or more"
-            )
-        self.tree.data(data)
+        if self.in_style:
+            self.tree.data(data)
 
     def refuse(self, *_declared: Any) -> None:
         raise MalformedFileError("declares XML entities, which are not read; save it as plain SVG")

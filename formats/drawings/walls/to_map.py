@@ -115,18 +115,15 @@ def _directed(endpoints: Floats, drawing: Drawing) -> Floats:
     """Return lines with free space on the left; in both directions if it is on both sides or unknown."""
     seen = sides_seen(endpoints, drawing.options.point)
     backward = endpoints[:, [2, 3, 0, 1]]
-    counts = {side: int((seen == side).sum()) for side in Sides}
-    drawing.notes.add_assumed(
-        "inside", "directions derived from the free places", counts[Sides.LEFT] + counts[Sides.RIGHT]
-    )
-    if counts[Sides.BOTH]:
-        drawing.notes.add_assumed(
-            "both_sides", "lines with free space on both sides; both directions are used", counts[Sides.BOTH]
-        )
-    if counts[Sides.NEITHER]:
-        drawing.notes.add_assumed(
-            "not_reached", "lines that no free place reaches; both directions are used", counts[Sides.NEITHER]
-        )
+    counts = np.bincount(seen, minlength=len(Sides))
+    one_sided = int(counts[Sides.LEFT] + counts[Sides.RIGHT])
+    drawing.notes.add_assumed("inside", "directions derived from the free places", one_sided)
+    for side, code, which in (
+        (Sides.BOTH, "both_sides", "with free space on both sides"),
+        (Sides.NEITHER, "not_reached", "that no free place reaches"),
+    ):
+        if counts[side]:
+            drawing.notes.add_assumed(code, f"lines {which}; both directions are used", int(counts[side]))
     left, right = seen != Sides.RIGHT, seen != Sides.LEFT
     return np.vstack([endpoints[left], backward[right]])
 
