@@ -202,7 +202,7 @@ def _note_paper_space(document: Document, drawing: Drawing) -> None:
         box = bbox.extents(
             (entity for entity in islice(layout, MAX_CURVE_POINTS) if entity.dxftype() in LINES), fast=True
         )
-        where = "" if box.is_empty else " from ({:g}, {:g}) to ({:g}, {:g})".format(*box.extmin.vec2, *box.extmax.vec2)
+        where = " from ({:g}, {:g}) to ({:g}, {:g})".format(*box.extmin.vec2, *box.extmax.vec2) if box.has_data else ""
         drawing.notes.add_dropped(
             f"paper_space_{shown(layout.name)}",
             f"entities in paper space, layout {shown(layout.name)}: "
