@@ -17,6 +17,12 @@ AGREEING = 3.0  # deviations
 LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 
 
+def pairs_of(segments: Segments, scan: Scan, result: AssociationResult) -> Correspondences:
+    """Return the correspondences of an answer, by scan segment, with the segments of the map of the search."""
+    pairs = [(one.scan, one.map) for one in result.correspondences]
+    return Correspondences.of(segments, scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
+
+
 def fits(result: AssociationResult) -> bool:
     """Return whether an answer is usable, or explains enough of its scan to show how far walls are off."""
     diagnostics = result.diagnostics
@@ -36,8 +42,7 @@ class Matched:
         """Return a scan with its answer on the map of these segments; None where too little of the scan fits."""
         if result.pose is None or not fits(result):
             return None
-        pairs = [(one.scan, one.map) for one in result.correspondences]
-        return cls(scan, result.pose, Correspondences.of(segments, scan.measured, pairs))
+        return cls(scan, result.pose, pairs_of(segments, scan, result))
 
 
 @dataclass(frozen=True, slots=True)

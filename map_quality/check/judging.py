@@ -63,7 +63,8 @@ def conclude(
         advice, would_be = replace(advice, sigma=None), fits.usable(replace(fits.present, oriented=True))
     findings = [*mistakes, *_moved(fits.samples)]
     if directed is not oriented and not mistakes:
-        findings.insert(0, _undirected(len(tried), usable, would_be))
+        message = f"The scans fit better if directions are ignored: {would_be} of {len(tried)} are usable instead of "
+        findings.insert(0, Finding("undirected", f'{message}{usable}. Set "oriented": false.'))
     if thicker is not None:
         findings.insert(0, _thickness_finding(thicker, oriented=directed))
     return SampleReport(tuple(findings), advice, usable, usable if advice.oriented is None else would_be, thicker)
@@ -178,14 +179,6 @@ def _thickness_finding(thicker: float, *, oriented: bool) -> Finding:
         f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For a grid, "
         f"import it again with the log, which estimates its `surface`, or with a `surface` {half:.1f} cm {depth}; its "
         f"unit is cells. In any other map, move each segment by {half:.1f} cm to its {side}.",
-    )
-
-
-def _undirected(count: int, usable: int, would_be: int) -> Finding:
-    return Finding(
-        "undirected",
-        f"The scans fit better if directions are ignored: {would_be} of {count} are usable instead of {usable}. "
-        'Set "oriented": false.',
     )
 
 

@@ -97,10 +97,11 @@ class _Scaled:
         if not self.is_usual:
             return replace(self, scans=[scaled(scan, factor) for scan in self.scans], factor=factor)
         segments = Segments.derived(self.index.segments.endpoints[: self.index.directed] / factor)
-        points, sigma = self.index.points, self.index.sigma
-        points = replace(points, positions=points.positions / factor)
+        points = replace(self.index.points, positions=self.index.points.positions / factor)
         with suppress(InvalidMapError, IndexingEndedError):
-            index = MapIndex.build(segments, sigma, oriented=self.oriented, points=points, deadline=self.deadline)
+            index = MapIndex.build(
+                segments, self.index.sigma, oriented=self.oriented, points=points, deadline=self.deadline
+            )
             return replace(self, index=index, factor=factor)
         return None
 

@@ -89,8 +89,7 @@ def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Fl
     (k,)
         Standard deviation of each normal to itself, metres.
     """
-    walls: list[Floats] = []
-    sigmas: list[float] = []
+    pieces: list[tuple[Floats, float]] = []
     left = np.argsort(-seen.lines.lengths, kind="stable")
     endpoints, directions = seen.lines.endpoints[left], seen.lines.directions[left]
     while len(left):
@@ -102,11 +101,10 @@ def candidates(seen: SeenLines, known: Segments, deadline: Deadline) -> tuple[Fl
         if len(rows) < tuning.LEAST_VISITS or not are_enough(len(np.unique(group.visits)), group.place_count):
             continue
         found = _pieces(group, known, deadline)
-        walls += [piece for piece, _ in found]
-        sigmas += [sigma for _, sigma in found]
+        pieces += found
         if found:  # shorter lines along these are of the same wall, such as those across a rounded corner
             known = Segments.derived(np.concatenate([known.endpoints, [piece for piece, _ in found]]))
-    return np.array(walls).reshape(-1, 4), np.array(sigmas)
+    return np.array([piece for piece, _ in pieces]).reshape(-1, 4), np.array([sigma for _, sigma in pieces])
 
 
 def _along(endpoints: Floats, directions: Floats) -> Bools:

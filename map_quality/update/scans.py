@@ -20,9 +20,9 @@ from association import (
     SoftPrior,
     associate,
 )
-from registration import Correspondences, InputError, RigidTransform, Segments
+from registration import InputError, RigidTransform, Segments
 
-from ..scale import Matched, errors_of
+from ..scale import Matched, errors_of, pairs_of
 from . import tuning
 from .result import Floats, RefusedVisit
 
@@ -177,11 +177,6 @@ class Localized:
         """The square that it was taken in."""
         return math.floor(self.pose.x / tuning.PLACE), math.floor(self.pose.y / tuning.PLACE)
 
-    def pairs(self, segments: Segments) -> Correspondences:
-        """Return the correspondences, by scan segment, with the segments of the map that it was searched in."""
-        pairs = [(one.scan, one.map) for one in self.result.correspondences]
-        return Correspondences.of(segments, self.scan.measured, np.array(pairs, dtype=np.intp).reshape(-1, 2))
-
 
 def by_content(scans: Iterable[VisitScan]) -> list[VisitScan]:
     """Return scans visit by visit, the visits in an order that depends on their ranges alone."""
@@ -251,7 +246,7 @@ def _doubt(own: Sequence[Localized], known: Segments, sigma: float) -> str | Non
             f"{sure} of {len(own)} scans are usable and precise, expected at least {least}. Check that the scans are "
             "from this building, and that the map shows the places where they were taken."
         )
-    matched = [Matched(one.scan, one.pose, one.pairs(known)) for one in precise]
+    matched = [Matched(one.scan, one.pose, pairs_of(known, one.scan, one.result)) for one in precise]
     errors = errors_of(matched, sigma)
     if errors.scale_deviation > tuning.SURE_OF_SCALE:
         return (

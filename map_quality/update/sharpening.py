@@ -23,6 +23,7 @@ import scipy
 from association import Deadline, MapIndex
 from registration import Segments
 
+from ..scale import pairs_of
 from . import tuning
 from .result import Bools, Floats, Indices, Sharpened
 from .scans import Localized, blocks, go_on
@@ -101,7 +102,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
     """Return the rows of all pairs, those of offsets before those of angles in each scan."""
     parts: list[_Pairs] = []
     for number, one in enumerate(found):
-        pairs = one.pairs(known)
+        pairs = pairs_of(known, one.scan, one.result)
         on = np.array([pair.map for pair in one.result.correspondences], dtype=np.intp)
         wall, normals = wall_of[on], known.normals[on]
         c, s = np.cos(one.pose.theta), np.sin(one.pose.theta)
@@ -140,8 +141,7 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
     weighted = scipy.sparse.diags_array(weight) @ of_pose
     both = (of_wall.T @ weighted).tocsr()
     gain = (inverse @ both).tocsr()
-    x, y = tuning.FREE_POSE
-    free = np.diag(np.tile(1.0 / np.square([x, x, y]), size // 3))
+    free = np.diag(np.tile(1.0 / np.square(tuning.FREE_POSE), size // 3))
     of_poses = np.linalg.inv(free + (of_pose.T @ weighted - both.T @ gain).toarray())
     shift = inverse @ at_wall - gain @ (of_poses @ (at_pose - gain.T @ at_wall))
     covariance = np.empty((len(prior), 2, 2))

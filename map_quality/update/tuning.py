@@ -71,7 +71,7 @@ SHARPER = 0.7  # times the declared sigma; the deviation of a wall above which i
 LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one scan that do not average out
 MOST_POSES = 1000  # of scans that are estimated with the walls; memory and time
 MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
-FREE_POSE = (1.0, 0.5)  # m, rad; deviations of a pose of which nothing is known
+FREE_POSE = (1.0, 1.0, 0.5)  # m, m, rad; deviations of a pose of which nothing is known
 
 # --- Confidence, and the check of the proposal ------------------------------------------------------------------------
 
