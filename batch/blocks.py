@@ -11,16 +11,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import linefix
-from association import Scan
-from linefix.ranges import RangeScan
-from registration import MeasuredSegments, Segments
-from vectorization import LaserScan, Motion
-
 from .errors import UnreadableScansError
-from .tables import BOUNDS, COLUMNS, MOTION
+from .tables import BOUNDS, COLUMNS, LASER, MOTION
 
-SIGMA = 0.02  # m, of the points of segments without a sigma; as over HTTP
+Json = dict[str, Any]
+FARTHEST = 1e4  # m; what is farther is no return
+ORIGIN = {"x": 0.0, "y": 0.0, "theta": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,74 +51,34 @@ class Block:
         return replace(self, stop=middle), replace(self, start=middle)
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One scan as it is in its file.
-
-    Attributes
-    ----------
-    index : int
-        In its log.
-    values : dict
-        By column; `ranges` as an array.
-    """
-
-    index: int
-    values: dict[str, Any]
-
-    def scan(self) -> Scan:
-        """Return the scans to search.
-
-        Raises
-        ------
-        InputError
-            When it is no scan.
-        """
-        if self.values.get("error") is not None:
-            raise UnreadableScansError(self.values["error"], argument="log")
-        if self.values.get("ranges") is not None:
-            return self._laser()
-        if self.values.get("segments") is not None:
-            return self._segments()
-        raise UnreadableScansError("expected ranges or segments, found neither", argument="scan")
-
-    def _laser(self) -> Scan:
-        angle_min, increment = self._number("angle_min"), self._number("angle_increment")
-        if angle_min is None or increment is None:
-            raise UnreadableScansError("expected a number", argument="angle_min and angle_increment")
-        bounds = {name: bound for name in BOUNDS if (bound := self._number(name)) is not None}
-        laser = LaserScan(angle_min, increment, self.values["ranges"], motion=self._motion(), **bounds)
-        seen = RangeScan(laser, self._number("time_increment") or 0.0, flipped=bool(self.values.get("flipped")))
-        return linefix.assemble([linefix.view_of(seen, sigma=self._number("sigma"))])
-
-    def _motion(self) -> Motion | None:
-        increment, *twist = (self._number(name) for name in MOTION)
-        known = [one for one in twist if one is not None]
-        return Motion(increment, *known) if increment and len(known) == 3 else None
-
-    def _segments(self) -> Scan:
-        try:
-            rows = np.array(self.values["segments"], dtype=np.float64).reshape(-1, 4)
-        except (TypeError, ValueError):
-            raise UnreadableScansError("expected rows of four numbers", argument="segments") from None
-        sigma = self._number("sigma")
-        segments = Segments.from_array(rows, argument="segments")
-        return Scan(MeasuredSegments.from_segments(segments, SIGMA if sigma is None else sigma))
-
-    def _number(self, name: str) -> float | None:
-        value = self.values.get(name)
-        return None if value is None else float(value)
+def scan_document(row: Json) -> Json:
+    """Return the `scan` of a request for a row; raises `UnreadableScansError` where there is none."""
+    values = {name: value for name, value in row.items() if value is not None}
+    if "error" in values:
+        raise UnreadableScansError(values["error"], argument="log")
+    sigma = {"sigma": values["sigma"]} if "sigma" in values else {}
+    if "ranges" not in values:
+        if "segments" not in values:
+            raise UnreadableScansError("expected ranges or segments, found neither", argument="scan")
+        return {"segments": values["segments"], **sigma}
+    laser = {name: values[name] for name in (*LASER, *BOUNDS, *MOTION[:1]) if name in values}
+    laser["range_max"] = most = min(laser.get("range_max", FARTHEST), FARTHEST)
+    laser["ranges"] = np.clip(laser["ranges"], -1.0, 2.0 * most)  # a request has no infinity
+    twist = {name: values[name] for name in MOTION[1:] if name in values}
+    motion = {"twist": twist} if len(twist) == len(MOTION[1:]) and laser.get(MOTION[0]) else {}
+    view = {"laser": laser, "pose": ORIGIN, "flipped": values.get("flipped", False)}
+    return {"views": [{**view, **sigma, **motion}]}
 
 
-def rows_of(block: Block) -> Iterator[Row]:
-    """Yield the scans of a block."""
+def rows_of(block: Block) -> Iterator[Json]:
+    """Yield the scans of a block, each as its row; `ranges` as an array."""
     table = _read(block)
     ranges = table.column("ranges") if "ranges" in table.column_names else pa.nulls(len(table))
     rest = table.select([name for name in table.column_names if name != "ranges"]).to_pylist()
-    for k, (values, one) in enumerate(zip(rest or [{} for _ in ranges], ranges, strict=True)):
+    for row, one in zip(rest or [{} for _ in ranges], ranges, strict=True):
         if one.is_valid:
-            values["ranges"] = one.values.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
-        yield Row(block.start + k, values)
+            row["ranges"] = one.values.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
+        yield row
 
 
 def _read(block: Block) -> pa.Table:

@@ -10,7 +10,7 @@ import signal
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Protocol, TypeVar
@@ -76,7 +76,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True, slots=True)
 class Processes:
-    """Worker processes; one that ends early is replaced.
+    """Worker processes; one that ends early is replaced. They stay for the next run, and end with this object.
 
     They are spawned, never forked: the compiled kernels and the caller's threads would not outlive a fork.
 
@@ -87,50 +87,45 @@ class Processes:
     """
 
     count: int
+    _idle: list[tuple[BaseProcess, Connection]] = field(default_factory=list)
 
     def run(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result | Lost]]:
         """Yield each item once with its result, as they are done; see `Engine.run`."""
         waiting, losses = deque(range(len(items))), Counter[int]()
         running: dict[Connection, tuple[BaseProcess, int]] = {}  # by the pipe of each worker; the number of its item
-
-        def give(process: BaseProcess, pipe: Connection) -> None:
-            """Send the next item to a worker, or end it; one that has just ended is noticed when its answer is read."""
-            if not waiting:
-                _end(process, pipe)
-                return
-            running[pipe] = process, waiting.popleft()
-            with contextlib.suppress(OSError):
-                pipe.send(items[running[pipe][1]])
-
+        done: list[tuple[Item, Result | Lost]] = []
         try:
-            for _ in range(min(self.count, len(items))):
-                give(*_started(function))
-            while running:
-                for pipe in wait(list(running)):
-                    assert isinstance(pipe, Connection)
-                    process, number = running.pop(pipe)
+            while waiting or running:
+                while waiting and len(running) < self.count:
+                    process, pipe = self._idle.pop() if self._idle else _started()
+                    running[pipe] = process, waiting.popleft()
+                    with contextlib.suppress(OSError):  # it has just ended, which is noticed when its answer is read
+                        pipe.send((function, items[running[pipe][1]]))
+                yield from done
+                done.clear()
+                for ready in wait(list(running)):
+                    assert isinstance(ready, Connection)
+                    process, number = running.pop(ready)
                     try:
-                        outcome = pipe.recv()
+                        done.append((items[number], checked(ready.recv())))
+                        self._idle.append((process, ready))
                     except (EOFError, OSError):
-                        _end(process, pipe)
-                        process, pipe = _started(function)
+                        _end(process, ready)
                         losses[number] += 1
                         if losses[number] < ATTEMPTS:
                             waiting.append(number)
-                            give(process, pipe)
-                            continue
-                        outcome = Lost(), ""
-                    give(process, pipe)
-                    yield items[number], checked(outcome)
+                        else:
+                            done.append((items[number], Lost()))
+            yield from done
         finally:
             for pipe, (process, _) in running.items():
                 _end(process, pipe)
 
 
-def _started(function: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
+def _started() -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_work, args=(function, theirs), daemon=True)
+    process = context.Process(target=_work, args=(theirs,), daemon=True)
     with _one_thread():
         process.start()
     theirs.close()  # so that ours shows the end of the worker
@@ -143,12 +138,12 @@ def _end(process: BaseProcess, pipe: Connection) -> None:
     process.join()
 
 
-def _work(function: Callable[[Item], Result], pipe: Connection) -> None:
-    """Answer until the other end is closed, or its process has ended."""
+def _work(pipe: Connection) -> None:
+    """Call functions for items until the other end is closed, or its process has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # from the terminal; the parent process receives it as well
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while True:
-            pipe.send(attempt(function, pipe.recv()))
+            pipe.send(attempt(*pipe.recv()))
 
 
 @contextlib.contextmanager

@@ -116,11 +116,9 @@ def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
     Raises
     ------
     UnreadableScansError
-        When there is no such log, or it is a Parquet file that holds no scans.
+        When it is a Parquet file that holds no scans.
     """
     path = Path(log)
-    if not path.exists():
-        raise UnreadableScansError("there is no such file; check the path and the working folder", argument=log)
     if path.suffix.lower() in PARQUET:
         metadata = _checked(path)
         groups = [metadata.row_group(group).num_rows for group in range(metadata.num_row_groups)]
@@ -131,9 +129,8 @@ def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
 
 def lay_out(layout: Layout) -> None:
     """Write a log's scans in row groups of a block."""
-    parquet = None
-    if Path(layout.log).suffix.lower() in PARQUET:
-        parquet = pq.ParquetFile(layout.log, pre_buffer=False)
+    is_table = Path(layout.log).suffix.lower() in PARQUET
+    parquet = pq.ParquetFile(layout.log, pre_buffer=False) if is_table else None
     schema = SCANS if parquet is None else parquet.schema_arrow
     with whole(Path(layout.path)) as file, pq.ParquetWriter(file, schema) as writer:
         if parquet is not None:

@@ -113,7 +113,8 @@ def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
         When a run is at work on it, or an unfinished one had other logs, maps or options.
     """
     parts = Parts(out.with_name(out.name + ".parts"))
-    parts.folder.mkdir(parents=True, exist_ok=True)
+    for folder in (parts.scans, parts.poses):
+        folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(parts.folder / "lock")
     try:
         lock.acquire(timeout=0)
@@ -122,8 +123,6 @@ def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
             "another run writes to it; wait until that run ends, or name another output", argument=str(out)
         ) from None
     try:
-        for folder in (parts.scans, parts.poses):
-            folder.mkdir(parents=True, exist_ok=True)
         plan = parts.folder / "run.json"
         if not plan.exists():
             with whole(plan) as file:

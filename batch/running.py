@@ -16,7 +16,7 @@ from .engine import Engine, Lost, Processes
 from .errors import UnreadableScansError
 from .logs import Layout, LogNote, lay_out, layout_of, merged_notes
 from .parts import Parts, opened
-from .searching import BlockSearch, FleetOptions, MapShelf, lost_row
+from .searching import BlockSearch, FleetOptions, MapShelf, lost_row, searching_on
 
 PathLike = str | os.PathLike[str]
 Watch = Callable[[str, int, int], None]
@@ -93,6 +93,8 @@ def associate_many(
     engine = Processes(len(os.sched_getaffinity(0))) if engine is None else engine
     names = [os.fspath(log) for log in logs]
     shelf, target = MapShelf.at(maps), Path(out)
+    if len(shelf.files) == 1:
+        searching_on(*shelf.files.values(), options)  # an error in the only map spoils everything
     target.parent.mkdir(parents=True, exist_ok=True)
     with opened(target, _told(names, shelf, options)) as parts:
         layouts = [layout_of(number, name, parts.scans, options.block) for number, name in enumerate(names)]
@@ -137,13 +139,11 @@ def _search(blocks: list[Block], search: BlockSearch, engine: Engine, parts: Par
 
 
 def _summary(tables: Iterator[pa.Table], taken_over: int, notes: tuple[LogNote, ...]) -> Summary:
-    scans = usable = errors = 0
-    statuses: Counter[str] = Counter()
+    usable, statuses = 0, Counter[Any]()
     for table in tables:
-        scans += len(table)
         usable += sum(table.column("usable").to_pylist())
-        errors += len(table) - table.column("error").null_count
-        statuses.update(status for status in table.column("status").to_pylist() if status is not None)
+        statuses.update(table.column("status").to_pylist())
+    scans, errors = statuses.total(), statuses.pop(None, 0)  # a row with an error has no status
     return Summary(scans, taken_over, usable, errors, dict(statuses), notes)
 
 
@@ -152,7 +152,7 @@ def _told(names: list[str], shelf: MapShelf, options: FleetOptions) -> dict[str,
     return {
         "logs": [_stamped(name) for name in names],
         "maps": [_stamped(path) for path in shelf.files.values()],
-        "options": [asdict(options.search), options.deadline_ms, options.block],
+        "options": asdict(options),
     }
 
 

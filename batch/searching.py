@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 
-import linefix
+from compiled import is_complete
+from formats import read_map
 from formats.reading import DRAWINGS
-from linefix import AssociationOptions, AssociationResult, Deadline
+from linefix.answering import LocalService
+from linefix.documents.errors import RequestError
+from linefix.documents.results import map_json
 from registration import InputError
 
-from .blocks import Block, Row, rows_of
+from .blocks import Block, Json, rows_of, scan_document
 from .errors import UnreadableMapsError
 from .tables import POSES
 
@@ -59,10 +60,7 @@ class MapShelf:
             raise UnreadableMapsError(
                 f"holds no map: expected a file that ends in one of {', '.join(sorted(SUFFIXES))}", argument=str(place)
             )
-        shelf = cls(files)
-        if len(files) == 1:
-            read_index(next(iter(files.values())))  # an error in the only map spoils everything
-        return shelf
+        return cls(files)
 
     def name(self, told: str | None, log: str) -> str | None:
         """Return the id of a scan's map: its own value, the name of its log, or the only one."""
@@ -73,31 +71,13 @@ class MapShelf:
             return stem
         return next(iter(self.files)) if len(self.files) == 1 else None
 
-    def get(self, name: str | None) -> linefix.MapIndex:
-        """Return a map.
-
-        Raises
-        ------
-        InputError
-            When there is none of that name, or it cannot be searched.
-        """
+    def path(self, name: str | None) -> str:
+        """Return the file of a map; raises `UnreadableMapsError` where there is none of that name."""
         path = None if name is None else self.files.get(name)
         if path is None:
             told = "nobody says which of the maps it lies on" if name is None else "there is no such map"
             raise UnreadableMapsError(told, argument=name or "map_id")
-        return read_index(path)
-
-
-@lru_cache(maxsize=KEPT)
-def read_index(path: str) -> linefix.MapIndex:
-    """Return the index of a map file.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read or searched.
-    """
-    return linefix.index_map(linefix.read_map(path))
+        return path
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,20 +86,36 @@ class FleetOptions:
 
     Attributes
     ----------
-    search : AssociationOptions
-        Directions count only where those of the map do, too.
-    deadline_ms : float
-        For each search; its answer is the best result until then.
+    on_map, usable_from, deadline_ms
+        Of each search, as in a request; the answer is the best result until the deadline.
     block : int
         Scans that a worker does at a time: the loss when one is killed, and the number held in memory.
-    prepare : callable, optional
-        Called once in each worker before it searches, such as to compile the kernels while no deadline runs.
     """
 
-    search: AssociationOptions = field(default_factory=AssociationOptions)
+    on_map: float = 0.9
+    usable_from: float = 0.95
     deadline_ms: float = 10_000.0
     block: int = 512
-    prepare: Callable[[], None] | None = None
+
+
+@lru_cache(maxsize=KEPT)
+def searching_on(path: str, options: FleetOptions) -> Callable[[Json], Json]:
+    """Index the map of a file; return the function from the ``scan`` of a request to its answer.
+
+    The kernels are compiled first: no deadline of a search is meant for that.
+
+    Raises
+    ------
+    InputError, RequestError
+        When it cannot be read or searched.
+    """
+    if not is_complete():
+        from linefix.compiling import compile_kernels
+
+        compile_kernels()
+    search = {name: value for name, value in asdict(options).items() if name != "block"}
+    document = map_json(read_map(path).map)
+    return LocalService().locating({"map": document}, {**search, "max_alternatives": 0, "include": []})
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,32 +127,22 @@ class BlockSearch:
 
     def __call__(self, block: Block) -> pa.Table:
         """Return one row of `POSES` for each scan, in order."""
-        _prepared(self.options.prepare)
         rows = [
-            {"log": block.log, "index": row.index, "stamp": row.values.get("stamp"), **self._found(block, row)}
-            for row in rows_of(block)
+            {**self._found(block, row), "log": block.log, "index": index, "stamp": row.get("stamp")}
+            for index, row in enumerate(rows_of(block), block.start)
         ]
         return pa.Table.from_pylist(rows, schema=POSES)
 
-    def _found(self, block: Block, row: Row) -> dict[str, Any]:
+    def _found(self, block: Block, row: Json) -> Json:
         """Return the result of one scan, whatever is wrong with it: no scan costs another its row."""
-        name = self.maps.name(row.values.get("map_id"), block.log)
+        name = self.maps.name(row.get("map_id"), block.log)
         try:
-            index, scan, begun = self.maps.get(name), row.scan(), time.perf_counter()
-            deadline = Deadline(time.monotonic() + 1e-3 * self.options.deadline_ms)
-            result = linefix.locate(index, scan, options=self.options.search, deadline=deadline)
-            return {"map_id": name, "search_ms": 1e3 * (time.perf_counter() - begun), **_answered(result)}
-        except InputError as error:
+            search = searching_on(self.maps.path(name), self.options)
+            return {**_columns_of(search({"scan": scan_document(row)})), "map_id": name}
+        except (InputError, RequestError) as error:
             return {"map_id": name, "usable": False, "error": f"invalid: {error}"}
         except Exception as error:
             return {"map_id": name, "usable": False, "error": f"internal: {type(error).__name__}: {error}"}
-
-
-@lru_cache
-def _prepared(prepare: Callable[[], None] | None) -> None:
-    """Prepare this process, once."""
-    if prepare is not None:
-        prepare()
 
 
 def lost_row(block: Block) -> pa.Table:
@@ -165,18 +151,9 @@ def lost_row(block: Block) -> pa.Table:
     return pa.Table.from_pylist([row | {"error": "worker_lost: its search ended each worker early"}], schema=POSES)
 
 
-def _answered(result: AssociationResult) -> dict[str, Any]:
-    found, covariance = result.diagnostics, result.covariance
-    return {
-        "status": str(result.status),
-        "usable": result.usable,
-        "probability": result.probability,
-        **({} if result.pose is None else asdict(result.pose)),
-        "covariance": None if covariance is None else covariance.ravel().tolist(),
-        "unobservable": None if result.unobservable is None else [float(c) for c in result.unobservable],
-        "reasons": [reason.code for reason in result.reasons],
-        "warnings": [warning.code for warning in result.warnings],
-        "inlier_fraction": None if found is None else found.inlier_fraction,
-        "margin": None if found is None else found.margin,
-        "complete": result.search.complete,
-    }
+def _columns_of(answer: Json) -> Json:
+    """Return an answer with its parts by the names of columns; other fields are no columns."""
+    flat = {**answer, **(answer["pose"] or {}), **(answer["diagnostics"] or {}), **answer["search"]}
+    codes = {name: [one["code"] for one in answer[name]] for name in ("reasons", "warnings")}
+    covariance = answer["covariance"] and [number for row in answer["covariance"] for number in row]
+    return {**flat, **codes, "covariance": covariance, "search_ms": answer["timing_ms"]["search"]}

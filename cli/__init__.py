@@ -7,6 +7,6 @@
     one_scan, replay, batch, analyze, ros2, maps/    the commands
     asking                    the service to ask: a server by `linefix-client`, or `linefix.answering` and the store
     stored                    the store of maps of this machine
-    inputs, scans, logs       files to requests; a robot along a log: frames, prior
+    inputs, logs              files to requests; a robot along a log: frames, prior
     options, printing         options of several commands; answers and progress for people
 """

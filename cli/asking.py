@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from linefix.documents.errors import Fault
 
@@ -20,17 +19,13 @@ from .printing import Json, compile_first
 if TYPE_CHECKING:
     from linefix.answering import LocalService
 
-N = TypeVar("N", int, float)
 Locate = Callable[[Json], Json]
 """From the scan and the prior of a request to the answer."""
 
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
-DEADLINE_MS = 30_000.0  # as a service has it by default
-MOST_SCANS = 10**9  # of an update: each is read from a file of this machine
 OF_STORED = ("check_map", "update_map")  # a server has them for stored maps
 OF_STORE = ("put_map", "get_map", "list_maps", "delete_map")
-LIMITS = ("values", "map_segments", "scan_segments", "beams")  # by settings of these names, after MAX_
 BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 _HEADER = re.compile(r"[!-~]+")
 _URL = re.compile(r"https?://([!-~]+@)?([a-z0-9._-]+|\[[0-9a-f:.]+\])(:[0-9]{1,5})?(/[!-~]*)?", re.IGNORECASE)
@@ -98,13 +93,10 @@ class Here:
 def answering(names: Names) -> Iterator[LocalService]:
     """Give what answers requests in this process, once it can search; raises as `refusing`."""
     from linefix.answering import LocalService
-    from linefix.documents.limits import Limits
 
     compile_first()
-    limits = {name: setting(f"MAX_{name.upper()}", getattr(Limits(), name)) for name in LIMITS}
-    limits |= {"pairs": setting("MAX_CORRESPONDENCES", Limits().pairs), "batch": MOST_SCANS}
     with refusing(names):
-        yield LocalService(Limits(**limits), setting("MAX_DEADLINE_MS", DEADLINE_MS), _stored)
+        yield LocalService(_stored)
 
 
 def _stored(map_id: str) -> tuple[Any, Json]:
@@ -112,18 +104,6 @@ def _stored(map_id: str) -> tuple[Any, Json]:
 
     with stored_maps(map_id) as maps:
         return maps.found(map_id)
-
-
-def setting(name: str, default: N) -> N:
-    """Return a number of the environment, as the service has it; raises `WrongUseError` where it is none."""
-    text = os.environ.get(f"LINEFIX_{name}")
-    try:
-        value = default if text is None else type(default)(text)
-    except ValueError:
-        value = type(default)(-1)
-    if not 0 < value < math.inf:
-        raise WrongUseError(f"LINEFIX_{name} in the environment: found {text!r}, expected a number above 0")
-    return value
 
 
 @contextmanager
@@ -182,11 +162,8 @@ class Server:
         except ProblemError as error:
             raise self._refusal(error, arguments, names) from None
         except LinefixError as error:
-            cause = error.__cause__
-            told = f"no server responds at {self._url}: {cause}; start one with linefix serve, or omit --server"
-            if cause is None:  # a server answers, though none of Linefix
-                told = f"{str(error).removesuffix('; check the URL')}; check the URL"
-            raise NoServerError(told) from None
+            remedy = "check the URL, start a server with linefix serve, or omit --server"
+            raise NoServerError(f"{str(error).removesuffix('; check the URL')}; {remedy}") from None
         except ValueError as error:  # such as a number that JSON cannot have
             raise WrongUseError(f"not sent: {error}") from None
 

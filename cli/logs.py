@@ -73,59 +73,53 @@ def print_notes(log: Log, where: TextIO) -> None:
 
 @dataclass(slots=True)
 class Frames:
-    """Decides whose poses are located.
+    """Decides whose poses are located: the first scan decides for all.
 
     Attributes
     ----------
     given : RigidTransform or None
         base_from_laser, as the user states it; goes before the mount in the log.
-    name : str
-        Of the frame whose poses are reported; empty before the first.
-    of_laser : bool
-        True when that is the laser's.
-    told : str
-        The frame whose poses are reported and the reason, for people.
+    first : LoggedScan or None
+        With the mount that counts; None before it is taken.
     """
 
     given: RigidTransform | None
-    name: str = ""
-    of_laser: bool = False
-    told: str = "none"
+    first: LoggedScan | None = None
 
     def taken(self, one: LoggedScan) -> LoggedScan:
         """Return a scan with the mount that counts; none where poses are those of the laser.
 
-        The first scan decides for all.
-
         Raises
         ------
         RefusedError
-            When it has no mount, though others do.
+            When it has no mount, though the first has one.
         """
         if self.given is not None:
             one = replace(one, mount=self.given, base_frame=ROBOT)
-        if not self.name:
-            self._decide(one)
-        if self.of_laser:
-            return replace(one, mount=None)
-        if one.mount is None:
+        self.first = self.first or one
+        if self.first.mount is not None and one.mount is None:
             raise RefusedError(
                 f"the log has no mount of {one.frame_id} at this time, expected one as for the other scans; set --mount"
             )
-        return one
+        return one if self.first.mount is not None else replace(one, mount=None)
 
-    def _decide(self, one: LoggedScan) -> None:
-        mount = one.mount
-        self.of_laser = mount is None
-        if mount is None:
-            self.name = one.frame_id or "laser"
-            self.told = f"of the laser (frame {self.name}); set --mount X Y THETA for those of the robot"
-            return
-        self.name = one.base_frame
-        way = "upside down " if one.flipped else ""
-        where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        by = "the log" if self.given is None else "--mount"
-        self.told = f"of the robot (frame {self.name}), with {one.frame_id} mounted {way}at {where}, from {by}"
+    @property
+    def name(self) -> str:
+        """The frame whose poses are reported; empty before the first scan."""
+        first = self.first
+        return "" if first is None else first.base_frame if first.mount is not None else first.frame_id or "laser"
+
+    @property
+    def told(self) -> str:
+        """The frame whose poses are reported and the reason, for people."""
+        first = self.first
+        if first is None:
+            return "none"
+        if first.mount is None:
+            return f"of the laser (frame {self.name}); set --mount X Y THETA for those of the robot"
+        way, by = "upside down " if first.flipped else "", "the log" if self.given is None else "--mount"
+        where = f"({first.mount.x:.3f}, {first.mount.y:.3f}) m, {math.degrees(first.mount.theta):.1f} degrees"
+        return f"of the robot (frame {self.name}), with {first.frame_id} mounted {way}at {where}, from {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:

@@ -44,7 +44,9 @@ def print_json(answer: Any) -> None:
     """Print one document in one line, without control characters for a terminal."""
     from linefix.documents.encoding import encode
 
-    sys.stdout.write(escaped(encode(answer).decode()) + "\n")
+    # Terminals obey other characters than ASCII, and DEL; JSON of the standard library escapes all but the last.
+    text = json.dumps(json.loads(encode(answer)), separators=(",", ":"))
+    sys.stdout.write(text.replace("\x7f", "\\u007f") + "\n")
 
 
 def write_json(document: Any, out: Path) -> None:
@@ -82,16 +84,38 @@ def table(columns: Sequence[str], records: Iterable[Sequence[object]]) -> Lines:
     ]
 
 
-def section(title: str, columns: Sequence[str], records: Iterable[Sequence[object]]) -> Lines:
-    """Return a table below its title and an empty line."""
-    return ["", title, *table(columns, records)]
+def outline(document: Json) -> Iterator[str]:
+    """Yield an object as text: its values; below their names, its lists of objects as tables, and its objects."""
+    parts = {name: value for name, value in document.items() if _is_part(value)}
+    yield from rows((name, shown(value)) for name, value in document.items() if name not in parts)
+    for name, value in parts.items():
+        yield from ("", name)
+        yield from outline(value) if isinstance(value, dict) else listing(value)
 
 
-def shown(value: object) -> str:
-    """Return a cell's text; a missing value is a dash."""
-    if value is None:
-        return "-"
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+def listing(objects: Sequence[Json]) -> Lines:
+    """Return the table of objects with the same fields."""
+    return table(tuple(objects[0]) if objects else ("none",), [tuple(one.values()) for one in objects])
+
+
+def _is_part(value: Any) -> bool:
+    """Tell whether a value is an object, or a list of them; a pose counts as a number."""
+    inner = value if isinstance(value, list | tuple) else [value]
+    return any(isinstance(one, dict) and "theta" not in one for one in inner)
+
+
+def shown(value: Any) -> str:
+    """Return a value's text; a missing value is a dash."""
+    match value:
+        case None | []:
+            return "-"
+        case {"theta": _}:
+            return pose_text(value)
+        case list() | tuple():
+            return ", ".join(map(shown, value))
+        case float():
+            return f"{value:z.3f}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def noted(note: Json) -> str:
@@ -125,17 +149,6 @@ def pose_text(pose: Json | None) -> str:
     return f"x {x:.3f} m, y {y:.3f} m, theta {theta:.4f} rad ({math.degrees(theta):.1f} degrees)"
 
 
-def escaped(document: str) -> str:
-    """Return a JSON document in one line with every character that is not printable as its escape.
-
-    JSON escapes the control characters below 32 only; terminals obey those from 127 to 159 as well, and others change
-    the direction of what follows.
-    """
-    if document.isascii() and "\x7f" not in document:
-        return document
-    return "".join(one if one.isprintable() else json.dumps(one)[1:-1].replace("\x7f", "\\u007f") for one in document)
-
-
 @contextmanager
 def progress() -> Iterator[Callable[[str, float, float | None], None]]:
     """Show the progress on a terminal, never in piped output; yield the function that takes stage, done and total."""
@@ -143,15 +156,19 @@ def progress() -> Iterator[Callable[[str, float, float | None], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    bars = Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
     tasks: dict[str, Any] = {}
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bars:
 
-        def show(stage: str, done: float, total: float | None) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, completed=int(done), total=total)
-            bars.update(tasks[stage], completed=done, total=total)
+    def show(stage: str, done: float, total: float | None) -> None:
+        bars.start()  # not before: that of the compiler may come first
+        if stage not in tasks:
+            tasks[stage] = bars.add_task(stage, completed=int(done), total=total)
+        bars.update(tasks[stage], completed=done, total=total)
 
+    try:
         yield show
+    finally:
+        bars.stop()
 
 
 def compile_first() -> None:

@@ -50,10 +50,8 @@ def key(
     try:
         parse_keys(lines)
     except ValueError:
-        raise WrongUseError(
-            f"the name {name!r}, a role of {role!r} or the prefix {maps!r} is not valid: expected 1 to 64 letters for "
-            f"NAME, one of {ROLES} for --role, and letters, digits, dots or dashes for --maps"
-        ) from None
+        expected = f"expected 1 to 64 letters, some of {ROLES}, and letters, digits, dots or dashes"
+        raise WrongUseError(f"found NAME {name!r}, --role {role!r} and --maps {maps!r}, {expected}") from None
     print(lines)
     typer.echo(made, err=True)
 

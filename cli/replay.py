@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from itertools import groupby, islice
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 from .asking import Locate, Where
@@ -15,64 +14,42 @@ from .errors import NoSuchMapError, RefusedError
 from .inputs import NamedMap, draw_picture, places_of, read_maps, target_of
 from .logs import Frames, Tracker, map_of, mount_of, opened, pose_of, print_notes, scans_of
 from .options import TopicOptions, UsableOptions, argument, grouped, option, required
-from .printing import Json, Lines, Output, print_json, print_lines, progress, rows, table
+from .printing import Json, Output, print_json, print_lines, progress, rows, table
 
 if TYPE_CHECKING:
-    from formats import Log, LoggedScan
+    from formats import LoggedScan
     from registration import RigidTransform
 
 
+REFUSED = "refused"
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
 HINT = "linefix map check MAP --log LOG{} tests the scale, the handedness and the directions of the map"
 MODE = "track: the prior is by odometry from the last usable pose; global: no prior."
+NOTHING: Json = {"status": None, "usable": False, "pose": None, "reasons": [], "warnings": []}  # of a refused scan
 FIELDS = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")  # of a line of --json
 
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """A pose that was found; `round` is that of the clock of the log, `map_id` empty without several maps."""
+    """A scan and its verdict; `round` is that of the clock of the log, `map_id` empty without several maps."""
 
     stamp_ns: int
     round: int
-    map_id: str
+    verdict: str
     usable: bool
-    pose: RigidTransform
+    reasons: list[str]  # codes, as of `warnings`
+    warnings: list[str]
+    map_id: str
+    pose: RigidTransform | None
 
-
-@dataclass(slots=True)
-class Tally:
-    """Counts and poses of the scans so far."""
-
-    verdicts: Counter[str] = field(default_factory=Counter)
-    reasons: Counter[str] = field(default_factory=Counter)
-    warnings: Counter[str] = field(default_factory=Counter)
-    times: list[float] = field(default_factory=list)  # ms
-    poses: list[Located] = field(default_factory=list)
-    refused: str | None = None  # the last message
-
-    @property
-    def count(self) -> int:
-        """The number of scans so far."""
-        return sum(self.verdicts.values())
-
-    @property
-    def usable(self) -> list[Located]:
-        """The usable poses so far."""
-        return [one for one in self.poses if one.usable]
-
-    def take(self, one: LoggedScan, found: Json) -> None:
-        """Count an answer, and keep its pose."""
-        if "error" in found:
-            self.verdicts["refused"] += 1
-            self.refused = found["error"]
-            return
-        usable, pose = found["usable"], pose_of(found)
-        self.verdicts[found["status"] + (", usable" if usable else ", not usable")] += 1
-        self.reasons.update(reason["code"] for reason in found["reasons"][:1])
-        self.warnings.update(warning["code"] for warning in found["warnings"])
-        self.times.append(found["timing_ms"]["total"])
-        if pose is not None:
-            self.poses.append(Located(one.stamp_ns, one.round, map_of(found) or "", usable, pose))
+    @classmethod
+    def of(cls, one: LoggedScan, found: Json) -> Located:
+        """Return the scan with its answer, or with the error why it is refused."""
+        usable = "usable" if found["usable"] else "not usable"
+        verdict = REFUSED if "error" in found else f"{found['status']}, {usable}"
+        reasons, warnings = ([each["code"] for each in found[name]] for name in ("reasons", "warnings"))
+        on = map_of(found) or ""
+        return cls(one.stamp_ns, one.round, verdict, found["usable"], reasons, warnings, on, pose_of(found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,33 +86,37 @@ def replay(
     laser.
     """
     mount, maps = mount_of(scans.mount), read_maps(on)
-    opened_log, tally, frames = opened(log, source, mount), Tally(), Frames(mount)
-    broken: RefusedError | None = None
+    opened_log, frames, found, refused = opened(log, source, mount), Frames(mount), list[Located](), ""
     options = {"include": [], "max_alternatives": 0, **asdict(usable)}
-    with where.opened() as service:
+    broken: RefusedError | None = None
+    tracker = Tracker() if scans.mode == "track" else None
+    taken = islice(scans_of(opened_log), 0, None, scans.every)
+    total = None if opened_log.count is None else -(-opened_log.count // scans.every)
+    with where.opened() as service, progress() as show:
         locate = service.locating(target_of(maps), options, {**places_of(maps), "/scan": log.name})
-        taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locate, taken, frames, Tracker() if scans.mode == "track" else None):
-                tally.take(one, found)
+            for one, answer in located(locate, taken, frames, tracker):
+                found.append(Located.of(one, answer))
+                show("scans", len(found), total)
+                refused = answer.get("error", refused)
                 if output.as_json:
-                    print_json(_line(one, found, frames, several=len(maps) > 1))
+                    print_json(_line(one, answer, frames, several=len(maps) > 1))
         except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
-            if not tally.count:
+            if not found:
                 raise
             broken = error
     if files.out is not None:
-        _write_poses(tally, files.out, output.notes)
+        _write_poses(found, files.out, output.notes)
     if files.picture is not None:
-        _draw(maps, where, tally, files.picture, output.notes)
+        _draw(maps, where, found, files.picture, output.notes)
     print_notes(opened_log, output.notes)
-    print_lines(_log_lines(opened_log, frames), output.notes)
+    print_lines(rows([("poses", frames.told)], 10), output.notes)
     if not output.as_json:
-        print_lines(_lines(tally, where.server))
+        print_lines(_lines(found, refused, where.server))
+    if broken is None and refused and all(one.verdict == REFUSED for one in found):
+        broken = RefusedError(refused)
     if broken is not None:
         raise broken
-    if tally.refused is not None and tally.count == tally.verdicts["refused"]:
-        raise RefusedError(tally.refused)
 
 
 def located(
@@ -155,20 +136,11 @@ def located(
         except RefusedError as error:
             if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map"):
                 raise
-            yield one, {"usable": False, "reasons": [], "error": str(error)}
+            yield one, {**NOTHING, "error": str(error)}
             continue
         if tracker is not None:
             tracker.learn(found, one)
         yield one, found
-
-
-def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
-    """Yield the scans; show the progress on a terminal."""
-    total = None if log.count is None else -(-log.count // every)
-    with progress() as show:
-        for number, one in enumerate(scans, 1):
-            yield one
-            show("scans", number, total)
 
 
 def _line(one: LoggedScan, found: Json, frames: Frames, *, several: bool) -> Json:
@@ -177,64 +149,49 @@ def _line(one: LoggedScan, found: Json, frames: Frames, *, several: bool) -> Jso
     return {**line, "map_id": map_of(found)} if several else line
 
 
-def _write_poses(tally: Tally, out: Path, where: TextIO) -> None:
+def _write_poses(found: Sequence[Located], out: Path, where: TextIO) -> None:
     """Write the usable poses in the order of their stamps; those after a clock was set back to a file of their own."""
     from formats import StampedPose, write_tum
 
-    usable = sorted(tally.usable, key=lambda one: (one.round, one.stamp_ns))
+    usable = sorted((one for one in found if one.usable), key=lambda one: (one.round, one.stamp_ns))
     rounds = [list(poses) for _, poses in groupby(usable, key=lambda one: one.round)] or [[]]
     for number, poses in enumerate(rounds, 1):
         file = out if number == 1 else out.with_stem(f"{out.stem}-{number}")
-        stamped = {one.stamp_ns: StampedPose(one.stamp_ns, one.pose) for one in poses}
+        stamped = {one.stamp_ns: StampedPose(one.stamp_ns, one.pose) for one in poses if one.pose is not None}
         write_tum(stamped.values(), file)
         if len(rounds) > 1:
             seconds = f"{poses[0].stamp_ns / 1e9:.3f} to {poses[-1].stamp_ns / 1e9:.3f}"
             print_lines(rows([("poses", f"part {number} of the log, stamps {seconds}, in {file}")], 10), where)
 
 
-def _draw(maps: Sequence[NamedMap], where: Where, tally: Tally, picture: Path, notes: TextIO) -> None:
+def _draw(maps: Sequence[NamedMap], where: Where, found: Sequence[Located], picture: Path, notes: TextIO) -> None:
     """Draw the map and the poses on it; of several maps those with a usable pose, each to a file with its name."""
-    several, drawn = len(maps) > 1, []
+    several, drawn = len(maps) > 1, list[str]()
     for one in maps:
-        mine = [pose for pose in tally.poses if pose.map_id == (one.name if several else "")]
-        usable, others = ([pose.pose for pose in mine if pose.usable is kind] for kind in (True, False))
+        mine = [each for each in found if each.pose is not None and each.map_id == (one.name if several else "")]
+        usable, others = ([each.pose for each in mine if each.usable is kind] for kind in (True, False))
         if usable or not several:
             out = picture.with_stem(f"{picture.stem}-{one.name}") if several else picture
             draw_picture(where.whole_map(one.document), out, usable, others)
-            drawn.append(out)
+            drawn.append(str(out))
     if several:
-        written = ", ".join(str(out) for out in drawn) or "none: no map has a usable pose"
-        print_lines(rows([("picture", written)], 10), notes)
+        print_lines(rows([("picture", ", ".join(drawn) or "none: no map has a usable pose")], 10), notes)
 
 
-def _log_lines(log: Log, frames: Frames) -> Lines:
-    """Return what was read of the log, and whose poses are printed."""
-    from linefix.ranges import SPEED, TURN
-
-    codes, found = {note.code for note in log.report.assumed}, []
-    if "no_odometry" in codes:
-        found.append(("prior", "none without odometry: each scan is searched on the whole map"))
-    if "motion" in codes:
-        wider = f"{SPEED:.1f} m/s and {TURN:.1f} rad/s"
-        found.append(("poses", f"covariances include an unknown motion of {wider} for scans without odometry"))
-    return rows([*found, ("poses", frames.told)], 10)
-
-
-def _lines(tally: Tally, server: str | None) -> Iterator[str]:
-    count, usable = max(1, tally.count), tally.usable
-    verdicts = [(name, number, f"{100.0 * number / count:.1f} %") for name, number in tally.verdicts.most_common()]
-    yield from table(("verdict", "scans", "fraction"), verdicts)
+def _lines(found: Sequence[Located], refused: str, server: str | None) -> Iterator[str]:
+    count, usable = max(1, len(found)), [one for one in found if one.usable]
+    verdicts = Counter(one.verdict for one in found).most_common()
+    yield from table(("verdict", "scans", "fraction"), [(*one, f"{100.0 * one[1] / count:.1f} %") for one in verdicts])
     stays = [(name, list(poses)) for name, poses in groupby(usable, key=lambda one: one.map_id) if name]
     if stays:
         parts = [(name, 1e-9 * poses[0].stamp_ns, 1e-9 * poses[-1].stamp_ns, len(poses)) for name, poses in stays]
         yield from table(("map", "from", "to", "usable scans"), parts)
-    for name, counts in (("why not usable", tally.reasons), ("warning", tally.warnings)):
+    reasons = Counter(code for one in found for code in one.reasons[:1])
+    warnings = Counter(code for one in found for code in one.warnings)
+    for name, counts in (("why not usable", reasons), ("warning", warnings)):
         if counts:
             yield from table((name, "scans"), counts.most_common())
-    if len(usable) < FEW * tally.count or "map_scale" in tally.warnings:
+    if len(usable) < FEW * len(found) or "map_scale" in warnings:
         yield from rows([("hint", HINT.format("" if server is None else f" --server {server}"))])
-    if tally.refused is not None:
-        yield from rows([("refused", tally.refused)])
-    if tally.times:
-        told = f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most"
-        yield from rows([("time", told)])
+    if refused:
+        yield from rows([("refused", refused)])

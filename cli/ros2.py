@@ -6,23 +6,23 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .asking import Where
-from .errors import RefusedError, WrongUseError, needing
+from .errors import WrongUseError, needing
 from .inputs import read_maps
 from .options import PlainCommand, UsableOptions, flag, grouped, option
-from .ros2_parameters import given_parameter, parameters_of, robots_of
 
 if TYPE_CHECKING:
     from ros2 import Maps, NodeOptions
 
-MAX_FRAME = 255  # characters
+NODE = "linefix"  # the name of the node in parameter files
+ANY = "**"  # stands for each node
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
-NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "stdout_logs", "help")
+NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "help")
 LEAST = "Minimum standard deviation"
 TOGETHER = "Search scans of several topics as one if they are so close in time; 0: never."
 STOP_TF = "Stop the transform of --publish-tf this long after the last scan with ranges; 0: never."
@@ -35,6 +35,8 @@ MAPS = (
     "A map file, a folder of map files, or the id of a stored map; repeat for more maps, which are searched together. "
     "Default: the topic of --map-topic."
 )
+
+Sections = dict[tuple[str, str], dict[str, Any]]
 
 
 class RosCommand(PlainCommand):
@@ -96,7 +98,6 @@ class RosArguments:
     parameter: list[str] | None = option(None, "Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")
     log_level: list[str] | None = option(None, "Ignored, as are rosout logs.", "LEVEL")
     rosout_logs: bool = flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)
-    stdout_logs: bool = flag("Ignored.", "--enable-stdout-logs/--disable-stdout-logs", hidden=True)
     remap: list[str] | None = option(None, "Remap the name of a topic.", "FROM:=TO", "--remap", "-r")
 
 
@@ -108,17 +109,11 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     """
     with needing("linefix ros2", "formats", "ros2"):
         import ros2 as node_side
-    rules = ros.remap or []
-    robots = [] if ros.params_file is None else robots_of(ros.params_file)
-    if len(robots) > 1 and robot.namespace is None and not any(rule.startswith("__ns:=") for rule in rules):
-        raise WrongUseError(
-            f"{ros.params_file}: found parameters of {', '.join(robots)}, expected one; add --namespace"
-        )
     given = asdict(robot) | asdict(usable)
     names, topics = given.pop("on"), tuple(given.pop("scan") or ("scan",))
     given["map_topic"] = None if names else robot.map_topic
     try:
-        remappings = dict(map(node_side.remapping_of, rules))
+        remappings = dict(map(node_side.remapping_of, ros.remap or []))
         remappings.pop("__node", None)
         space = remappings.pop("__ns", robot.namespace)
         space = node_side.checked_namespace(node_side.namespace_of(topics) if space is None else space)
@@ -152,12 +147,10 @@ def _run(node: Any, options: NodeOptions, maps: Maps | None) -> None:
 def _started(options: NodeOptions, maps: Maps | None) -> str:
     from formats.report import first_of
 
-    scans = ", ".join(options.topic(name) for name in options.scans)
-    source = f"map from the topic {options.topic(options.map_topic or 'map')}"
-    if maps is not None:
-        source = f"{'maps' if maps.several else 'map'} {first_of(list(maps.frames))}"
+    scans = ", ".join(map(options.topic, options.scans))
+    on = f"topic {options.topic(options.map_topic or 'map')}" if maps is None else first_of(list(maps.frames))
     return (
-        f"subscribed to {scans} in domain {options.domain}; {source}; base frame {options.base}; "
+        f"subscribed to {scans} in domain {options.domain}; map: {on}; base frame {options.base}; "
         f"{options.topic('initialpose')} when {options.agree} scans agree"
     )
 
@@ -167,14 +160,88 @@ def _maps_at(names: Sequence[str]) -> Maps:
     from ros2 import Maps
 
     documents = {one.name: Where().whole_map(one.document) for one in read_maps(names)}
-    frames = {name: document.get("frame_id") or "map" for name, document in documents.items()}
-    for name, frame in frames.items():
-        if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
-            raise RefusedError(
-                f"{name}: found a frame_id that is not a name, expected at most "
-                f"{MAX_FRAME} printable characters; correct it in the map file"
-            )
     with needing("a map"):
         several = len(documents) > 1
         index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
-    return Maps(index, frames)
+    return Maps(index, {name: document.get("frame_id", "map") for name, document in documents.items()})
+
+
+def parameters_of(file: Path, namespace: str | None = None, known: Container[str] = ()) -> dict[str, Any]:
+    """Return the parameters of a file for a robot, by the names of options.
+
+    The sections ``/**`` and ``linefix`` apply to each robot, ``/robot1/linefix`` to that one and with precedence.
+
+    Parameters
+    ----------
+    file : Path
+    namespace : str, optional
+        Of the robot, such as ``/robot1``. None: that of the file.
+    known : container of str
+        Names of options; others in sections of all nodes are left out.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file, it is no file of parameters, it has none for this robot, or, without a namespace,
+        those of several robots.
+    """
+    sections = _sections_of(file)
+    robots = sorted({above for above, _ in sections if above})
+    chosen = "".join(robots[:1]) if namespace is None else namespace.strip("/")
+    keys = [(above, node) for above in dict.fromkeys(("", chosen)) for node in (ANY, NODE)]
+    if sections.keys().isdisjoint(keys) or (namespace is None and len(robots) > 1):
+        expected = "expected one; add --namespace" if namespace is None else f"expected those of /{chosen}"
+        raise WrongUseError(f"{file}: found parameters of {', '.join(f'/{one}' for one in robots)}, {expected}")
+    values: dict[str, Any] = {}
+    for above, node in keys:
+        section = _with_maps(sections.get((above, node), {}), file)
+        # Parameters of all nodes may be meant for others.
+        values.update({name: value for name, value in section.items() if node == NODE or name in known})
+    return values
+
+
+def given_parameter(rule: str) -> dict[str, Any]:
+    """Return a parameter of the command line, ``name:=value``, by the name of its option; raises `WrongUseError`."""
+    name, _, text = rule.partition(":=")
+    node, _, name = name.rpartition(":")
+    value = _yaml(text)
+    if not name or value is None or node.strip("/").rpartition("/")[2] not in ("", NODE):
+        raise WrongUseError(f"-p: found {rule[:80]!r}, expected NAME:=VALUE, such as agree:=5")
+    return _with_maps({name: value}, Path("-p"))
+
+
+def _yaml(text: str) -> Any:
+    """Return the value of a text in YAML; None where it is none."""
+    from formats.files import load_yaml
+    from registration import InputError
+
+    try:
+        return load_yaml(text)
+    except InputError:
+        return None
+
+
+def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:
+    """Return a section with `map`, a text, or `maps`, a list, as the option that takes both; raises `WrongUseError`."""
+    others = {name: value for name, value in section.items() if value is not None}
+    one, several = others.pop("map", None), others.pop("maps", None) or []
+    maps = [*([] if one is None else [one]), *(several if isinstance(several, list) else [several])]
+    if not all(isinstance(name, str) for name in maps):
+        raise WrongUseError(
+            f"{file}: found {str(maps)[:80]}, expected map: NAME, or maps: [NAME, ...] with names of maps"
+        )
+    return {**others, "on": maps} if maps else others
+
+
+def _sections_of(file: Path) -> Sections:
+    """Return the sections of the node by namespace and name of the node."""
+    document = _yaml(file.read_text(encoding="utf-8", errors="replace"))
+    sections: Sections = {}
+    for name, inner in document.items() if isinstance(document, dict) else ():
+        above, _, node = str(name).strip("/").rpartition("/")
+        parameters = inner.get("ros__parameters") if isinstance(inner, dict) else None
+        if node in (NODE, ANY) and isinstance(parameters, dict):
+            sections[above, node] = {str(key): value for key, value in parameters.items()}
+    if not sections:
+        raise WrongUseError(f"{file}: found no parameters in YAML, expected {NODE}: ros__parameters: name: value")
+    return sections

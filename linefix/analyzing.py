@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from itertools import islice
+import os
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from functools import partial
 
 from association import Deadline
 from map_quality import Analysis, PlaceVerdict, finished
@@ -19,39 +21,27 @@ _analysis: Analysis | None = None  # of a process that was started for it
 _deadline = Deadline()
 
 
-def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progress: Progress) -> Looks:
+def look_on_all_cores(analysis: Analysis, deadline: Deadline, progress: Progress) -> Looks:
     """Try every place, and return the results of those for which there was time.
 
-    The verdicts are the same however many cores there are.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    cores : int
-    deadline : Deadline
-    progress : callable
-        Called with the number of places that are done, and of all.
+    The verdicts are the same however many cores there are. `progress` is called with the number of places that are
+    done, and of all.
     """
-    order = analysis.standing.order.tolist()
+    order, found = analysis.standing.order.tolist(), dict[int, PlaceVerdict | None]()
     portions = [order[k : k + PORTION] for k in range(0, len(order), PORTION)]
-    found: Looks = {}
-    if cores == 1 or len(order) <= ALONE:
-        for portion in portions:
-            found |= finished(looks(analysis, portion, deadline))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with ExitStack() as stack:
+        done: Iterator[Looks] = (finished(looks(analysis, portion, deadline)) for portion in portions)
+        if cores > 1 and len(order) > ALONE:
+            # Spawned, never forked: this process has threads.
+            context = multiprocessing.get_context("spawn")
+            pool = ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (analysis, deadline.at))
+            stack.callback(partial(pool.shutdown, cancel_futures=True))
+            done = pool.map(_look_here, portions)
+        for some in done:
+            found |= some
             progress(len(found), len(order))
-        return found
-    # Spawned, never forked: this process has threads.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (analysis, deadline.at)) as pool:
-        todo, running = iter(portions), set[Future[Looks]]()
-        while True:
-            running |= {pool.submit(_look_here, portion) for portion in islice(todo, 2 * cores - len(running))}
-            if not running:
-                return found
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            for one in done:
-                found |= one.result()
-            progress(len(found), len(order))
+    return found
 
 
 def looks(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Generator[None, None, Looks]:

@@ -14,7 +14,7 @@ from . import operations
 from .analyzing import Progress, look_on_all_cores
 from .documents import inputs, results
 from .documents.analysis import MapAnalyzeRequest
-from .documents.limits import Limits
+from .documents.errors import Fault, InvalidRequestError
 from .documents.parts import InlineMap, MapDocument, SearchOptions, StoredMap
 from .documents.reading import validate
 from .documents.requests import (
@@ -28,10 +28,14 @@ from .documents.requests import (
 )
 from .documents.updates import UpdateRequest
 from .driving import Explanation, explain_search, search
-from .operations import Json, Search, Stopwatch, Target, require_time, worked
+from .operations import Json, Search, Stopwatch, Target, worked
 
 if TYPE_CHECKING:
     from formats import ImportedMap
+
+
+def _none_stored(map_id: str) -> tuple[MapDocument, Json]:
+    raise InvalidRequestError([Fault("/map/map_id", "found the id of a stored map, expected the map itself")])
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,25 +43,21 @@ class LocalService:
     """Answers requests in this process; the methods are those of the client of a service.
 
     Each raises `RequestError` or `InputError` when a part of the request is not taken, and `DeadlinePassedError` when
-    the deadline passes before the search starts.
+    the deadline of the request passes before the search starts. The limits of a service do not apply.
 
     Attributes
     ----------
-    limits : Limits
-    deadline_ms : float
-        Of a search: its default, and the longest.
     stored : callable
-        From the id of a stored map to its document, and its id and revision as they are answered.
+        From the id of a stored map to its document, and its id and revision as they are answered. Default: there are
+        none.
     """
 
-    limits: Limits
-    deadline_ms: float
-    stored: Callable[[str], tuple[MapDocument, Json]]
+    stored: Callable[[str], tuple[MapDocument, Json]] = _none_stored
 
     def associate(self, document: Json, by: Search = search) -> Json:
         """Return the answer of ``POST /v1/associate``."""
         watch = Stopwatch()
-        asked = validate(AssociateRequest, document, self.limits)
+        asked = validate(AssociateRequest, document)
         return self._find(watch, self._target(asked, asked.options), asked, asked.options, by)
 
     def locating(self, on: Json, options: Json) -> Callable[[Json], Json]:
@@ -65,9 +65,9 @@ class LocalService:
 
         The function answers as `associate` does, and raises the same.
         """
-        how = validate(SearchOptions, options, self.limits)
-        target = self._target(validate(OnMaps, on, self.limits), how)
-        return lambda sought: self._find(Stopwatch(), target, validate(BatchItem, sought, self.limits), how)
+        how = validate(SearchOptions, options)
+        target = self._target(validate(OnMaps, on), how)
+        return lambda sought: self._find(Stopwatch(), target, validate(BatchItem, sought), how)
 
     def explain(self, document: Json) -> Json:
         """Return the answer of `associate` as ``answer``, and next to it how its verdict came about."""
@@ -82,38 +82,38 @@ class LocalService:
     def register(self, document: Json) -> Json:
         """Return the answer of ``POST /v1/register``."""
         watch = Stopwatch()
-        return _sealed(watch, operations.registered(validate(RegisterRequest, document, self.limits), watch))
+        return _sealed(watch, operations.registered(validate(RegisterRequest, document), watch))
 
     def vectorize(self, document: Json) -> Json:
         """Return the answer of ``POST /v1/vectorize``."""
         watch = Stopwatch()
-        return _sealed(watch, operations.vectorized(validate(VectorizeRequest, document, self.limits), watch))
+        return _sealed(watch, operations.vectorized(validate(VectorizeRequest, document), watch))
 
-    def analyze(self, document: Json, cores: int = 1, progress: Progress = lambda done, total: None) -> Json:
-        """Return the answer of ``POST /v1/analyze``; it takes as long as it takes where no deadline is given."""
+    def analyze(self, document: Json, progress: Progress = lambda done, total: None) -> Json:
+        """Return the answer of ``POST /v1/analyze``, worked out on all cores."""
         watch = Stopwatch()
-        asked = validate(MapAnalyzeRequest, document, self.limits)
+        asked = validate(MapAnalyzeRequest, document)
         drawn, reference = self._document_of(asked.map)
         analysis = inputs.analysis_of(inputs.index_of(drawn), asked)
         deadline = watch.deadline(asked.deadline_ms)
         watch.lap("decode")
-        looks = look_on_all_cores(analysis, cores, deadline, progress)
+        looks = look_on_all_cores(analysis, deadline, progress)
         watch.lap("search")
         return _sealed(watch, results.analysis_json(analysis, looks), map=reference, client_ref=asked.client_ref)
 
     def check_map(self, on: Json, document: Json | None = None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check`` for the map of a request; a document has sample scans."""
         watch = Stopwatch()
-        asked = NO_SAMPLES if document is None else validate(CheckRequest, document, self.limits)
+        asked = NO_SAMPLES if document is None else validate(CheckRequest, document)
         drawn, reference = self._map_at(on)
-        deadline = watch.deadline(asked.deadline_ms, self.deadline_ms)
+        deadline = watch.deadline(asked.deadline_ms)
         steps = operations.check_steps(inputs.index_of(drawn, oriented=True), drawn.oriented, asked, deadline)
         return _sealed(watch, worked(steps, watch, deadline), map=reference, client_ref=asked.client_ref)
 
     def update_map(self, on: Json, document: Json) -> Json:
         """Return the answer of ``POST /v1/maps/{map_id}:update`` for the map of a request."""
         watch = Stopwatch()
-        asked = validate(UpdateRequest, document, self.limits)
+        asked = validate(UpdateRequest, document)
         old, reference = self._map_at(on)
         deadline = watch.deadline(asked.deadline_ms)
         steps = operations.update_steps(inputs.index_of(old), old, asked, deadline)
@@ -121,13 +121,10 @@ class LocalService:
 
     def check_import(self, imported: ImportedMap, watch: Stopwatch) -> Json:
         """Return the answer of ``POST /v1/maps:import`` for a map that was read."""
-        deadline = watch.deadline(None, self.deadline_ms)
         watch.lap("read")
-        document = validate(InlineMap, results.map_json(imported.map), self.limits)
+        document = validate(InlineMap, results.map_json(imported.map))
         inputs.require_map(document)
-        index = inputs.index_of(document, oriented=True)
-        require_time(deadline)
-        found = check_map(index, deadline, oriented=imported.map.oriented)
+        found = check_map(inputs.index_of(document, oriented=True), oriented=imported.map.oriented)
         watch.lap("check")
         return _sealed(watch, results.import_json(imported, found))
 
@@ -139,7 +136,7 @@ class LocalService:
         how: SearchOptions,
         by: Search = search,
     ) -> Json:
-        deadline = watch.deadline(how.deadline_ms, self.deadline_ms)
+        deadline = watch.deadline(how.deadline_ms)
         _, answer = operations.find(target, sought, how, deadline, watch, by)
         return _sealed(watch, answer, client_ref=getattr(sought, "client_ref", None))
 
@@ -156,7 +153,7 @@ class LocalService:
         """Return the map of a request, and the id and revision of a stored one."""
         if "map_id" in on and "segments" not in on:
             return self.stored(on["map_id"])
-        return validate(InlineMap, on, self.limits), None
+        return validate(InlineMap, on), None
 
     def _document_of(self, on: InlineMap | StoredMap) -> tuple[MapDocument, Json | None]:
         """Return a map, and the id and revision of a stored one."""

@@ -31,9 +31,6 @@ from .ranges import MountedScan, ranges_scan, view_of
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
 
-# Of a map document.
-MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "points", "points_sigma", "meta"))
-
 
 def locate(
     map: MapIndex | MapSet | LineMap | ImportedMap | Segments | ArrayLike,
@@ -235,21 +232,18 @@ def map_part(map: Any, argument: str) -> MapPart:
 
 def _document_part(document: Mapping[str, Any], argument: str) -> MapPart:
     """Return the map of a document; raises `InputError` where a field is unknown, or not what it should be."""
-    unknown = sorted(set(map(str, document)) - MAP_FIELDS)
-    if unknown:
-        raise InvalidArgumentError(
-            f"found the field {unknown[0]}, expected {', '.join(sorted(MAP_FIELDS))}", argument=argument
-        )
-    oriented, sigma = document.get("oriented"), document.get("sigma")
-    if not (oriented is None or isinstance(oriented, bool)):
-        raise InvalidArgumentError(f"expected true, false or null, found {oriented!r}", argument=f"{argument}.oriented")
-    points_sigma = document.get("points_sigma")
-    for name, deviation in (("sigma", sigma), ("points_sigma", points_sigma)):
-        if deviation is not None and (isinstance(deviation, bool) or not isinstance(deviation, int | float)):
-            raise InvalidArgumentError(f"expected metres or null, found {deviation!r}", argument=f"{argument}.{name}")
+    from .documents.errors import InvalidRequestError
+    from .documents.parts import InlineMap
+    from .documents.reading import validate
+
+    try:  # both may be arrays of NumPy here
+        fields = validate(InlineMap, {**document, "segments": [], "points": []})
+    except InvalidRequestError as error:
+        fault = error.faults[0]
+        raise InvalidArgumentError(fault.message, argument=argument + fault.pointer.replace("/", ".")) from None
     segments = Segments.from_array(document.get("segments", []), argument=f"{argument}.segments")
-    points = MapPoints.of(document.get("points", []), points_sigma, path=f"{argument}.")
-    return MapPart(segments, sigma, oriented is not False, points)
+    points = MapPoints.of(document.get("points", []), fields.points_sigma, path=f"{argument}.")
+    return MapPart(segments, fields.sigma, fields.oriented is not False, points)
 
 
 def scan_of(

@@ -8,18 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..asking import Where
-from ..inputs import read_map_or_id
+from ..inputs import read_map_or_id, read_scan
 from ..logs import some_scans
 from ..options import MapArgument, TopicOptions, grouped, option
 from ..printing import Json, Output, rows
-from ..scans import read_scan
 
 if TYPE_CHECKING:
     from formats import LoggedScan
 
 SHOWN = 3  # places of a finding
-BETTER = {"mirrored", "reversed", "undirected", "centre_lines", "scale"}  # findings by scans
-AS_IT_IS = "; no better mirrored, reversed, without directions or at another scale"
 SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
 
@@ -65,10 +62,6 @@ def check_rows(found: Json, document: Json) -> Iterator[tuple[str, str]]:
             yield "advice", f'set "{name}" of the map to {str(value).lower()}'
     if samples is not None:
         tried = sum(one["status"] is not None for one in samples["scans"])
-        usable = f"{samples['usable']} of {tried} usable; with the advice {samples['usable_as_advised']}"
-        as_it_is = found["complete"] and BETTER.isdisjoint(one["code"] for one in found["findings"])
-        yield "scans", usable + AS_IT_IS * as_it_is
-        if tried < len(samples["scans"]):
-            yield "note", f"the time limit ended the check before {len(samples['scans']) - tried} more scans"
-    elif not found["complete"]:
+        yield "scans", f"{samples['usable']} of {tried} usable; with the advice {samples['usable_as_advised']}"
+    if not found["complete"]:
         yield "note", "the time limit ended the check; the findings are not complete"

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 from ..asking import Where, answering
-from ..errors import WrongUseError, flags_of, needing
+from ..errors import flags_of, needing
 from ..inputs import draw_picture, existing, write_document
 from ..logs import some_scans
 from ..options import DRAW_RESULT, ORIENTED, WRITE_MAP, TopicOptions, argument, flag, grouped, option
 from ..printing import Json, Output, noted, rows
 from .checking import SAMPLES, check_rows, of_sensor
-from .updating import draw_changes, update_by_drive, update_rows
 
-IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
 UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit."
 
 
@@ -49,45 +46,25 @@ class SaidOfFile:
 def import_map(
     file: Annotated[Path, argument("Map file: yaml of map_server, dxf, svg, geojson, csv, json, or a bag.", "FILE")],
     said: SaidOfFile,
-    where: Where,
     output: Output,
     out: Path | None = option(None, WRITE_MAP, "FILE"),
     picture: Path | None = option(None, DRAW_RESULT, "FILE"),
     log: Path | None = option(None, "A log of the building: find where the walls' surfaces are.", "FILE"),
-    update: bool = flag("Improve the map with the scans of --log; see map update.", "--update"),
 ) -> None:
     """Read a map of another tool, report what was read and what is doubtful, and write it as a map file."""
-    if log is not None and where.server is not None:
-        raise WrongUseError(
-            "--log: not possible with --server; omit --server, and store the map with linefix map put afterwards"
-        )
-    if update and log is None:
-        raise WrongUseError("--update: found no log, expected one; add --log FILE with scans of the building")
-    answer = imported(file, said, where)
+    answer = imported(file, said)
     if log is not None:
         answer = beside_log(answer, file, said, log)
-    found = [*report_rows(answer), *check_rows(answer["check"], answer["map"])]
-    if update and log is not None:
-        updated = update_by_drive(answer["map"], log)
-        found += update_rows(updated, answer["map"])
-        if picture is not None:
-            draw_changes(answer["map"], updated, picture)
-        answer = {**answer, "map": updated.pop("map"), "update": updated}
-    elif picture is not None:
+    if picture is not None:
         draw_picture(answer["map"], picture)
     if out is not None:
         write_document(answer["map"], out)
-    output.print(answer, rows(found))
+    output.print(answer, rows([*report_rows(answer), *check_rows(answer["check"], answer["map"])]))
 
 
-def imported(file: Path, said: SaidOfFile, where: Where) -> Json:
+def imported(file: Path, said: SaidOfFile) -> Json:
     """Return what ``/v1/maps:import`` answers to a file; raises `WrongUseError` when there is no such file."""
-    files = [existing(file)] if where.server is None else _with_what_it_names(existing(file))
-    names = flags_of(said) | {"": file.name, "/files": file.name}
-    names |= {f"/files/{number}": one.name for number, one in enumerate(files)}
-    if where.server is not None:
-        sent = [(one.name, one.read_bytes()) for one in files]
-        return where.ask("import_map", sent, said.fields, names=names)
+    names = flags_of(said) | {"": existing(file).name}
     with answering(names) as service, needing(f"reading {file.name}"):
         from formats import read_map
         from linefix.operations import Stopwatch
@@ -107,35 +84,24 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
     """
     scans = {"scans": [of_sensor(one) for one in some_scans(log, SAMPLES, TopicOptions())]}
     found = Where().ask("check_map", answer["map"], scans)
-    thicker, line_map = found["samples"]["wall_thickness"], answer["map"]
-    meta = line_map["meta"]
-    made_of_centres = "thickness" in meta or not line_map["oriented"]
+    thicker, meta, oriented = found["samples"]["wall_thickness"], answer["map"]["meta"], answer["map"]["oriented"]
+    made_of_centres = "thickness" in meta or not oriented
     if thicker is not None and "surface" in meta and said.surface is None:
         cells = max(0.0, float(meta["surface"]) - 0.5 * thicker / float(meta["resolution"]))
         changed, replaced = replace(said, surface=round(cells, 2)), "surface"
         message = f"wall surfaces lie {cells:.2f} cells behind the border of the free cells"
     elif thicker is not None and made_of_centres and said.thickness is None and said.drawn != "faces":
-        thickness = max(0.0, (float(meta.get("thickness", 0.0)) if line_map["oriented"] else 0.0) + thicker)
+        thickness = max(0.0, (float(meta.get("thickness", 0.0)) if oriented else 0.0) + thicker)
         changed, replaced = replace(said, drawn="centres", thickness=round(thickness, 2)), "thickness_given"
         message = f"walls are {thickness:.2f} m thick"
     else:
         return {**answer, "check": found}
-    again = imported(file, changed, Where())
+    again = imported(file, changed)
     kept = [note for note in again["report"]["assumed"] if note["code"] != replaced]
-    told = {"code": f"{replaced.partition('_')[0]}_found", "count": 0}
-    again["report"]["assumed"] = [*kept, {**told, "message": f"{message}, estimated from scans of {log.name}"}]
+    message += f", estimated from scans of {log.name}"
+    note = {"code": f"{replaced.partition('_')[0]}_found", "message": message, "count": 0}
+    again["report"]["assumed"] = [*kept, note]
     return {**again, "check": Where().ask("check_map", again["map"], scans)}
-
-
-def _with_what_it_names(file: Path) -> list[Path]:
-    """Return the files to send: a bag's folder whole, and in addition to a yaml its picture."""
-    if file.is_dir():
-        return sorted(path for path in file.iterdir() if path.is_file())
-    if file.suffix.lower() not in (".yaml", ".yml"):
-        return [file]
-    named = IMAGE.search(file.read_text(encoding="utf-8-sig", errors="replace"))
-    picture = file.with_name(named[1]) if named else file
-    return [file, picture] if named and picture.is_file() else [file]
 
 
 def report_rows(answer: Json) -> list[tuple[str, str]]:

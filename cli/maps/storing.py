@@ -8,10 +8,8 @@ from typing import Annotated
 from ..asking import Where
 from ..errors import WrongUseError
 from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id, write_document
-from ..options import WRITE_MAP, MapArgument, argument, grouped, option, required
-from ..printing import Json, Output, print_json, print_lines, rows, table
-
-COLUMNS = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
+from ..options import MapArgument, argument, grouped, required
+from ..printing import Json, Output, listing, outline, print_json, print_lines
 
 
 def _checked(map_id: str) -> str:
@@ -28,8 +26,7 @@ MapFile = Annotated[str, argument("A map file: json, or another file that map im
 def put(map_id: MapId, file: MapFile, where: Where, output: Output) -> None:
     """Store a map under an id."""
     told = where.ask("put_map", _checked(map_id), read_map_file(file), names={"": file})
-    line = f"{told['map_id']}, revision {told['revision']}, {told['segment_count']} segments"
-    output.print(told, rows([("stored", line)]))
+    output.print(told, outline(told))
 
 
 @grouped
@@ -45,23 +42,13 @@ def list_maps(where: Where, output: Output) -> None:
         for one in maps:
             print_json(one)
         return
-    names = ("map_id", "revision", "segment_count")
-    records = [(*(m[name] for name in names), *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in maps]
-    print_lines(table(COLUMNS, records))
+    print_lines(listing(maps))
 
 
 @grouped
-def get(
-    map_id: MapId,
-    where: Where,
-    out: Path | None = option(None, f"{WRITE_MAP} Default: print it.", "FILE"),
-) -> None:
-    """Print a stored map as JSON, or write it to a file."""
-    document = where.ask("get_map", _checked(map_id))
-    if out is None:
-        print_json(document)
-    else:
-        write_document(document, out)
+def get(map_id: MapId, where: Where) -> None:
+    """Print a stored map as JSON."""
+    print_json(where.ask("get_map", _checked(map_id)))
 
 
 @grouped

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import fmean, median
+from statistics import fmean, median, mode
 from typing import TYPE_CHECKING, Annotated
 
 from ..asking import Where
@@ -25,34 +24,6 @@ SCANS = 200  # of a log; more cost time, and say the same again
 SHOWN = 8  # segments of a change
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Visits(TopicOptions):
-    """The logs of visits, and what to read of them."""
-
-    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")]
-    scans: int = option(SCANS, "Use so many scans of each log at most.", "N", min=3)
-
-    def read(self) -> dict[str, list[LoggedScan]]:
-        """Return scans of each visit, by the name of its log.
-
-        Raises
-        ------
-        WrongUseError
-            When a log is there twice.
-        """
-        if len({log.resolve() for log in self.logs}) < len(self.logs):
-            raise WrongUseError("LOG: found the same log twice, expected a log of each visit")
-        same = len({log.name for log in self.logs}) < len(self.logs)
-        return {str(log) if same else log.name: self._scans_of(log) for log in self.logs}
-
-    def _scans_of(self, log: Path) -> list[LoggedScan]:
-        """Return some scans of a log; those that odometry does not connect with the others are without it."""
-        taken = some_scans(log, self.scans, self)
-        # Odometry connects the scans of one part only: that with most of them.
-        parts = Counter(one.part for one in taken).most_common(1)
-        return [one if one.part == parts[0][0] else replace(one, pose=None) for one in taken]
-
-
 @dataclass(frozen=True, slots=True)
 class Result:
     """Which changes to accept, and files for the new map."""
@@ -64,12 +35,20 @@ class Result:
 
 
 @grouped
-def update(on: MapArgument, visits: Visits, result: Result, where: Where, output: Output) -> None:
+def update(
+    on: MapArgument,
+    logs: Annotated[list[Path], argument("A log of each visit; changes need two visits.", "LOG")],
+    source: TopicOptions,
+    result: Result,
+    where: Where,
+    output: Output,
+) -> None:
     """Propose changes of a map that the scans of several visits show, and write the new map."""
-    target, scans = read_map_or_id(on), visits.read()
+    target, scans = read_map_or_id(on), _visits_of(logs, source)
     names = flags_of(result) | {"": on, "/map": on}
     names |= {f"/visits/{number}": name for number, name in enumerate(scans)}
-    request = {**_request_of(scans), "accept": result.accept, "refuse": result.refuse or []}
+    visits = [{"visit": name, "scans": [_sent(one) for one in some]} for name, some in scans.items()]
+    request = {"visits": visits, "accept": result.accept, "refuse": result.refuse or []}
     answer = where.ask("update_map", target, request, names=names)
     if result.out is not None:
         write_document(answer["map"], result.out)
@@ -79,31 +58,36 @@ def update(on: MapArgument, visits: Visits, result: Result, where: Where, output
     output.print(answer, rows(update_rows(answer, old, len(scans))))
 
 
-def _request_of(visits: Mapping[str, Sequence[LoggedScan]]) -> Json:
-    """Return a request for an update; poses are those of the sensor, so that mounts make no difference."""
-    return {"visits": [{"visit": name, "scans": [_sent(one) for one in scans]} for name, scans in visits.items()]}
+def _visits_of(logs: Sequence[Path], source: TopicOptions) -> dict[str, list[LoggedScan]]:
+    """Return scans of each visit, by the name of its log.
+
+    Odometry connects the scans of one part of a log: scans of other parts than the longest are without it.
+
+    Raises
+    ------
+    WrongUseError
+        When a log is there twice.
+    """
+    if len({log.resolve() for log in logs}) < len(logs):
+        raise WrongUseError("LOG: found the same log twice, expected a log of each visit")
+    same = len({log.name for log in logs}) < len(logs)
+    found: dict[str, list[LoggedScan]] = {}
+    for log in logs:
+        taken = some_scans(log, SCANS, source)
+        longest = mode(one.part for one in taken)
+        found[str(log) if same else log.name] = [
+            one if one.part == longest else replace(one, pose=None) for one in taken
+        ]
+    return found
 
 
 def _sent(one: LoggedScan) -> Json:
-    """Return a scan of a log as a request for an update has it."""
+    """Return a scan of a log as a request for an update has it: of the sensor, so that mounts make no difference."""
     view = of_sensor(one)["views"][0]
     told: Json = {name: view[name] for name in ("laser", "twist", "flipped") if name in view}
     if one.pose is not None:
         told["odometry"] = {"x": one.pose.x, "y": one.pose.y, "theta": one.pose.theta}
     return told
-
-
-def update_by_drive(document: Json, log: Path) -> Json:
-    """Return the update of a map by one log; its halves count as two visits.
-
-    Raises
-    ------
-    RefusedError
-        When the log, or a scan, is not taken.
-    """
-    (scans,) = Visits(logs=[log], scans=2 * SCANS).read().values()
-    half = len(scans) // 2
-    return Where().ask("update_map", document, _request_of({"first half": scans[:half], "second half": scans[half:]}))
 
 
 def update_rows(answer: Json, old: Json, visits: int = 2) -> Iterator[tuple[str, str]]:
@@ -142,8 +126,7 @@ def _some(segments: Sequence[int]) -> str:
 
 def _middle(rows: Sequence[Sequence[float]]) -> tuple[float, float]:
     """Return the mean of the ends of segments, where the number of their change stands on the picture."""
-    x, y = (fmean(row[k] for row in rows for k in (axis, axis + 2)) for axis in (0, 1))
-    return x, y
+    return fmean(x for row in rows for x in row[::2]), fmean(y for row in rows for y in row[1::2])
 
 
 def _metres(rows: Sequence[Sequence[float]]) -> str:

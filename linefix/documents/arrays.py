@@ -81,7 +81,12 @@ class _Array:
         return {"type": "array", "items": item}
 
     def validate(self, value: Any, info: ValidationInfo) -> Floats:
-        """Return the numbers; stored arrays are read without limits, which may have changed since."""
+        """Return the numbers; stored arrays are read without limits, which may have changed since.
+
+        In the same process an array of NumPy is taken, too; NaN in it is null.
+        """
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
         if type(value) is not list:
             raise _not_an_array(value)
         name, what = self.counted

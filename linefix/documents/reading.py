@@ -113,7 +113,7 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
         raise NotJsonError(what) from None
 
 
-def validate(model: type[M], value: Any, limits: Limits) -> M:
+def validate(model: type[M], value: Any, limits: Limits | None = None) -> M:
     """Check parsed JSON against a request model.
 
     Raises
@@ -121,7 +121,7 @@ def validate(model: type[M], value: Any, limits: Limits) -> M:
     InvalidRequestError
         When it is not what the model takes.
     TooManyError
-        When an array is longer than `limits` allow.
+        When an array is longer than `limits` allow; None: any length is taken.
     """
     try:
         return model.model_validate(value, context=limits)

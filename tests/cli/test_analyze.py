@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -28,9 +27,9 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.long
 def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService, linefix: Linefix) -> None:
-    """Enough places for several processes."""
+    """Enough places for several processes, where there are several cores."""
     asked = "analyze two.json --spacing 0.9 --beams 180 --drive 1 --landmark box.json --json"
-    here = linefix(*asked.split(), LINEFIX_SEARCHES="2")
+    here = linefix(*asked.split())
     assert (here.code, here.err) == (0, "")
     answer = here.answer
     assert len(answer["places"]) == answer["summary"]["similar_pose"] > 30
@@ -42,17 +41,13 @@ def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningS
 
 
 def test_files_of_it(folder: Path, linefix: Linefix) -> None:
-    asked = ("analyze", "room.json", "--spacing", "1", "--out", "a.geojson", "--picture", "a.png")
+    asked = ("analyze", "room.json", "--spacing", "1", "--picture", "a.png")
     ended = linefix.done(*asked, "--drive", "2", "--landmark", "box.json")
-    assert "usable" in ended.out
-    assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\), simulated", ended.out, re.MULTILINE)
-    assert "at once or after a drive" in ended.out
+    told = {line.split()[0]: line.split()[1] for line in ended.out.splitlines()}
+    assert int(told["places"]) >= int(told["usable"]) >= 20
+    assert told["complete"] == "true"
+    assert min(int(told[name]) for name in ("resolved_within", "usable_with_landmark")) >= 15
     assert "without people, and without furniture" in ended.out
-    assert "with the landmark" in ended.out
-    features = json.loads((folder / "a.geojson").read_text())["features"]
-    assert len(features) > 15
-    assert features[0]["geometry"]["type"] == "Point"
-    assert features[0]["properties"]["status"] == "ok"
     with Image.open(folder / "a.png") as picture:
         colours = {colour: count for count, colour in picture.convert("RGB").getcolors(1 << 20) or []}
     assert colours[(0, 158, 115)] > 0.2 * sum(colours.values())

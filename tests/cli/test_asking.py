@@ -56,7 +56,7 @@ def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
     asked = ("register", "room.json", "scan.json", "--correspondences", "pairs.json")
     answer = linefix.done(*asked, "--json").answer
     assert (answer["status"], answer["diagnostics"]["pairs"]) == ("ok", 4)
-    assert "4 pairs, chi2 " in linefix.done(*asked).out
+    assert re.search(r"^pairs +4$", linefix.done(*asked).out, re.MULTILINE)
 
 
 def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:
@@ -69,7 +69,7 @@ def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None
 def test_vectorize_says_that_points_are_in_no_order(linefix: Linefix, folder: Path) -> None:
     points = [[x / 20, -1.0] for x in range(60)]
     (folder / "mixed.json").write_text(json.dumps({"points": [points[k * 23 % 60] for k in range(60)]}))
-    assert "points_not_in_order: " in linefix("vectorize", "mixed.json").out
+    assert "points_not_in_order " in linefix("vectorize", "mixed.json").out
     assert "points_not_in_order" not in linefix("vectorize", "points.json").out
 
 

@@ -66,7 +66,7 @@ def test_a_veto_that_applies_is_shown(linefix: Linefix, folder: Path) -> None:
     verdict = explained(linefix, "room.json", "wall.json")["verdict"]
     (only,) = [veto for veto in verdict["vetoes"] if veto["applies"]]
     assert only == {"name": "unobservable_direction", "applies": True, "reason": "unobservable_direction"}
-    shown = r"unobservable_direction +unobservable_direction +applies"
+    shown = r"unobservable_direction +true +unobservable_direction"
     assert re.search(shown, linefix("explain", "room.json", "wall.json").out)
 
 
@@ -75,7 +75,7 @@ def test_without_an_answer_there_are_vetoes_only(linefix: Linefix, folder: Path)
     found = explained(linefix, "room.json", "nothing.json")
     assert found["answer"]["status"] == found["verdict"]["status"] == "no_match"
     assert found["verdict"]["features"] is None
-    assert "status no_match, not usable" in linefix.done("explain", "room.json", "nothing.json").out
+    assert "verdict  no_match, not usable" in linefix.done("explain", "room.json", "nothing.json").out
 
 
 def test_it_takes_what_locate_takes(linefix: Linefix) -> None:

@@ -72,7 +72,6 @@ def test_what_is_no_json_is_no_linefix(linefix: Linefix, body: bytes) -> None:
         ("map", "get", "hall"),
         ("map", "put", "hall", "room.json"),
         ("map", "check", "hall"),
-        ("map", "import", "room.csv", "--units", "m"),
         ("analyze", "hall"),
     ],
 )
@@ -80,7 +79,6 @@ def test_an_answer_of_another_shape_is_named(
     linefix: Linefix, folder: Path, body: bytes, command: tuple[str, ...]
 ) -> None:
     (folder / "points.json").write_text(json.dumps({"points": [[0.1 * k, -1.0] for k in range(20)]}))
-    (folder / "room.csv").write_text("x1,y1,x2,y2\n0,0,6,0\n6,0,6,4\n")
     head = b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
     with sending(head % len(body) + body) as (url, _):
         line = refused(linefix(*command, "--server", url), 4)

@@ -98,9 +98,7 @@ def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Lin
     assert found
     assert max(radians for _, radians in found) < 0.1  # two standard deviations of 1 rad/s over 0.05 s
     assert "no odometry was found" in ended.err
-    assert "each scan is searched on the whole map" in ended.err
     assert "scans with a time_increment, but without the motion of the sensor" in ended.err
-    assert "covariances include an unknown motion of 0.5 m/s and 1.0 rad/s" in ended.err
 
 
 @pytest.mark.parametrize("odometry", [True, False])

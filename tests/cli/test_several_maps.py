@@ -57,7 +57,7 @@ def test_the_table_of_maps_is_whole_in_a_narrow_terminal(
     monkeypatch.setenv("COLUMNS", "40")
     lines = linefix("locate", "floors", "scan.json").out.splitlines()
     head = next(number for number, line in enumerate(lines) if "status" in line)
-    assert lines[head].split() == ["map", "status", "score", "probability", "pose"]
+    assert lines[head].split() == ["map_id", "revision", "status", "score", "probability", "pose"]
     assert {line.split()[0] for line in lines[head + 1 :]} == {"room", "hall"}
     assert "…" not in "".join(lines)
 
@@ -69,17 +69,6 @@ def test_the_server_answers_as_this_process(linefix: Linefix, files: Path, servi
     for name in ("request_id", "timing_ms"):
         del here[name], there[name]
     assert there == here
-
-
-def test_weights_and_the_map_of_a_window_are_taken(linefix: Linefix, files: Path) -> None:
-    (files / "twin.json").write_text((files / "room.json").read_text())
-    both = ("floors/room.json", "floors/twin.json", "scan.json", "--json")
-    assert linefix.done("locate", *both).answer["status"] == "ambiguous"
-    for name in ("room", "twin"):
-        weighed = linefix.done("locate", *both, "--weight", f"{name}=0.9999").answer
-        assert weighed["map"]["map_id"] == name
-        near = linefix.done("locate", *both, "--near", "1", "0.5", "1.57", "--near-map", name).answer
-        assert near["map"]["map_id"] == name
 
 
 def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None:

@@ -130,19 +130,6 @@ def test_a_change_is_refused_by_its_number_or_for_its_confidence(linefix: Linefi
     assert (wrong.code, "expected an index of the 1 proposed changes" in wrong.err) == (3, True)
 
 
-def test_an_imported_map_is_improved_by_a_log(linefix: Linefix, folder: Path) -> None:
-    ends = HALL.endpoints.tolist()
-    (folder / "hall.csv").write_text("".join(f"{a},{b},{c},{d}\n" for a, b, c, d in ends))
-    lines = [(folder / f"{day}.log").read_text() for day in ("monday", "tuesday")]
-    (folder / "drive.log").write_text("".join(lines))
-    plain = ("map", "import", "hall.csv", "--oriented", "--units", "m", "--json")
-    told = linefix.done(*plain, "--log", "drive.log", "--update", "--out", "better.json", "--picture", "changes.png")
-    assert REMOVED in colours_of(folder / "changes.png")
-    answer = told.answer
-    assert [one["code"] for one in answer["update"]["changes"]] == ["removed"]
-    assert len(json.loads((folder / "better.json").read_text())["segments"]) == len(TODAY)
-
-
 @pytest.mark.parametrize("count", [3, 200, 228, 401, 455, 1597, 10_000])
 def test_a_long_log_gives_as_many_scans_as_wanted_from_all_over_it(count: int) -> None:
     assert thinned([], 200) == ([], 0)

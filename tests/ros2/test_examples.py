@@ -12,8 +12,7 @@ import typer.main
 from ruamel.yaml import YAML
 
 from cli.program import app
-from cli.ros2 import NOT_IN_FILES
-from cli.ros2_parameters import parameters_of
+from cli.ros2 import NOT_IN_FILES, parameters_of
 
 ROOT = Path(__file__).parents[2]
 NAV2 = ROOT / "examples" / "nav2"
