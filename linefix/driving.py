@@ -24,7 +24,6 @@ from association import (
     KnownOfMaps,
     MapIndex,
     MapSet,
-    Prior,
     Scan,
     VerdictExplanation,
     Views,
@@ -78,20 +77,6 @@ class LastView:
     own: Indices
 
 
-def associate(
-    index: MapIndex,
-    scan: Scan,
-    prior: Prior | None = None,
-    options: AssociationOptions | None = None,
-    deadline: Deadline | None = None,
-) -> AssociationResult:
-    """Find where in a map a scan was taken; arguments, result and exceptions are those of `association.associate`.
-
-    The answer of a drive that is not usable is that of its last view, if `search_drive` finds that usable.
-    """
-    return search(index, scan, KnownOfMaps(prior), options, deadline)
-
-
 def search(
     maps: MapIndex | MapSet,
     scan: Scan,
@@ -99,7 +84,9 @@ def search(
     options: AssociationOptions | None = None,
     deadline: Deadline | None = None,
 ) -> AssociationResult:
-    """Find a scan in a map, or on several: the search of each interface, with drives as `associate`.
+    """Find a scan in a map, or on several: the search of each interface.
+
+    The answer of a drive that is not usable is that of its last view, if `search_drive` finds that usable.
 
     Raises
     ------
@@ -123,7 +110,7 @@ def search(
 def explain_search(
     index: MapIndex, scan: Scan, known: KnownOfMaps, options: AssociationOptions, deadline: Deadline | None
 ) -> Explanation:
-    """Search a scan on one map as `linefix.associate`, and return how the verdict came about."""
+    """Search a scan on one map as `search`, and return how the verdict came about."""
     found: list[AnswerExplanation] = []
 
     def search(seen: Scan) -> AssociationResult:

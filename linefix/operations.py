@@ -26,12 +26,11 @@ from .analyzing import looks
 from .checking import checking
 from .documents import inputs, results
 from .documents.analysis import AnalyzeRequest
-from .documents.applying import ApplyRequest
 from .documents.errors import DeadlinePassedError, Fault, InvalidRequestError
 from .documents.parts import MapDocument, SearchOptions
 from .documents.requests import AssociateRequest, BatchItem, CheckRequest, RegisterRequest, VectorizeRequest
 from .documents.scans import measured_of, scanned_of, transform_of, vectorization_of
-from .documents.updates import UpdateRequest
+from .documents.updates import ApplyRequest, UpdateRequest
 from .driving import search
 
 T = TypeVar("T")

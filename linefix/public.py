@@ -32,7 +32,7 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .checking import CheckedMap, check
-from .driving import Explanation, associate
+from .driving import Explanation
 from .locating import explain, index_map, index_maps, locate, scan_of
 from .ranges import MountedScan, view_of
 from .updating import update_map
@@ -69,7 +69,6 @@ __all__ = [
     "VectorizationOptions",
     "View",
     "assemble",
-    "associate",
     "check",
     "draw_map",
     "explain",
@@ -96,7 +95,5 @@ def __getattr__(name: str) -> Any:
         return getattr(importlib.import_module("formats"), name)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            f"linefix.{name} requires the extra `formats`. Install it, for example with "
-            '`pip install ".[formats]"` in a '
-            "checkout"
+            f'linefix.{name} requires the extra `formats`: in a checkout, `pip install ".[formats]"`'
         ) from error

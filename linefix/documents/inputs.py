@@ -14,14 +14,13 @@ from map_quality import NOT_SHARPENED, Analysis, Replacement, Robot, Sharpened, 
 from registration import InputError, InvalidArgumentError, RegistrationOptions, Segments
 
 from .analysis import AnalyzeRequest
-from .applying import ApplyRequest, SharpenedWalls
 from .errors import Fault, InvalidRequestError, RequestError, fault_of
 from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields, is_oriented
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
 from .scans import Scanned, scanned_of, transform_of
 from .sensors import LaserScan, OneScan, ViewsScan
-from .updates import UpdateRequest
+from .updates import ApplyRequest, SharpenedWalls, UpdateRequest
 
 # Options of a search that have the same names and values in a request.
 _AS_SENT = [one.name for one in fields(AssociationOptions) if one.name not in ("oriented", "include")]

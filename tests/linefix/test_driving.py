@@ -120,7 +120,7 @@ def counting(searched: list[Scan]) -> Callable[[Scan], AssociationResult]:
 def test_the_last_view_answers_for_a_drive_that_is_not_usable() -> None:
     assert (DRIVE.usable, ALONE.usable) == (False, True)
     pose = known(ALONE.pose)
-    for answer in (linefix.locate, linefix.associate, lambda *asked: linefix.explain(*asked).result):
+    for answer in (linefix.locate, lambda *asked: linefix.explain(*asked).result):
         found = answer(INDEX, WHOLE)
         assert (found.status, found.usable, found.reasons) == (ALONE.status, True, ())
         assert found.probability == pytest.approx(ALONE.probability, abs=1e-9)
@@ -152,7 +152,7 @@ def latest_last() -> tuple[Scan, int]:
 def test_its_indices_are_those_of_the_drive() -> None:
     """Wherever among the views it is; the segments of the others are unmatched."""
     whole, before = latest_last()
-    found = linefix.associate(INDEX, whole)
+    found = linefix.locate(INDEX, whole)
     assert LAST_VIEW_ONLY.code in codes(found)
     expected = [(pair.scan + before, pair.map) for pair in ALONE.correspondences]
     assert [(pair.scan, pair.map) for pair in found.correspondences] == expected
@@ -200,10 +200,10 @@ def test_a_drive_that_is_usable_is_searched_once_and_one_of_no_usable_view_stays
 @pytest.mark.usefixtures("_judged")
 def test_a_prior_that_the_drive_contradicts_is_not_answered() -> None:
     elsewhere = HardPrior(RigidTransform(7.5, 2.0, INSIDE.theta), 0.5, 0.5)
-    assert not linefix.associate(INDEX, WHOLE, elsewhere).usable
+    assert not linefix.locate(INDEX, WHOLE, prior=elsewhere).usable
     maps = linefix.index_maps({"room": ROOM, "hall": ROOM[:4] * [2.0, 3.0, 2.0, 3.0]})
     assert not search(maps, WHOLE, KnownOfMaps(elsewhere, "room")).usable
-    assert linefix.associate(INDEX, WHOLE, HardPrior(INSIDE, 0.5, 0.5)).usable
+    assert linefix.locate(INDEX, WHOLE, prior=HardPrior(INSIDE, 0.5, 0.5)).usable
 
 
 def test_a_last_view_that_is_not_searched_to_the_end_leaves_the_answer_incomplete() -> None:

@@ -116,7 +116,7 @@ def test_a_map_document_is_indexed_as_its_file_says() -> None:
 @pytest.mark.parametrize(
     ("document", "argument"),
     [
-        ({"segments": ROOM, "sgma": 1}, "map"),
+        ({"segments": ROOM, "sgma": 1}, "map.sgma"),
         ({"segments": ROOM, "sigma": "1"}, "map.sigma"),
         ({"segments": ROOM, "sigma": -1}, "map.sigma"),
         ({"segments": ROOM, "oriented": "no"}, "map.oriented"),

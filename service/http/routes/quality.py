@@ -11,11 +11,10 @@ from fastapi import APIRouter, Query, Response
 from association import MapIndex
 from linefix.documents import examples
 from linefix.documents.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
-from linefix.documents.applying import ApplyAnswer, ApplyRequest
 from linefix.documents.checks import CheckAnswer
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import NO_SAMPLES, CheckRequest
-from linefix.documents.updates import UpdateAnswer, UpdateRequest
+from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
 from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps, worked
 
 from ...maps.lookup import FoundMaps
