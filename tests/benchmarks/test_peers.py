@@ -1,8 +1,7 @@
-"""Peers of the comparison: scenes as promised, adapters in processes of their own, a matcher for grids."""
+"""Peers of the comparison: adapters in processes of their own, a matcher for grids. Worlds pin the scenes."""
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterator
 
@@ -13,50 +12,10 @@ from benchmarks.peers.adapters import PEERS, Answer
 from benchmarks.peers.grid_matcher import GridMatcher
 from benchmarks.peers.race import Attempt, Racer, attempts, is_right
 from benchmarks.peers.report import judged
-from benchmarks.peers.scenes import DRAWN_LEVELS, KINDS, SIZES, Cell, Level, draw_query, drawn_cell, polygons
+from benchmarks.peers.scenes import Cell, Level, draw_query, polygons
 from registration import RigidTransform
 
 LONG = pytest.mark.long
-
-# --- Scenes -----------------------------------------------------------------------------------------------------------
-
-cell_of = functools.cache(drawn_cell)  # drawn once for all tests that look at it
-CELLS = [
-    pytest.param((kind, size, level), marks=[LONG] * (size == max(SIZES)), id=f"{kind}-{size}-{level.name}")
-    for kind in KINDS
-    for size in SIZES
-    for level in DRAWN_LEVELS
-]
-
-
-@pytest.fixture(params=CELLS)
-def drawn(request: pytest.FixtureRequest) -> tuple[Cell, tuple[str, int, object]]:
-    kind, size, level = request.param
-    return cell_of(kind, size, level, 3, seed=3), request.param
-
-
-def test_counts_and_outliers_are_as_promised(drawn) -> None:
-    cell, (_, _, level) = drawn
-    for query in cell.queries:
-        inliers, whole = int((query.on_map >= 0).sum()), len(query.scan)
-        low, high = level.counts
-        assert low - 1 <= (whole if level.whole else inliers) <= high + 1
-        assert abs((whole - inliers) / whole - level.outliers) < 0.03
-
-
-def test_the_truth_lays_every_inlier_on_its_segment_within_the_noise(drawn) -> None:
-    cell, (_, _, level) = drawn
-    for query in cell.queries:
-        seen = query.pose.apply(query.scan.reshape(-1, 2)).reshape(-1, 4)
-        for ends, wall in zip(seen[query.on_map >= 0], query.map[query.on_map[query.on_map >= 0]], strict=True):
-            along = wall[2:] - wall[:2]
-            length = math.hypot(*along)
-            for end in ends.reshape(2, 2) - wall[:2]:
-                across = (along[0] * end[1] - along[1] * end[0]) / length
-                assert abs(across) < 5.0 * level.sigma
-                assert -5.0 * level.sigma < end @ along / length < length + 5.0 * level.sigma
-            assert (ends[2:] - ends[:2]) @ along > 0.0
-
 
 # --- Adapters ---------------------------------------------------------------------------------------------------------
 

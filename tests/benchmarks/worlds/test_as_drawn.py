@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from benchmarks.worlds import CONDITIONS, FAMILIES, draw_case
+from benchmarks.peers.scenes import DRAWN_LEVELS, KINDS, SIZES, drawn_cell
+from benchmarks.worlds import CONDITIONS, FAMILIES, FLOOR_KINDS, draw_case, draw_floors
 from simulation import OfficePlan, World, offices
 
 FILE = Path(__file__).with_name("as_drawn.json")
 SEEDS = range(1, 9)
+LEVELS = {level.name: level for level in DRAWN_LEVELS}
 Numbers = list[float]
 
 
@@ -51,6 +53,17 @@ def case(condition: str) -> Numbers:
     return found
 
 
+def floors(name: str) -> Numbers:
+    return mark(*(floor.endpoints for floor in draw_floors(FLOOR_KINDS[name], 4, np.random.default_rng(3))))
+
+
+def peers(name: str) -> Numbers:
+    kind, size, level = name.split()
+    cell = drawn_cell(kind, int(size), LEVELS[level], 3, seed=3)
+    poses = [(one.pose.x, one.pose.y, one.pose.theta) for one in cell.queries]
+    return mark(*(part for one in cell.queries for part in (one.map, one.scan, one.on_map)), poses)
+
+
 def office(rooms: str) -> Numbers:
     plan = OfficePlan(rooms=int(rooms), corridors=2 + int(rooms) % 3)
     world: World = offices(np.random.default_rng(int(rooms)), plan)
@@ -60,6 +73,8 @@ def office(rooms: str) -> Numbers:
 DRAWN: dict[str, tuple[Callable[[str], Numbers], list[str]]] = {
     "building": (building, sorted(FAMILIES)),
     "case": (case, sorted(CONDITIONS)),
+    "floors": (floors, sorted(FLOOR_KINDS)),
+    "peers": (peers, [f"{kind} {min(SIZES)} {level}" for kind in KINDS for level in LEVELS]),
     "office": (office, ["1", "4", "9"]),
 }
 NAMES = [(kind, name) for kind, (_, names) in DRAWN.items() for name in names]
