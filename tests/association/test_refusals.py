@@ -56,6 +56,10 @@ def index(walls: Any, sigma: float = 0.0) -> Call:
     return lambda: index_of(walls, sigma)
 
 
+def points(of: Any, sigma: float | None = None) -> Call:
+    return lambda: MapPoints.of(of, sigma)
+
+
 def maps(*given: tuple[str, MapPart]) -> Call:
     return lambda: MapSet(given)
 
@@ -99,6 +103,15 @@ def of_maps(prior: HardPrior | None = None, map_id: str | None = None, **weights
         (InvalidMapError, "map.sigma", index(ROOM, -1.0)),
         (InvalidMapError, "map.sigma", index(ROOM, 11.0)),
         (InvalidMapError, "map.sigma", index(ROOM, math.nan)),
+        (InvalidMapError, "map.points", points([[1.0, 2.0, 3.0]])),
+        (InvalidMapError, "map.points", points([1.0, 2.0])),
+        (InvalidMapError, "map.points", points([[1.0, 2.0], [3.0]])),
+        (InvalidMapError, "map.points", points([["a", "b"]])),
+        (InvalidMapError, "map.points.1", points([[0.0, 0.0], [math.nan, 0.0]])),
+        (InvalidMapError, "map.points", points(np.zeros((200_001, 2)))),
+        (InvalidMapError, "map.points_sigma", points([[2.0, 2.5]], 0.0)),
+        (InvalidMapError, "map.points_sigma", points([[2.0, 2.5]], 10.1)),
+        (InvalidMapError, "map.points_sigma", points([[2.0, 2.5]], math.nan)),
         (InvalidMapError, "maps", maps()),
         (InvalidMapError, "maps", maps(("a", PART), ("a", PART))),
         (InvalidMapError, "maps", maps(*((str(k), PART) for k in range(257)))),
@@ -111,27 +124,6 @@ def test_the_argument_at_fault_is_named(error: type[AssociationError], argument:
     with pytest.raises(error) as caught:
         call()
     assert caught.value.argument == argument
-
-
-@pytest.mark.parametrize(
-    ("points", "sigma", "argument", "message"),
-    [
-        ([[1.0, 2.0, 3.0]], None, "map.points", "found an array of shape"),
-        ([1.0, 2.0], None, "map.points", "found an array of shape"),
-        ([[1.0, 2.0], [3.0]], None, "map.points", "rows"),
-        ([["a", "b"]], None, "map.points", "rows"),
-        ([[0.0, 0.0], [math.nan, 0.0]], None, "map.points.1", "finite"),
-        (np.zeros((200_001, 2)), None, "map.points", "at most 200000 points, found 200001"),
-        ([[2.0, 2.5]], 0.0, "map.points_sigma", "above 0"),
-        ([[2.0, 2.5]], -1.0, "map.points_sigma", "above 0"),
-        ([[2.0, 2.5]], 10.1, "map.points_sigma", "found 10.1"),
-        ([[2.0, 2.5]], math.nan, "map.points_sigma", "above 0"),
-    ],
-)
-def test_arrays_that_are_no_points_are_rejected(points: Any, sigma: float | None, argument: str, message: str) -> None:
-    with pytest.raises(InvalidMapError, match=message) as error:
-        MapPoints.of(points, sigma)
-    assert error.value.argument == argument
 
 
 @pytest.mark.parametrize("prior", [lambda at: HardPrior(at, 1.0, 0.1), lambda at: SoftPrior(at, np.eye(3))])

@@ -145,16 +145,6 @@ def test_a_bag_gives_scans_where_tf_has_the_sensor(tmp_path: Path, kind: str) ->
     assert near(in_map.pose, 101.5, 0.1, 0.0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_odometry_stands_in_where_tf_says_nothing(tmp_path: Path, kind: str) -> None:
-    bag = Robots(kind, tmp_path)
-    bag.says(SECOND, 1.0)
-    bag.says(3 * SECOND // 2, 3.0)
-    bag.scan(5 * SECOND // 4, frame="base_link")
-    (scan,) = read_log(bag.done())
-    assert near(scan.pose, 2.0, 0.0, 0.0)
-
-
 def test_the_topic_with_most_scans_is_taken_and_broken_scans_are_dropped(bag: Robots) -> None:
     bag.scan(1, "/rear")
     for ns in (2, 3):

@@ -38,6 +38,8 @@ def storeys(tmp_path: Path, kind: str) -> Path:
         groups = (("Level 0", -1), ("1st floor", -2), ("1st floor", -3))
         text = '<g id="{0}"><line x2="4" y1="{1}" y2="{1}" stroke="black"/></g>'
         return svg(tmp_path, "".join(text.format(*group) for group in groups))
+    if kind == "z of a table":
+        return written(tmp_path, "a.csv", "x1,y1,z1,x2,y2,z2\n0,1,0,4,1,0\n0,2,3.2,4,2,3.2\n0,3,3.2,4,3,3.2\n")
     if kind == "csv":
         return written(tmp_path, "a.csv", "x1,y1,x2,y2,Level\n0,1,4,1,0\n0,2,4,2,3.2\n0,3,4,3,3.2\n")
     if kind == "z":
@@ -46,7 +48,8 @@ def storeys(tmp_path: Path, kind: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("kind", "upper"), [(k, "3.2") for k in ("level", "level_id", "z", "heights", "csv")] + [("svg", "1st floor")]
+    ("kind", "upper"),
+    [(k, "3.2") for k in ("level", "level_id", "z", "heights", "csv", "z of a table")] + [("svg", "1st floor")],
 )
 def test_several_floors_are_a_question_that_an_option_answers(tmp_path: Path, kind: str, upper: str) -> None:
     path, options = storeys(tmp_path, kind), FACES
@@ -155,6 +158,12 @@ def test_a_table_that_is_not_clear_is_refused_with_its_line(tmp_path: Path, text
     assert said in str(caught.value)
 
 
+PROJECTED = (
+    "urn:ogc:def:crs:EPSG::32632", "http://www.opengis.net/def/crs/EPSG/0/25832", "epsg:25832+5783",
+    "WGS 84 / UTM zone 32N", {"type": "EPSG", "properties": {"code": 25832}},
+)  # fmt: skip
+
+
 def placed(x: float, y: float, scale: float = 1.0) -> dict[str, Any]:
     return feature([[[x + scale * a, y + scale * b] for a, b in RING]], "Polygon")
 
@@ -162,7 +171,7 @@ def placed(x: float, y: float, scale: float = 1.0) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("where", "crs", "options", "said"),
     [
-        ((692000, 5336000, 1), "urn:ogc:def:crs:EPSG::32632", {}, None),
+        *(((692000, 5336000, 1), crs, {}, None) for crs in PROJECTED),
         ((4e5, 1e5, 1), "EPSG:27700", {}, None),
         ((692000, 5336000, 1), None, {}, "are no degrees, such as"),
         ((1847903, 6300000, 1.53), "urn:ogc:def:crs:EPSG::3857", {"local_metres": True}, "1.529 times too large"),
@@ -178,10 +187,10 @@ def placed(x: float, y: float, scale: float = 1.0) -> dict[str, Any]:
     ],
 )
 def test_the_coordinate_system_of_a_geojson(
-    tmp_path: Path, where: tuple[float, float, float], crs: str | None, options: dict[str, Any], said: str | None
+    tmp_path: Path, where: tuple[float, float, float], crs: Any, options: dict[str, Any], said: str | None
 ) -> None:
-    members = {} if crs is None else {"crs": {"type": "name", "properties": {"name": crs}}}
-    path = geojson(tmp_path, placed(*where), **members)
+    named = {"type": "name", "properties": {"name": crs}} if isinstance(crs, str) else crs
+    path = geojson(tmp_path, placed(*where), **({} if crs is None else {"crs": named}))
     if said is not None:
         with pytest.raises(IncompleteFileError) as caught:
             read_map(path, ImportOptions(**options))

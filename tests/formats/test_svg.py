@@ -57,8 +57,19 @@ def test_what_is_no_length_is_named_with_its_line(tmp_path: Path, told: str) -> 
 )
 def test_lists_of_numbers(tmp_path: Path, points: str) -> None:
     assert len(lines(tmp_path, f'<polyline points="{points}"/>')) == 2
-    with pytest.raises(MalformedFileError, match="line 2: points of a polyline element is 'x5'"):
-        read(tmp_path, '<polyline points="1,1 2,x5"/>')
+
+
+@pytest.mark.parametrize(
+    ("inner", "message"),
+    [
+        ('<polyline points="1,1 2,x5"/>', "line 2: points of a polyline element is 'x5'"),
+        (f'<g style="transform: translate(calc(1px + 1px), 0)">{BASE}</g>', r"calc\(1px \+ 1px\)"),
+        ('<path d="M0 0H4 what"/>', "d of a path element"),
+    ],
+)
+def test_what_is_not_read_is_named(tmp_path: Path, inner: str, message: str) -> None:
+    with pytest.raises(MalformedFileError, match=message):
+        read(tmp_path, inner)
 
 
 INLINE = '<rect style="display:inline" x="1" y="1" width="2" height="3"/>'
@@ -197,10 +208,15 @@ def test_what_is_left_out_is_counts(tmp_path: Path) -> None:
         ("style='rotate: 90deg; translate: 1px 2px; scale: 2'", [1, 2, -9, 22]),
         ("style='rotate: z 90deg'", [0, 0, -5, 10]),
         ("style='rotate: x 45deg; transform: none' rotate='90'", [0, 0, 10, 5]),
+        ("style='scale: 50%'", [0, 0, 5, 2.5]),
+        ("class='on screen'", [1, 0, 11, 5]),
+        ("class='in print'", [0, 0, 10, 5]),
     ],
 )
 def test_transforms(tmp_path: Path, attributes: str, expected: list[float]) -> None:
-    ((x1, y1, x2, y2),) = lines(tmp_path, f"<g {attributes}>{ONE}</g>")
+    move = "{ transform: translate(1px, 0) }"
+    style = f"<style>@media screen{{.screen {move}}} @media print{{.print {move}}}</style>"
+    ((x1, y1, x2, y2),) = lines(tmp_path, f"{style}<g {attributes}>{ONE}</g>")
     assert [x1, y1, x2, y2] == pytest.approx(expected, abs=1e-6)
 
 

@@ -11,9 +11,9 @@ from ezdxf import units
 from ezdxf.document import Drawing as Document
 from ezdxf.filemanagement import new
 
-from formats import ImportedMap, ImportOptions, IncompleteFileError, MalformedFileError, read_map
+from formats import ImportedMap, ImportOptions, IncompleteFileError, read_map
 
-from .reading import feature, geojson, notes, rows, saved, svg, written
+from .reading import feature, geojson, notes, rows, saved, svg
 
 METRES = ImportOptions(units="m", drawn="faces")
 WALL, OTHER = [0.0, 0.0, 4.0, 0.0], [0.0, 3.0, 2.0, 3.0]
@@ -139,53 +139,6 @@ def test_groups_of_svg_are_layers(tmp_path: Path, named: str) -> None:
 def test_groups_of_svg_are_floors(tmp_path: Path, named: str) -> None:
     with pytest.raises(IncompleteFileError, match="has 2 levels"):
         read_map(groups(tmp_path, named, 1, 2), METRES)
-
-
-def test_the_heights_of_a_table_are_floors(tmp_path: Path) -> None:
-    path = written(tmp_path, "a.csv", "x1,y1,z1,x2,y2,z2\n0,0,0,4,0,0\n0,3,3,2,3,3\n")
-    with pytest.raises(IncompleteFileError, match="has 2 levels"):
-        read_map(path)
-
-
-@pytest.mark.parametrize(
-    "crs",
-    [
-        {"type": "name", "properties": {"name": "http://www.opengis.net/def/crs/EPSG/0/25832"}},
-        {"type": "name", "properties": {"name": "epsg:25832+5783"}},
-        {"type": "name", "properties": {"name": "WGS 84 / UTM zone 32N"}},
-        {"type": "EPSG", "properties": {"code": 25832}},
-        "EPSG:32632",
-    ],
-)
-def test_names_of_projected_systems(tmp_path: Path, crs: Any) -> None:
-    line = {"type": "LineString", "coordinates": [[692000, 5336000], [692004, 5336000]]}
-    path = written(tmp_path, "a.geojson", json.dumps(line | {"crs": crs}))
-    assert rows(read_map(path)) == [[692000, 5336000, 692004, 5336000]]
-
-
-@pytest.mark.parametrize(
-    ("inner", "expected"),
-    [
-        ("<style>@media screen{g{transform: translate(1px,0)}}</style><g>", [1, 0, 5, 0]),
-        ("<style>@media print{g{transform: translate(1px,0)}}</style><g>", [0, 0, 4, 0]),
-        ('<g style="scale: 50%">', [0, 0, 2, 0]),
-    ],
-)
-def test_media_and_percentages_of_scale(tmp_path: Path, inner: str, expected: list[float]) -> None:
-    path = svg(tmp_path, f'{inner}<line x1="0" y1="0" x2="4" y2="0" stroke="black"/></g>')
-    assert rows(read_map(path, METRES)) == [expected]
-
-
-@pytest.mark.parametrize(
-    ("inner", "message"),
-    [
-        ('<g style="transform: translate(calc(1px + 1px), 0)"><path d="M0 0H4"/></g>', r"calc\(1px \+ 1px\)"),
-        ('<path d="M0 0H4 what"/>', "d of a path element"),
-    ],
-)
-def test_what_an_svg_says_and_is_not_read_is_named(tmp_path: Path, inner: str, message: str) -> None:
-    with pytest.raises(MalformedFileError, match=message):
-        read_map(svg(tmp_path, inner), METRES)
 
 
 ROOM = ((0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (0.0, 4.0))

@@ -1,9 +1,11 @@
-"""Maps and scans in each form, to one answer."""
+"""Maps and scans in each form, to one answer or to a check, and their documents."""
 
 from __future__ import annotations
 
+import json
 import math
-from functools import cache
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,12 @@ import numpy as np
 import pytest
 
 import linefix
-from formats import ImportedMap, ImportReport
+from association import AssociationDiagnostics, Corrections
+from formats import ImportedMap, ImportOptions, ImportReport
+from linefix.documents.found import AssociationDiagnosticsAnswer
+from linefix.documents.results import Included, association_json, checked_json
 from tests.association.scenes import known
+from tests.map_quality.check.drawn import centre_lines, sampled
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 TRUTH = linefix.RigidTransform(1.0, 1.5, 0.4)
@@ -20,10 +26,10 @@ SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
 ANGLES = (SCANNER.angle_min, SCANNER.angle_increment)
 
 
-@cache
-def ranges() -> Any:
-    walls = linefix.Segments.from_array(ROOM)
-    return linefix.simulation.scan(walls, TRUTH, SCANNER, np.random.default_rng(2)).ranges
+def ranges(scale: float = 1.0, at: linefix.RigidTransform = TRUTH) -> Any:
+    """Return what is read in the room, as of a map whose lengths are divided by `scale`."""
+    walls = linefix.Segments.from_array(scale * ROOM)
+    return linefix.simulation.scan(walls, at, SCANNER, np.random.default_rng(2)).ranges
 
 
 def laser() -> linefix.LaserScan:
@@ -122,6 +128,11 @@ def test_a_map_document_is_indexed_as_its_file_says() -> None:
         ({"segments": ROOM, "oriented": "no"}, "map.oriented"),
         ({"segments": ROOM, "oriented": 1}, "map.oriented"),
         ({"segments": [[1, 2, 3]]}, "map.segments"),
+        ({"segments": ROOM, "points": [[1.0]]}, "map.points"),
+        ({"segments": ROOM, "points": [[1.0, math.inf]]}, "map.points.0"),
+        ({"segments": ROOM, "points": [[1.0, 2.0]], "points_sigma": "wide"}, "map.points_sigma"),
+        ({"segments": ROOM, "points": [[1.0, 2.0]], "points_sigma": 0}, "map.points_sigma"),
+        ({"segments": ROOM, "points_sigma": True}, "map.points_sigma"),
         ({}, "map.segments"),
     ],
 )
@@ -129,3 +140,79 @@ def test_a_document_that_is_no_map_is_refused(document: dict[str, object], argum
     with pytest.raises(linefix.InputError) as refused:
         linefix.index_map(document)
     assert refused.value.argument == argument
+
+
+SEEN = [[-1, 1, -1, -5], [-1, -5, 1, -5], [1, -5, 1, -3], [1, -3, 4, -3], [4, -3, 4, 1], [4, 1, -1, 1]]
+
+
+def test_corrections_and_the_turn_rate_are_in_the_diagnostics() -> None:
+    answer = linefix.locate(ROOM, SEEN)
+    assert isinstance(answer.diagnostics, AssociationDiagnostics)
+    for corrections, turn_rate in ((Corrections(1.01, -0.02, (0.001, -0.002, 0.003)), 0.5), (None, None)):
+        diagnostics = replace(answer.diagnostics, corrections=corrections, turn_rate=turn_rate)
+        found = association_json(replace(answer, diagnostics=diagnostics), Included(frozenset(), "map", "laser"))
+        document = json.loads(json.dumps(found))["diagnostics"]
+        told = {"scale": 1.01, "offset": -0.02, "strain": [0.001, -0.002, 0.003]}
+        assert document["corrections"] == (None if corrections is None else told)
+        assert document["turn_rate"] == turn_rate
+        AssociationDiagnosticsAnswer.model_validate(document)
+
+
+def test_the_message_is_that_of_http() -> None:
+    answer = linefix.locate(ROOM, SEEN)
+    document = association_json(answer, Included(frozenset(), "map", "laser"))
+    assert answer.message == document["message"]
+    assert answer.message.startswith("The robot is at this pose with a probability of ")
+
+
+FIELDS = {"findings", "size", "advice", "places", "viewpoints", "complete", "samples"}
+
+
+def seen(scale: float) -> list[linefix.Scan]:
+    poses = [linefix.RigidTransform(scale * x, scale * 1.2, x) for x in (1.0, 2.0, 3.0)]
+    return [linefix.scan_of(ranges(scale, pose), ANGLES) for pose in poses]
+
+
+def test_a_map_alone_has_no_samples() -> None:
+    found = linefix.check(linefix.index_map(ROOM))
+    assert (found.report, found.samples, found.complete) == (None, (), True)
+    document = checked_json(found)
+    assert document["samples"] is None
+    assert set(document) == FIELDS
+
+
+@pytest.mark.parametrize(("scale", "codes"), [(1.0, []), (1.5, ["scale"])])
+def test_scans_come_first(scale: float, codes: list[str]) -> None:
+    found = linefix.check(linefix.index_map(ROOM), seen(scale))
+    assert [one.code for one in found.all.findings if one.code != "looks_alike"] == codes
+    document = checked_json(found)
+    assert [one["code"] for one in document["findings"]][: len(codes)] == codes
+    assert len(document["samples"]["scans"]) == 3
+
+
+def test_samples_without_time_are_none() -> None:
+    found = linefix.check(linefix.index_map(ROOM), seen(1.0), deadline=linefix.Deadline(time.monotonic()))
+    assert found.samples == (None, None, None)
+    assert not found.complete
+    assert [one["status"] for one in checked_json(found)["samples"]["scans"]] == [None] * 3
+
+
+SCANS = 12
+
+
+def usable(map: ImportedMap) -> int:
+    """Count the usable answers; all of them are right."""
+    index, count = linefix.index_map(map), 0
+    for truth, scan in sampled(SCANS):
+        answer = linefix.locate(index, scan)
+        if answer.usable:
+            assert math.hypot(known(answer.pose).x - truth.x, known(answer.pose).y - truth.y) < 0.1
+            count += 1
+    return count
+
+
+def test_scans_are_usable_without_a_word(tmp_path: Path) -> None:
+    path = tmp_path / "plan.csv"
+    path.write_text("".join(",".join(map(str, line)) + "\n" for line in centre_lines().tolist()))
+    assert usable(linefix.read_map(path, ImportOptions(drawn="faces"))) <= 1
+    assert usable(linefix.read_map(path)) >= 4  # with the true faces, and with doors as they are, 8

@@ -21,7 +21,7 @@ from ros2.reporting import values_of
 from service.app import create_app
 from service.http.openapi import describe
 from service.settings import Settings
-from tests.linefix.test_answers import ROOM, SEEN
+from tests.linefix.test_locating import ROOM, SEEN
 
 PAGE = Path(linefix.__file__).parent.parent / "docs" / "reference" / "names.md"
 ROWS = [

@@ -1,16 +1,20 @@
-"""From JSON to a checked request."""
+"""From JSON to a checked request, its options, and back to JSON."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import orjson
 import pytest
 
+from association import INCLUDED, AssociationOptions
 from linefix.documents import examples
+from linefix.documents.encoding import BLOCK, NotFiniteError, encode, encode_list
 from linefix.documents.errors import InvalidRequestError, NotJsonError, TooManyError
+from linefix.documents.inputs import association_options_of
 from linefix.documents.limits import Limits
-from linefix.documents.parts import MapDocument
+from linefix.documents.parts import MapDocument, SearchOptions
 from linefix.documents.reading import parse, read_batch, read_model, read_stored
 from linefix.documents.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
 
@@ -111,3 +115,29 @@ def test_options_that_nobody_gives_are_not_copied_for_each_request() -> None:
     body = orjson.dumps({name: part for name, part in examples.ASSOCIATE.items() if name != "options"})
     first, second = (read_model(AssociateRequest, body, LIMITS) for _ in range(2))
     assert first.options is second.options
+
+
+@pytest.mark.parametrize("answer", [np.nan, {"a": [1.0, {"b": np.inf}]}, {"a": np.array([[1.0, -np.inf]])}, (np.nan,)])
+def test_nothing_that_is_not_finite_leaves(answer: object) -> None:
+    with pytest.raises(NotFiniteError):
+        encode(answer)
+    assert encode({"a": np.array([1.0]), "b": None}) == b'{"a":[1.0],"b":null}'
+
+
+@pytest.mark.parametrize("count", [0, 1, BLOCK, BLOCK + 1, 3 * BLOCK])
+def test_a_list_that_is_encoded_by_blocks_is_the_same(count: int) -> None:
+    items = [{"a": number, "b": [0.1 * number]} for number in range(count)]
+    assert encode({"items": encode_list(iter(items))}) == encode({"items": items})
+
+
+def test_nor_does_anything_in_a_block() -> None:
+    with pytest.raises(NotFiniteError):
+        encode_list([{"a": 1.0}] * BLOCK + [{"a": np.inf}])
+
+
+def test_only_parts_that_are_included_are_worked_out() -> None:
+    """By default all, as the library does; so are other options."""
+    assert association_options_of(SearchOptions(), oriented=True) == AssociationOptions(include=INCLUDED)
+    for names, parts in (([], ()), (["segments", "alternatives"], ("alternatives",))):
+        asked = SearchOptions.model_validate({"include": names}, strict=False)
+        assert association_options_of(asked, oriented=True).include == parts

@@ -12,7 +12,7 @@ from linefix_client import laser
 from PIL import Image
 
 from linefix.documents import examples
-from tests.linefix.test_map_points import POSTS, ROOMS, SCANNER, ranges
+from tests.linefix.posts import POSTS, ROOMS, SCANNER, ranges
 from tests.service.asking import HERE, answered, pose_json
 
 from ..importing.forms import TYPE, YAML, encoded, form

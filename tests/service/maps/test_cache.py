@@ -1,4 +1,4 @@
-"""Indexed maps in memory."""
+"""From the map of a request to its index, and indexed maps in memory."""
 
 from __future__ import annotations
 
@@ -7,16 +7,24 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from typing import Any
 
 import numpy as np
 import pytest
 
-from association import Deadline, MapIndex
+from association import Deadline, InvalidMapError, MapIndex
+from linefix.documents import examples
+from linefix.documents.errors import TooManyError
+from linefix.documents.parts import MapDocument, MapPrefix, NamedMap, StoredMap
 from registration import Segments
-from service.errors import IndexNotReadyError
-from service.maps import CachedMap, IndexCache
+from service.errors import BusyStoreError, IndexNotReadyError
+from service.maps import CachedMap, IndexCache, MapOutline
+from service.maps.lookup import OVERHEAD, outline_of
+from service.parsing.child import LARGE
 from service.settings import Settings
 from service.telemetry.metrics import Metrics
+
+from .stores import Lookup, inline
 
 NO_END = Deadline()
 INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
@@ -118,3 +126,108 @@ def test_nobody_waits_for_a_build_beyond_the_deadline_and_it_is_kept_all_the_sam
         release.set()
         made = building.result(60)
     assert cache.get("a", lambda: pytest.fail("is there"), deadline) is made
+
+
+@pytest.mark.parametrize(
+    "parts", [{"sigma": 0.05}, {"frame_id": "other"}, {"segments": [*examples.WALLS[:-1], [-4.0, 3.0, -4.0, -3.001]]}]
+)
+def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, parts: dict[str, Any]) -> None:
+    plain, revision = lookup.look(inline(), oriented=True)
+    assert revision is None
+    other, _ = lookup.look(inline(**parts), oriented=True)
+    assert other is not plain
+    assert other.frames[None] == parts.get("frame_id", "map")
+    assert isinstance(other.maps, MapIndex)
+    assert other.maps.sigma == parts.get("sigma")
+    assert lookup.look(inline(), oriented=True)[0] is plain
+
+
+def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) -> None:
+    one, other, again = (lookup.look(inline(), oriented=oriented)[0] for oriented in (True, False, True))
+    assert isinstance(one.maps, MapIndex)
+    assert isinstance(other.maps, MapIndex)
+    assert len(other.maps.segments) == 2 * len(one.maps.segments)
+    assert again is one
+    assert lookup.cache.bytes == one.maps.nbytes + other.maps.nbytes + 2 * OVERHEAD
+    assert other.maps.undirected is other.maps
+
+
+def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
+    lookup.put("m", segments=examples.WALLS)
+    load, changes = lookup.store.load, [1, 2]
+
+    def changing(map_id: str) -> Any:
+        if changes:
+            lookup.put("m", segments=examples.WALLS, frame_id=f"change {changes.pop()}")
+        return load(map_id)
+
+    lookup.store.load = changing  # type: ignore[method-assign]
+    found, revision = lookup.look(StoredMap(map_id="m"), oriented=True)
+    assert (found.frames[None], revision) == ("change 1", 3)
+
+
+def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(lookup: Lookup) -> None:
+    lookup.put("m", segments=examples.WALLS)
+    lookup.look(StoredMap(map_id="m"), oriented=True)
+    found = lookup.find("m", oriented=True)
+    assert found.document is None
+    lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
+    assert lookup.indexed(found, oriented=True, deadline=Deadline()).frames[None] == "map"  # read again
+    lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
+    lookup.put("m", segments=examples.WALLS, frame_id="other")
+    with pytest.raises(BusyStoreError):
+        lookup.indexed(found, oriented=True, deadline=Deadline())
+
+
+def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
+    begins = np.random.default_rng(0).uniform(1e3, 2e3, (12_000, 2))
+    rows = np.hstack([begins, begins + np.array([1.0, 0.1])]).tolist()
+    lookup.put("small", segments=examples.WALLS)
+    lookup.put("large", segments=rows)
+    assert len(lookup.store.load("large").document) > LARGE
+    lookup.look(StoredMap(map_id="small"), oriented=True)
+    assert lookup.parser.pid is None
+    assert lookup.look(StoredMap(map_id="large"), oriented=True)[0].maps.nbytes > 0
+    assert lookup.parser.pid is not None
+
+
+def test_several_maps_are_counted_by_their_records(lookup: Lookup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were loaded and parsed first, and their points were not counted: 9.6 GB."""
+    for number in range(2):
+        for kind, counts in (("segments", (150_000, 0)), ("points", (4, 150_000))):
+            lookup.store.put(f"{kind}-{number}", b"{}", MapOutline(*counts, (0.0, 0.0, 1.0, 1.0)))
+    monkeypatch.setattr(lookup.store, "load", lambda _: pytest.fail("loaded"))
+    for kind in ("segments", "points"):
+        for asked in (MapPrefix(prefix=kind), [StoredMap(map_id=f"{kind}-{number}") for number in range(2)]):
+            with pytest.raises(TooManyError, match=kind) as caught:
+                lookup.find_together(asked, "")
+            assert caught.value.pointer == "/maps"
+    found = lookup.find_together(
+        [StoredMap(map_id="points-0"), NamedMap.model_validate({"map_id": "x", "segments": examples.WALLS})], ""
+    )
+    assert found.unread_bytes == 2
+
+
+def test_several_maps_are_loaded_for_as_long_as_somebody_waits(lookup: Lookup, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(3):
+        lookup.put(f"m-{number}", segments=examples.WALLS)
+    load, deadline, loaded = lookup.store.load, Deadline(), []
+
+    def last(map_id: str) -> Any:
+        loaded.append(map_id)
+        deadline.cancel()
+        return load(map_id)
+
+    monkeypatch.setattr(lookup.store, "load", last)
+    with pytest.raises(IndexNotReadyError):
+        lookup.indexed(lookup.find_together(MapPrefix(prefix="m-"), ""), oriented=None, deadline=deadline)
+    assert loaded == ["m-0"]
+
+
+@pytest.mark.parametrize("across", [False, True])
+def test_a_map_is_at_most_100_km_wide(across: bool) -> None:
+    for width, fits in ((1e5, True), (1e5 + 0.001, False)):
+        rows = np.array([[0.0, 0.0, 1.0, 0.0], [width - 1.0, 0.0, width, 0.0]])
+        document = MapDocument.model_validate({"segments": (rows[:, [1, 0, 3, 2]] if across else rows).tolist()})
+        with nullcontext() if fits else pytest.raises(InvalidMapError, match="extent"):
+            assert outline_of(document).segments == 2

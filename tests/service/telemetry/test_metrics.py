@@ -1,20 +1,25 @@
-"""Metrics, the log, and a dashboard that uses only existing metrics."""
+"""Metrics, the log and who reads it, and a dashboard that uses only existing metrics."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import re
+import subprocess
+import sys
+import threading
 import time
 from pathlib import Path
 
 import httpx
+import orjson
 import pytest
 
 from linefix.documents import examples
 from service.telemetry import metrics as module
+from service.telemetry.logs import WAITING_LINES
 from service.telemetry.metrics import Metrics
-from tests.running import RunningService, until
+from tests.running import PATIENCE, RunningService, until
 
 DASHBOARD = json.loads((Path(__file__).parents[3] / "deploy" / "grafana.json").read_text())
 
@@ -135,3 +140,42 @@ def test_one_that_fails_is_not_the_last(monkeypatch: pytest.MonkeyPatch) -> None
         return await metrics.exposition()
 
     assert b"linefix_build_info" in asyncio.run(ask())
+
+
+LOGS = """
+import logging, logging.config, sys, time
+from service.telemetry.logs import log_config
+logging.config.dictConfig(log_config("info"))
+begun = time.monotonic()
+for number in range({count}):
+    logging.getLogger("linefix").info("line", extra={{"number": number, "text": "x" * 100}})
+took = time.monotonic() - begun
+print(took, flush=True)
+time.sleep({rest})
+logging.getLogger("linefix").info("last")
+"""
+
+
+def test_lines_come_in_order_and_whole() -> None:
+    code = LOGS.format(count=3000, rest=0)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stderr.splitlines()
+    lines = [orjson.loads(line) for line in told]
+    assert [line["number"] for line in lines[:-1]] == list(range(3000))
+    assert lines[-1]["message"] == "last"
+
+
+def test_what_a_sleeping_reader_misses_is_counted() -> None:
+    count = WAITING_LINES + 5000
+    code = LOGS.format(count=count, rest=2)
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        ending = threading.Timer(PATIENCE, process.kill)
+        ending.start()
+        assert process.stdout.readline(), "stood still"  # the log is not read meanwhile
+        ending.cancel()
+        lines = [orjson.loads(line) for line in process.stderr.read().splitlines()]
+    lost = sum(line.get("count", 0) for line in lines)
+    assert lost > 0
+    assert sum(line["message"] == "line" for line in lines) + lost == count
+    assert lines[-1]["message"] == "last"
