@@ -82,30 +82,36 @@ class IndexCache:
                 return found
             promise = self._building.get(key)
             if promise is None:
-                own = self._building[key] = Future()
-        if promise is not None:
-            return _awaited(promise, deadline)
+                self._building[key] = Future()
+        try:
+            if promise is not None:
+                return _awaited(promise, deadline)
+        finally:
+            del promise  # its error holds this frame: in a cycle, the map would stay until the next collection
         self._metrics.cache_misses.inc()
-        return self._build(key, own, build)
+        return self._build(key, build)
 
     def make_room(self, size: int) -> None:
         """Drop the maps used the longest ago until so much more would fit; before something large is built."""
         with self._lock:
             self._drop_until(self._max_bytes - size)
 
-    def _build(self, key: Hashable, promise: Future[CachedMap], build: Callable[[], CachedMap]) -> CachedMap:
+    def _build(self, key: Hashable, build: Callable[[], CachedMap]) -> CachedMap:
         try:
             made = build()
         except BaseException as error:
-            with self._lock:
-                del self._building[key]
-            promise.set_exception(error)
+            self._promised(key).set_exception(error)
             raise
         with self._lock:
-            del self._building[key]
+            promise = self._building.pop(key)
             self._keep(key, made)
         promise.set_result(made)
         return made
+
+    def _promised(self, key: Hashable) -> Future[CachedMap]:
+        """Return what those wait for who want a map that is not built any more."""
+        with self._lock:
+            return self._building.pop(key)
 
     def _keep(self, key: Hashable, made: CachedMap) -> None:
         """Keep a map; one that is larger than the cache, by up to as much again, alone and until the next comes.
@@ -130,5 +136,8 @@ def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
         left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()
         done, _ = wait([promise], max(0.0, min(LOOK_SECONDS, left)))
         if done:
-            return promise.result()
+            try:
+                return promise.result()
+            finally:
+                del promise, done  # as above
     raise IndexNotReadyError

@@ -112,8 +112,11 @@ class Child:
                 found, error = self._answer((function, *map(_wrapped, arguments)), ends)
             except (OSError, EOFError):
                 raise ParserEndedError(self._end()) from None
-        if error is not None:
-            raise error
+        try:
+            if error is not None:
+                raise error
+        finally:
+            del error  # its traceback holds this frame: in a cycle, the body would stay until the next collection
         answer: T = found
         return answer
 
