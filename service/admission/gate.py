@@ -349,6 +349,8 @@ async def _until(deadline: Deadline, wait: Awaitable[T]) -> T:
         if not limit.expired():
             raise
         raise DeadlinePassedError from None
+    finally:
+        del wait  # a future holds its error, which holds this frame
 
 
 def _go_behind(thread: int | None, nice: int) -> None:
