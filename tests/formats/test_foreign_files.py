@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import pytest
+from ezdxf.filemanagement import new
 from PIL import Image
 
 from formats import FormatError, ImportOptions, LogOptions, UnsupportedFormatError, read_log, read_map
@@ -111,7 +111,7 @@ def test_a_dxf_that_is_cut_off_is_said(tmp_path: Path) -> None:
 
 
 def test_lines_with_gaps_are_no_walls_whatever_their_name(tmp_path: Path) -> None:
-    document = ezdxf.new("R2010", units=6)
+    document = new("R2010", units=6)
     document.linetypes.add("AXES", [3.0, 2.0, -0.25, 0.5, -0.25])
     document.linetypes.add("WALL", [1.0, 1.0])
     for y, linetype in enumerate(("AXES", "WALL", "CONTINUOUS")):
