@@ -15,7 +15,7 @@ from .features import Described, describe, with_null
 from .model import MODELS, Model
 from .null import find_null
 from .reasons import INCOMPLETE, VETOES, Findings, Veto, applied, reasons_of, weighed_reasons
-from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY
+from .tuning import CONTRADICTED, NO_MATCH_PROBABILITY
 from .unobservable import choose_along_direction
 
 NEUTRAL = 0.5  # prior probability at which it is judged whether a scan is of the map at all
@@ -186,7 +186,7 @@ def _reasons(verdict: Verdict, on_map: float, usable_from: float) -> tuple[Reaso
     assert verdict.described is not None
     assert verdict.model is not None
     settled: list[ReasonCode] = []
-    if verdict.explained < ELSEWHERE_PROBABILITY:
+    if verdict.status is Status.NO_MATCH:
         settled.append("not_on_map")
     if verdict.described.comparison.probability < usable_from and verdict.status is Status.AMBIGUOUS:
         settled.append("similar_place")

@@ -14,7 +14,10 @@ import pytest
 
 import linefix
 from association import AssociationDiagnostics, Corrections
+from examples.building import draw_cases
+from examples.demo import as_laser
 from formats import ImportedMap, ImportOptions, ImportReport
+from linefix.answering import LocalService
 from linefix.documents.found import AssociationDiagnosticsAnswer
 from linefix.documents.results import Included, association_json, checked_json
 from tests.association.scenes import known
@@ -216,3 +219,11 @@ def test_scans_are_usable_without_a_word(tmp_path: Path) -> None:
     path.write_text("".join(",".join(map(str, line)) + "\n" for line in centre_lines().tolist()))
     assert usable(linefix.read_map(path, ImportOptions(drawn="faces"))) <= 1
     assert usable(linefix.read_map(path)) >= 4  # with the true faces, and with doors as they are, 8
+
+
+def test_the_demo_gets_the_verdicts_that_it_promises() -> None:
+    building, cases = draw_cases()
+    map_document = {"segments": building.endpoints.tolist()}
+    answers = [LocalService().associate({"map": map_document, "scan": as_laser(case.scan)}) for case in cases]
+    assert [one["status"] for one in answers] == [case.expected for case in cases]
+    assert [one["usable"] for one in answers] == [True, False, False, False]
