@@ -53,10 +53,11 @@ def test_a_body_is_the_same_and_has_the_same_limit_whichever_way_it_comes(narrow
 
 ONE = gzip.compress(b"{}", mtime=0)
 NOT_PACKED = {
-    "not gzip": (b"not gzip", "is not gzip"), "nothing": (b"", "line 1 column 1"), "cut short": (ONE[:-4], "cut short"),
+    "not gzip": (b"not gzip", "is not gzip"), "nothing": (b"", "cut short"), "cut short": (ONE[:-4], "cut short"),
     "large, cut short": (gzip.compress(LARGE, 1)[:2_000_000], "cut short"),
-    "more bytes": (ONE + b"more", "is not gzip"), "two objects": (ONE * 2, "line 1 column 3"),
-    "a large one, and more bytes": (gzip.compress(LARGE, 1) + b"x", "is not gzip"),
+    "more bytes": (ONE + b"more", "more bytes follow"), "two objects": (ONE * 2, "more bytes follow"),
+    "a large one, and more bytes": (gzip.compress(LARGE, 1) + b"x", "more bytes follow"),
+    "many empty ones": (gzip.compress(b"") * 1_500_000, "more bytes follow"),
 }  # fmt: skip
 
 
