@@ -114,24 +114,20 @@ def line_map_of(document: Json) -> LineMap:
 
 
 def write_document(document: Json, out: Path) -> None:
-    """Write a map in the format of the file's name, or draw it as PNG.
+    """Write a map as a map file; raises `RefusedError` where the name has another ending."""
+    if out.suffix.lower() != ".json":
+        raise RefusedError(f"{out.name}: expected a name that ends in .json")
+    write_json(document, out)
+
+
+def draw_picture(document: Json, out: Path, *poses: Any, **more: Any) -> None:
+    """Draw a map, and on it what `formats.draw_map` takes.
 
     Raises
     ------
     RefusedError
-        When it has another, or the extra ``[formats]`` is missing.
+        When the name does not end in ``.png``, or the extra ``[formats]`` is missing.
     """
-    if out.suffix.lower() == ".json":
-        write_json(document, out)
-        return
-    with needing(f"writing {out.name}"):
-        from formats import write_map
-
-        write_map(line_map_of(document), out)
-
-
-def draw_picture(document: Json, out: Path, *poses: Any, **more: Any) -> None:
-    """Draw a map, and on it what `formats.draw_map` takes; raises `RefusedError` as `write_document`."""
     with needing("drawing a picture"):
         from formats import draw_map
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..asking import Where
 from ..errors import WrongUseError
-from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id, write_document
+from ..inputs import MAP_ID, draw_picture, read_map_file, read_map_or_id
 from ..options import MapArgument, argument, grouped, required
 from ..printing import Json, Output, listing, outline, print_json, print_lines
 
@@ -60,9 +60,8 @@ def remove(map_id: MapId, where: Where) -> None:
 @grouped
 def draw(
     on: MapArgument,
-    out: Annotated[Path, required("File to write: png, svg, dxf, geojson, csv or json.", "FILE")],
+    out: Annotated[Path, required("File to write: png.", "FILE")],
     where: Where,
 ) -> None:
     """Draw a map: walls in grey, a blue tick on the free side of each."""
-    write = draw_picture if out.suffix.lower() == ".png" else write_document
-    write(where.whole_map(read_map_or_id(on)), out)
+    draw_picture(where.whole_map(read_map_or_id(on)), out)

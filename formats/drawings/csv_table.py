@@ -60,7 +60,7 @@ def read_csv(path: Path, drawing: Drawing) -> None:
     """Read rows of x1, y1, x2, y2, metres unless an option or the header says otherwise.
 
     A first row may name the columns, then in any order and among others, which are properties of the segments. Lines
-    that begin with ``#`` are comments, of which ours say ``# oriented=true``.
+    that begin with ``#`` are comments.
 
     Raises
     ------
@@ -77,9 +77,8 @@ def read_csv(path: Path, drawing: Drawing) -> None:
         raise TooLargeError(
             f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}"
         )
-    comments = {line[1:].strip() for line in lines if line.startswith("#")}
     table = _table(lines)
-    drawing.metres, drawing.oriented = table.metres, "oriented=true" in comments
+    drawing.metres = table.metres
     others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
     commas, loose = 0, []
     for row, line in zip(table.rows, table.lines, strict=True):

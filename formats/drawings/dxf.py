@@ -1,4 +1,4 @@
-"""Drawings in DXF, text or binary, read and written by ezdxf."""
+"""Drawings in DXF, text or binary, read by ezdxf."""
 
 from __future__ import annotations
 
@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 # It would print every repair of a broken file; they are counted in the report.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
-# The layer of lines that have free space on their left; the only way to declare this in a DXF.
-FREE_LEFT = "FREE_LEFT"
-
 # Metres per unit, by the number in $INSUNITS: inch, foot, mile, mm, cm, m, km, microinch, mil, yard, angstrom, nm, um,
 # dm, dam, hm, and those of the US survey: foot, inch, yard, mile.
 METRES_OF = {
@@ -70,16 +67,12 @@ def read_dxf(path: Path, drawing: Drawing) -> None:
     drawing.metres = _metres(document, drawing.notes)
     expansion = Expansion.of(document, drawing)
     metres = options.metres or drawing.metres or 1.0
-    directed = 0
     try:
         if not options.layers and not options.where:
             drawing.walls = walls_among(expansion.layers(document.modelspace()), drawing.notes)
         for placed in expansion.visible(document.modelspace()):
-            if not drawing.takes(placed.layers, _properties(placed, expansion.broken)):
-                continue
-            before = len(drawing.polylines)
-            _add(placed, drawing, SAGITTA / metres)
-            directed += (len(drawing.polylines) - before) * (placed.layers[-1] == FREE_LEFT)
+            if drawing.takes(placed.layers, _properties(placed, expansion.broken)):
+                _add(placed, drawing, SAGITTA / metres)
     except FormatError:
         raise
     except BROKEN as error:
@@ -87,7 +80,6 @@ def read_dxf(path: Path, drawing: Drawing) -> None:
             "has a block that cannot be read; expected valid entities. Repair the drawing (AUDIT)"
         ) from error
     _note_paper_space(document, drawing)
-    drawing.oriented = 0 < directed == len(drawing.polylines)
 
 
 def _document(path: Path, notes: Notes) -> Document:

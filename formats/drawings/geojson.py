@@ -15,7 +15,6 @@ from .drawing import Drawing
 from .selection import lower_keys
 
 MAX_COLLECTIONS = 4
-OWN = "linefix"  # the member that identifies our own files
 HEIGHTS = ("z", "elevation", "elev")  # properties of a feature whose positions have no z
 PACKED = re.compile(r'"([^"]+)"=>"([^"]*)"')  # tags as ogr2ogr writes them into one property
 HIDDEN = ("feature_type", "id")  # members of an IMDF feature outside its properties
@@ -43,9 +42,7 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
         found = "an object without it" if isinstance(root, dict) else kind_of(root)
         raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}")
-    own = root.get(OWN)
-    told = own if isinstance(own, dict) else {}
-    drawing.metres, drawing.oriented = 1.0, told.get("oriented") is True
+    drawing.metres = 1.0
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
         raise MalformedFileError(f"expected features to be a list, found {kind_of(features)}")
@@ -55,9 +52,8 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
         if not isinstance(feature, dict):
             raise MalformedFileError(f"expected every feature to be an object, found {kind_of(feature)} as feature {k}")
         _read_feature(feature, drawing, k)
-    if told.get("metres") is not True:
-        members = [one[key] for one in (root, *features) for key in ("crs", "coordRefSys") if key in one]
-        require_lengths(members[0] if members else None, drawing)
+    members = [one[key] for one in (root, *features) for key in ("crs", "coordRefSys") if key in one]
+    require_lengths(members[0] if members else None, drawing)
 
 
 def _loaded(content: bytes) -> Any:

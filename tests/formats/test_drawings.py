@@ -309,30 +309,21 @@ def test_the_thickness_that_a_geojson_has(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("oriented", [True, False])
-@pytest.mark.parametrize("suffix", ["json", "geojson", "svg", "csv", "dxf"])
-def test_a_map_comes_back_to_the_bit(tmp_path: Path, suffix: str, oriented: bool) -> None:
+def test_a_map_comes_back_to_the_bit(tmp_path: Path, oriented: bool) -> None:
     corners, points = [[1.5, 2.5, 4.25, 0.75], [0.1, 1 / 3, -7e3, 2e3]], np.array([[1.0, 1 / 3]])
     written = LineMap(Segments.from_array(corners), 0.04, oriented, "hall", {"source": "drawn"}, points, 0.03)
-    path = tmp_path / f"map.{suffix}"
+    path = tmp_path / "map.json"
     write_map(written, path)
     again = read_map(path).map
     assert again.segments.endpoints.tolist() == corners
     assert again.oriented is oriented
-    if suffix == "json":
-        assert (again.sigma, again.frame_id, again.meta) == (0.04, "hall", {"source": "drawn"})
-        assert (again.points.tolist(), again.points_sigma) == (points.tolist(), 0.03)
-
-
-def test_names_in_a_map_cannot_break_out_of_an_svg(tmp_path: Path) -> None:
-    path = tmp_path / "map.svg"
-    write_map(LineMap(Segments.from_array([[0, 0, 1, 0]]), frame_id='"><script>alert(1)</script>'), path)
-    assert b"<script" not in path.read_bytes()
-    assert len(read_map(path).map.segments) == 1
+    assert (again.sigma, again.frame_id, again.meta) == (0.04, "hall", {"source": "drawn"})
+    assert (again.points.tolist(), again.points_sigma) == (points.tolist(), 0.03)
 
 
 def test_other_formats_are_not_written(tmp_path: Path) -> None:
     one = LineMap(Segments.from_array([[0, 0, 1, 0]]))
-    with pytest.raises(UnsupportedFormatError, match="ends in one of"):
+    with pytest.raises(UnsupportedFormatError, match=r"ends in \.json"):
         write_map(one, tmp_path / "map.dwg")
     with pytest.raises(UnsupportedFormatError, match=r"\.png"):
         draw_map(one, tmp_path / "map.jpg")

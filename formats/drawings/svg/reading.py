@@ -15,9 +15,6 @@ from .shapes import SHAPES, Measure
 from .visible import Visible
 from .xml import kind_of, parse_xml
 
-# Attributes of the root that identify our own drawings.
-METRES, ORIENTED = "data-metres-per-unit", "data-free-space-on-left"
-
 
 def read_svg(path: Path, drawing: Drawing) -> None:
     """Read the visible lines, shapes and paths of an SVG; y is turned to point up.
@@ -36,9 +33,7 @@ def read_svg(path: Path, drawing: Drawing) -> None:
     root = parse_xml(read_bounded(path, MAX_MAP_BYTES))
     if kind_of(root) != "svg":
         raise MalformedFileError("expected an svg element")
-    drawing.oriented = root.get(ORIENTED) == "true"
     try:
-        drawing.metres = float(root.attrib[METRES]) if METRES in root.attrib else None
         with np.errstate(all="ignore"):  # what is no number is refused where it is added
             _read_shapes(root, drawing)
     except FormatError:

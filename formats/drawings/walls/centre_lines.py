@@ -54,7 +54,7 @@ def are_centres(endpoints: Floats, drawing: Drawing) -> bool:
     options = drawing.options
     if options.drawn is not None:
         return options.drawn == "centres"
-    told = options.oriented is not None or bool(options.point) or drawing.oriented or drawing.format == "json"
+    told = options.oriented is not None or bool(options.point) or drawing.format == "json"
     if told or not 3 <= len(endpoints) <= MOST_LINES:
         return False
     lengths = np.hypot(*(endpoints[:, 2:] - endpoints[:, :2]).T)
