@@ -13,7 +13,7 @@ from .drawings.geojson import read_geojson
 from .drawings.own_json import read_json
 from .drawings.svg.reading import read_svg
 from .drawings.walls.to_map import to_map
-from .errors import InvalidOptionError, MalformedFileError, UnsupportedFormatError, naming
+from .errors import InvalidOptionError, UnsupportedFormatError, naming
 from .files import ending_of, name_of, require_content
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
@@ -88,7 +88,8 @@ def read_map(
             grid, files = read_grid(file, options, notes, pictures)
             return _imported(grid, "map", options.surface, notes, "map_server", files)
         if is_bag(file):
-            return _read_bag(file, options, notes)
+            found = read_bag_grid(file, options.topic, notes)
+            return _imported(found.grid, found.frame, options.surface, notes, found.format, (name_of(file),))
         if suffix in DRAWINGS:
             drawing = Drawing(name_of(file), suffix[1:], notes, options)
             DRAWINGS[suffix](file, drawing)
@@ -142,18 +143,6 @@ def _require_use(options: ImportOptions, suffix: str) -> None:
             raise InvalidOptionError(
                 f"found a value, but the file is a {what}, which has no {name}; omit it", argument=name
             )
-
-
-def _read_bag(file: Path, options: ImportOptions, notes: Notes) -> ImportedMap:
-    found = read_bag_grid(file, options.topic, notes)
-    try:
-        return _imported(found.grid, found.frame, options.surface, notes, found.format, (name_of(file),))
-    except MalformedFileError as error:
-        if not found.costmap:
-            raise
-        raise MalformedFileError(
-            f"{error.message}; {found.topic} is a costmap, in which obstacles are inflated: name the topic of the map"
-        ) from error
 
 
 def map_of_grid(message: Any, name: str = "OccupancyGrid", surface: float | None = None) -> ImportedMap:

@@ -21,7 +21,7 @@ from . import tuning
 from .cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
 
 KINDS = {"free": FREE, "occupied": OCCUPIED, "unknown": UNKNOWN}
-DECIDED = ("mode", "transparent", "thresholds", "unknown_grey", "inverted")  # notes on how cells were told apart
+DECIDED = ("costmap", "transparent", "thresholds", "unknown_grey", "inverted")  # notes on how cells were told apart
 
 WHY_DRAWN = "because walls have a constant thickness, as in a drawn grid; set the option surface for another value"
 WHY_MAPPED = "by the thickness of walls that are seen from one side, as in a mapped grid"

@@ -36,15 +36,11 @@ class BagGrid:
         The frame that it is in.
     format : str
         Of the bag.
-    topic : str
-    costmap : bool
     """
 
     grid: Grid
     frame: str
     format: str
-    topic: str
-    costmap: bool
 
 
 def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
@@ -65,17 +61,13 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
             raise IncompleteFileError(f"has no messages of OccupancyGrid; {bag.topics()}")
         grids = _last_grids(bag, wanted)
         if not grids:
-            raise MalformedFileError(f"has no grid with cells on {_listed(wanted)}")
+            raise MalformedFileError(f"has no grid with cells on {', '.join(map(shown, sorted(wanted)[:NAMED]))}")
         chosen = next(iter(grids)) if len(wanted) == 1 else _map_among(grids, notes)
         notes.add_read("grids", f"grids of {shown(chosen)}, of which the last is used", counts[chosen])
-        costmap = is_costmap(chosen, grids[chosen])
-        if costmap:
-            said = (
-                f"{shown(chosen)} is a costmap with inflated obstacles; walls may lie in front of their true positions"
-            )
-            notes.add_assumed("costmap", said)
-        grid, frame = grid_of(grids[chosen], notes)
-        return BagGrid(grid, frame, bag.format, shown(chosen), costmap)
+        if is_costmap(chosen, grids[chosen]):
+            told = f"{shown(chosen)} is a costmap, whose inflated obstacles lie in front of the walls"
+            notes.add_assumed("costmap", f"{told}; set the option topic to the map")
+        return BagGrid(*grid_of(grids[chosen], notes), bag.format)
 
 
 def _last_grids(bag: Bag, topics: Collection[str]) -> dict[str, Any]:
@@ -117,10 +109,6 @@ def _map_among(grids: dict[str, Any], notes: Notes) -> str:
 def _size(message: Any) -> str:
     info = message.info
     return f"{info.width} x {info.height} cells of {float(info.resolution):.3g} m"
-
-
-def _listed(topics: Collection[str]) -> str:
-    return ", ".join(shown(topic) for topic in sorted(topics)[:NAMED])
 
 
 def is_costmap(topic: str, message: Any) -> bool:
