@@ -143,11 +143,6 @@ def read_description(path: Path, notes: Notes) -> Description:
         raise UnsupportedFormatError(
             f"has an unknown mode; expected one of {', '.join(MODES)}, found {shown(str(mode))}"
         )
-    for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
-        if key not in values:
-            notes.add_assumed(key, f"{key} is {assumed}, because the file has none")
-    if mode == "raw":
-        notes.add_assumed("mode", "in mode raw grey values up to 100 are an occupancy in percent, others are unknown")
     free, occupied = (
         _number(values, f"{key}_thresh", 0.0, 1.0, usual) for key, usual in (("free", 0.196), ("occupied", 0.65))
     )

@@ -12,9 +12,6 @@ SPIKE_RATIO = 3.0
 DARKEST_UNKNOWN = 0.8
 DARKER_SHARE = 0.02
 
-# Cells darker than it may be fewer in large halls: this many times the side of a square of the free cells.
-DARKER_SIDES = 1.0
-
 # Grey values, of 255, that tools write for unknown cells: map_saver 205; others 127, 128 and 200.
 UNKNOWN_GREYS = (205, 200, 127, 128)
 

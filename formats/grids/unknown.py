@@ -101,7 +101,7 @@ def find_unknown_level(counts: Counts, between: tuple[int, int] = (1, 0)) -> int
     free = int(counts[spikes[0]])
     darker = total - np.cumsum(counts)
     # Walls around a large hall are few cells: their number grows with the side of the free area, not with the area.
-    least = max(float(tuning.LEAST_CELLS), min(tuning.DARKER_SHARE * free, tuning.DARKER_SIDES * free**0.5))
+    least = max(float(tuning.LEAST_CELLS), min(tuning.DARKER_SHARE * free, free**0.5))
     fit = [
         k
         for k in spikes[1:]
