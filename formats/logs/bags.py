@@ -125,14 +125,14 @@ class Bag:
 
 
 @contextmanager
-def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
+def opened(path: Path, notes: Notes) -> Iterator[Bag]:
     """Open a recording.
 
     Parameters
     ----------
     path : Path
         A ``.bag``, ``.mcap`` or ``.db3``, or the folder of a bag of ROS 2.
-    notes : Notes, optional
+    notes : Notes
         Takes what of it cannot be read.
 
     Raises
@@ -140,7 +140,6 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
     FormatError
         When it cannot be read.
     """
-    notes = Notes() if notes is None else notes
     paths, name = recorded_files(path, notes), name_of(path)
     with ExitStack() as stack:
         files: list[McapFile | RosbagFile] = []
@@ -161,18 +160,9 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
             notes,
             paths[0].parent,
         )
-        _note_left_out(bag, notes)
         yield bag
         for code, said, count in (remark for file in files for remark in file.remarks):
             notes.add_dropped(code, said, count)
-
-
-def _note_left_out(bag: Bag, notes: Notes) -> None:
-    """Note the channels whose messages are not those of ROS."""
-    others = [one for one in bag.connections() if one.encoding not in (CDR, ROS1) or not one.msgtype]
-    if others:
-        some = ", ".join(f"{shown(one.topic)} ({shown(one.encoding) or 'no encoding'})" for one in others[:3])
-        notes.add_dropped("other_channels", f"channels without messages of ROS, such as {some}", len(others))
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path, PureWindowsPath
 
-from ..errors import FormatError, IncompleteFileError, MalformedFileError, UnsupportedFormatError
+from ..errors import FormatError, IncompleteFileError, MalformedFileError
 from ..files import load_yaml, read_bounded, text_of
 from ..limits import MAX_METADATA_BYTES, MAX_RECORDED_FILES
 from ..report import Notes, first_of
@@ -14,17 +14,14 @@ FOLDER_SUFFIXES = (".mcap", ".db3")  # of files in the folder of a bag of ROS 2
 SUFFIXES = (".bag", *FOLDER_SUFFIXES)
 METADATA = "metadata.yaml"
 PACKED = ".zstd"  # what rosbag2 appends where it compresses whole files
-PACKED_SUFFIXES = tuple(f"{kind}{packed}" for kind in FOLDER_SUFFIXES for packed in (PACKED, ".zst"))
-ACTIVE = ".bag.active"
-OLD_SUFFIXES = (".bag", ACTIVE)  # of ROS 1
 _NUMBER = re.compile(r"_\d+$")  # of a file among those that one recording was split into
 
 
 def is_bag(path: Path) -> bool:
     """Tell whether a path is a recording: by its ending, or as a folder with such files."""
     if path.is_dir():
-        return (path / METADATA).is_file() or bool(_ending(path, *FOLDER_SUFFIXES, *PACKED_SUFFIXES, *OLD_SUFFIXES))
-    return path.name.lower().endswith((*SUFFIXES, ACTIVE))
+        return (path / METADATA).is_file() or bool(_ending(path, *FOLDER_SUFFIXES))
+    return path.name.lower().endswith(SUFFIXES)
 
 
 def recorded_files(path: Path, notes: Notes) -> list[Path]:
@@ -43,8 +40,6 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
         When there is none that can be read.
     """
     if not path.is_dir():
-        if path.name.lower().endswith(ACTIVE):
-            raise UnsupportedFormatError("was not closed by the recorder; rosbag reindex makes a .bag of it")
         return [path]
     listed = _listed(path, notes) if (path / METADATA).is_file() else None
     if listed is None:
@@ -52,8 +47,8 @@ def recorded_files(path: Path, notes: Notes) -> list[Path]:
     found = [file for file in map(_unpacked, listed) if file.is_file()]
     missing = [file.name for file in listed if _unpacked(file) not in found]
     if not found:
-        _refuse_packed(path)
-        raise MalformedFileError(f"is missing the files that {METADATA} lists: {first_of(missing)}")
+        hint = "; decompress them first with zstd -d" if missing[0].endswith(PACKED) else ""
+        raise MalformedFileError(f"is missing the files that {METADATA} lists: {first_of(missing)}{hint}")
     if missing:
         notes.add_dropped(
             "missing_files", f"files that {METADATA} lists and that are missing: {first_of(missing)}", len(missing)
@@ -79,10 +74,7 @@ def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     """Return the files in a folder without a description, where they are of one recording."""
     found = _ending(folder, *FOLDER_SUFFIXES)
     if not found:
-        _refuse_packed(folder)
-        raise IncompleteFileError(
-            f"is a folder without a bag: expected {METADATA}, or files that end in {' or '.join(FOLDER_SUFFIXES)}"
-        )
+        raise IncompleteFileError(f"has a {METADATA}, but no files that end in {' or '.join(FOLDER_SUFFIXES)}")
     stems = sorted({_NUMBER.sub("", file.stem) for file in found})
     if len(stems) > 1 or len({file.suffix.lower() for file in found}) > 1:
         raise IncompleteFileError(
@@ -104,15 +96,3 @@ def _ending(folder: Path, *endings: str) -> list[Path]:
 def _unpacked(file: Path) -> Path:
     """Return the file that a compressed one becomes when it is unpacked next to it."""
     return file.with_suffix("") if file.suffix.lower() == PACKED else file
-
-
-def _refuse_packed(folder: Path) -> None:
-    packed, old = _ending(folder, *PACKED_SUFFIXES), _ending(folder, *OLD_SUFFIXES)
-    if packed:
-        raise UnsupportedFormatError(
-            f"is compressed file by file ({first_of([file.name for file in packed])}); decompress it first with zstd -d"
-        )
-    if old:
-        raise UnsupportedFormatError(
-            f"is not a bag of ROS 2, and has {first_of([file.name for file in old])}; choose one file"
-        )

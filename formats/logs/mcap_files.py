@@ -72,7 +72,8 @@ class McapFile:
         require_content(path, but=".mcap")
         self._file = _WholeReads(FileIO(path))
         try:
-            self._begin()
+            if not self._file.peek(len(MAGIC)).startswith(MAGIC):
+                raise MalformedFileError("is not an mcap: its first bytes are not those of the format")
             summary = self._summary()
             self._chunks: list[ChunkIndex] = []
             self.connections = self._scanned() if summary is None else self._from_summary(summary)
@@ -112,14 +113,6 @@ class McapFile:
         for message in found:
             if message.channel_id in wanted:
                 yield Received(wanted[message.channel_id], message.log_time, message.data)
-
-    def _begin(self) -> None:
-        try:
-            magic = self._file.read(len(MAGIC))
-        except EndOfFile:
-            magic = b""
-        if magic != MAGIC:
-            raise MalformedFileError("is not an mcap: its first bytes are not those of the format")
 
     def _summary(self) -> Summary | None:
         """Return the summary; None where it does not name all that has to be known of the messages."""

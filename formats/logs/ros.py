@@ -32,7 +32,7 @@ def read_bag(path: Path, options: LogOptions) -> Log:
     FormatError
         When it is no bag, or has no scans; while iterating, when it is broken.
     """
-    with opened(path) as bag:
+    with opened(path, Notes()) as bag:
         form = bag.format
         count = sum(c.msgcount for c in scan_connections(bag, options.topic, Notes()))
     return Log(form, name_of(path), partial(_scans, path, options), count)
