@@ -173,9 +173,7 @@ class Stamps:
             said = "scans without a stamp, which have the time at which the recorder received them"
             self.notes.add_assumed("stamp_received", said, 1)
             stamp = received
-        if self._last is not None and stamp == self._last:
-            self.notes.add_assumed("stamp_repeated", "scans with the stamp of the scan before", 1)
-        elif self._last is not None and stamp < self._last:
+        if self._last is not None and stamp < self._last:
             self._farthest_back = max(self._farthest_back, (self._last - stamp) * SECONDS)
             said = f"scans with a stamp before that of the scan before, by up to {self._farthest_back:.3f} s"
             self.notes.add_assumed("stamp_back", said, 1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -231,10 +230,14 @@ class Sensors:
         if moving is not None:
             return self._doubted(Odometry(moving[-1], MOVING, tree.tracks(moving)), others)
         if not fitting:
-            self._note_missing(tree, frame, paths)
+            self._note_missing(frame, paths)
             return None
         found, *others = others
-        self._note_messages(found, [one.source for one in others])
+        if others:
+            unused = ", ".join(shown(one.source) for one in others)
+            self._notes.add_assumed("odometry", f"odometry is that of {shown(found.source)}; not used: {unused}")
+        if not found.moving:
+            self._notes.add_assumed("odometry_stands", f"the robot never moves according to {shown(found.source)}")
         return self._doubted(found, others)
 
     def _of_messages(self, tree: Transforms, frame: str, topic: OdometryTopic) -> Odometry:
@@ -261,31 +264,13 @@ class Sensors:
         found.note_doubts(self._notes)
         return found
 
-    def _note_missing(self, tree: Transforms, frame: str, paths: list[list[str]]) -> None:
-        moving = [path for path in paths if len(path) > 1 and path[-1] != base_of(path, self._bases)]
-        base = base_of((*moving, *paths, [])[0], self._bases) or frame
-        why = (
-            f"{shown(base)} does not move in {shown(moving[0][-1])}"
-            if moving
-            else f"no frame is above {shown(base) or NAMELESS}"
-        )
-        unset = [
-            (child, parent) for path in paths for child, parent in pairwise(path) if tree.track(parent, child).unset
-        ]
-        if unset:
-            child, parent = map(shown, unset[0])
-            why = f"all transforms of {child} in {parent} have the stamp 0; set it in their publisher"
+    def _note_missing(self, frame: str, paths: list[list[str]]) -> None:
+        base = base_of((*paths, [])[0], self._bases) or frame
         self._notes.add_assumed(
-            "no_odometry", f"no odometry was found: {why}, and there is no Odometry message of this robot"
+            "no_odometry",
+            f"no odometry was found: {shown(base) or NAMELESS} moves in no frame above it, and there is no Odometry "
+            "message of this robot; transforms need stamps other than 0",
         )
-
-    def _note_messages(self, found: Odometry, others: list[str]) -> None:
-        if others:
-            self._notes.add_assumed(
-                "odometry", f"odometry is that of {shown(found.source)}; not used: {', '.join(map(shown, others))}"
-            )
-        if not found.moving:
-            self._notes.add_assumed("odometry_stands", f"the robot never moves according to {shown(found.source)}")
 
 
 def note_tilt(sensor: Sensor, place: Place, notes: Notes) -> None:

@@ -246,11 +246,6 @@ class Track:
                     yield stamp, received
 
     @property
-    def unset(self) -> bool:
-        """True where the values should have stamps and have none."""
-        return not self.static and set(self.stamps) == {0}
-
-    @property
     def part_count(self) -> int:
         """The number of parts."""
         return len(self._parts)
