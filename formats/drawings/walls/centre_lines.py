@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from registration import Segments
 from registration.layout import Floats
 
-from ...options import ImportOptions
 from ..drawing import Drawing
 
 Flags = NDArray[np.bool_]
@@ -30,15 +28,6 @@ MEETS = 0.05  # m; an end as near to another line meets it
 MOST_JOINED = 3000  # walls whose joints are worked out; of more only the faces are drawn
 INSIDE = 1e-6  # m; what lies no deeper in another wall stays
 LEAST_LEFT = 0.01  # m; shorter rests of a face are left out
-
-
-@dataclass(frozen=True, slots=True)
-class Walls:
-    """Thickness of the walls of centre lines, ``(n,)`` metres, and the note of the report."""
-
-    thickness: Floats
-    code: str
-    told: str
 
 
 def are_centres(endpoints: Floats, drawing: Drawing) -> bool:
@@ -70,29 +59,31 @@ def are_centres(endpoints: Floats, drawing: Drawing) -> bool:
     return True
 
 
-def walls_of(widths: Floats, options: ImportOptions) -> Walls:
+def thickness_of(widths: Floats, drawing: Drawing) -> Floats:
     """Return how thick the walls of centre lines are: as the caller says, as the drawing does, or as walls usually are.
 
     Parameters
     ----------
     widths : (n,)
         Of the lines as they are drawn, metres; 0 where they have none.
-    options : ImportOptions
+    drawing : Drawing
+        Its notes take which of these it is.
     """
-    if options.thickness is not None:
-        thickness = np.full(len(widths), options.thickness)
-        return Walls(
-            thickness, "thickness_given", f"walls are {options.thickness:g} m thick, as the option thickness states"
-        )
+    given, notes = drawing.options.thickness, drawing.notes
+    if given is not None:
+        notes.add_assumed("thickness_given", f"walls are {given:g} m thick, as the option thickness states")
+        return np.full(len(widths), given)
     known = (widths >= THINNEST) & (widths <= THICKEST)
     if not known.any():
         told = f"walls are assumed {USUAL:g} m thick; a map check with scans estimates the thickness"
-        return Walls(np.full(len(widths), USUAL), "thickness_usual", told)
+        notes.add_assumed("thickness_usual", told)
+        return np.full(len(widths), USUAL)
     middle = float(np.median(widths[known]))
     told = f"walls are as thick as the drawn lines, with a median of {middle:.2g} m"
     if not known.all():
         told += f", which is assumed for {int((~known).sum())} lines without a width"
-    return Walls(np.where(known, widths, middle), "thickness_drawn", told)
+    notes.add_assumed("thickness_drawn", told)
+    return np.where(known, widths, middle)
 
 
 def _neighbours(endpoints: Floats, lengths: Floats) -> tuple[Floats, Flags]:

@@ -13,7 +13,7 @@ from ...errors import IncompleteFileError, MalformedFileError
 from ...line_map import LineMap
 from ...options import UNITS
 from ..drawing import Drawing
-from .centre_lines import are_centres, outline, walls_of
+from .centre_lines import are_centres, outline, thickness_of
 from .far_lines import near_lines
 from .free_sides import Sides, sides_seen
 from .levels import on_level, undirected
@@ -104,11 +104,10 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
 
 def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing) -> Floats:
     """Return both faces of walls drawn by their centre line, free space on the left."""
-    walls = walls_of(widths, drawing.options)
-    drawing.notes.add_assumed(walls.code, walls.told)
+    thickness = thickness_of(widths, drawing)
     drawing.notes.add_merged("faces", "centre lines made into two faces", len(endpoints))
-    drawing.meta |= {"thickness": f"{float(np.median(walls.thickness)):.3g}"}
-    return outline(_segments(endpoints, drawing).endpoints, walls.thickness)
+    drawing.meta |= {"thickness": f"{float(np.median(thickness)):.3g}"}
+    return outline(_segments(endpoints, drawing).endpoints, thickness)
 
 
 def _directed(endpoints: Floats, drawing: Drawing) -> Floats:
