@@ -67,17 +67,7 @@ def read_csv(path: Path, drawing: Drawing) -> None:
     FormatError
         When a row has no four numbers, or it is not clear which columns are the coordinates.
     """
-    text = text_of(read_bounded(path, MAX_MAP_BYTES))
-    ends = sum(text.count(end) for end in ("\n", "\r"))
-    if ends > 2 * MAX_LINES:
-        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends")
-    lines = list(io.StringIO(text, newline=None))
-    longest = max(map(len, lines), default=0)
-    if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
-        raise TooLargeError(
-            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}"
-        )
-    table = _table(lines)
+    table = _table(_lines(path))
     drawing.metres = table.metres
     others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
     commas, loose = 0, []
@@ -89,8 +79,12 @@ def read_csv(path: Path, drawing: Drawing) -> None:
             found = f"'{shown(row[wrong])}' in column {wrong + 1}" if wrong < len(row) else f"{len(row)} cells"
             raise MalformedFileError(f"line {line}: expected rows of x1, y1, x2, y2, found {found}")
         most = len(table.names) or len(COLUMNS)
-        if sum(_number(cell) is not None for cell in row) > most:
-            raise _unclear(row, line, most)
+        if (count := sum(_number(cell) is not None for cell in row)) > most:
+            raise IncompleteFileError(
+                f"line {line}: has {count} columns of numbers ({first_of(row)}), expected {most}, as x1, y1, x2, y2. "
+                "An index, z, or decimal commas make more. Delete the others, or name all columns in a first row, "
+                "x1,y1,x2,y2 among them"
+            )
         commas += any("," in row[k] for k in table.wanted)
         properties = {table.names[k]: row[k] for k in others if k < len(row)}
         layer = properties.get("layer", texts[0] if texts and not table.names else None)
@@ -108,11 +102,23 @@ def read_csv(path: Path, drawing: Drawing) -> None:
         drawing.notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
 
 
+def _lines(path: Path) -> list[str]:
+    text = text_of(read_bounded(path, MAX_MAP_BYTES))
+    ends = sum(text.count(end) for end in ("\n", "\r"))
+    if ends > 2 * MAX_LINES:
+        raise TooLargeError(f"expected at most {MAX_LINES} lines, found {ends} line ends")
+    lines = list(io.StringIO(text, newline=None))
+    longest = max(map(len, lines), default=0)
+    if len(lines) > MAX_LINES or longest > MAX_CSV_LINE:
+        raise TooLargeError(
+            f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters, found {len(lines)} of at most {longest}"
+        )
+    return lines
+
+
 def _table(lines: list[str]) -> Table:
     """Return the table by the delimiter that gives four numbers, or a header; else by the most frequent one."""
     kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip(" \t\r\n,;|") and not line.startswith(COMMENTS)]
-    told = re.fullmatch(r"\"?sep=(.)\"?\s*", kept[0][1]) if kept else None
-    kept = kept[1:] if told else kept
     named = [line for line in lines[: kept[0][0] - 1] if line.startswith(COMMENTS)] if kept else []
     named = [line.lstrip("#%/ ") for line in named]  # numpy and Matlab put the names of columns into a comment
     header_line = next((line for line in named if any(_columns(_cells(line, one))[2] for one in DELIMITERS)), "")
@@ -120,7 +126,7 @@ def _table(lines: list[str]) -> Table:
         kept.insert(0, (kept[0][0], header_line))
     first = kept[0][1] if kept else ""
     likely = next((one for one in DELIMITERS if one in first), ",")
-    for delimiter in (told[1],) if told else (*DELIMITERS, likely):
+    for delimiter in (*DELIMITERS, likely):
         header = _cells(first, delimiter)
         columns, metres, names = _columns(header)
         if names or sum(_number(cell) is not None for cell in header) >= len(COLUMNS):
@@ -174,12 +180,3 @@ def _number(cell: str) -> float | None:
     if COMMA.fullmatch(cell):
         return float(cell.replace(",", "."))
     return float(cell) if NUMBER.fullmatch(cell) else None
-
-
-def _unclear(row: list[str], line: int, most: int) -> IncompleteFileError:
-    numbers = sum(_number(cell) is not None for cell in row)
-    return IncompleteFileError(
-        f"line {line}: has {numbers} columns of numbers ({first_of(row)}), expected {most}, as x1, y1, x2, y2. An "
-        "index, z, or decimal commas make more. Delete the others, or name all columns in a first row, x1,y1,x2,y2 "
-        "among them"
-    )

@@ -28,7 +28,6 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
     Parameters
     ----------
     path : Path
-        An object, or one feature on each line.
     drawing : Drawing
         Takes them. Layers are the properties ``layer`` and ``name``, and ``thickness`` or ``width`` are those of a wall
         drawn by its centre line.
@@ -38,7 +37,7 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
     FormatError
         When it is no GeoJSON, or its coordinates are degrees or of an unknown unit.
     """
-    root = _loaded(read_bounded(path, MAX_MAP_BYTES))
+    root = load_json(read_bounded(path, MAX_MAP_BYTES))
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
         found = "an object without it" if isinstance(root, dict) else kind_of(root)
         raise MalformedFileError(f"is not GeoJSON: expected an object with a type, found {found}")
@@ -54,14 +53,6 @@ def read_geojson(path: Path, drawing: Drawing) -> None:
         _read_feature(feature, drawing, k)
     members = [one[key] for one in (root, *features) for key in ("crs", "coordRefSys") if key in one]
     require_lengths(members[0] if members else None, drawing)
-
-
-def _loaded(content: bytes) -> Any:
-    """Return the object of a file, or the collection of those on its lines (RFC 8142, and without its separators)."""
-    lines = [line for one in content.split(b"\n") if (line := one.strip(b"\x1e \r\t"))]
-    if len(lines) < 2 or not all(line.startswith(b"{") and line.endswith(b"}") for line in lines):
-        return load_json(content)
-    return load_json(b'{"type": "FeatureCollection", "features": [' + b",".join(lines) + b"]}")
 
 
 def _read_feature(feature: dict[str, Any], drawing: Drawing, number: int) -> None:
@@ -118,22 +109,22 @@ def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
         raise MalformedFileError(f"expected at most {MAX_COLLECTIONS} nested collections, found more; flatten them")
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind == "GeometryCollection":
-        for inner in _listed(geometry.get("geometries"), drawing):
+        for inner in _listed(geometry.get("geometries")):
             yield from _lines(inner, drawing, depth + 1)
     elif kind == "LineString":
-        yield _listed(coordinates, drawing), False
+        yield _listed(coordinates), False
     elif kind in ("MultiLineString", "Polygon"):
-        yield from ((_listed(line, drawing), kind == "Polygon") for line in _listed(coordinates, drawing))
+        yield from ((_listed(line), kind == "Polygon") for line in _listed(coordinates))
     elif kind == "MultiPolygon":
-        for polygon in _listed(coordinates, drawing):
-            yield from ((_listed(ring, drawing), True) for ring in _listed(polygon, drawing))
+        for polygon in _listed(coordinates):
+            yield from ((_listed(ring), True) for ring in _listed(polygon))
     else:
-        drawing.drop(str(kind), hint="needs to become GeoJSON (mapshaper, or ogr2ogr)" if kind == "Topology" else "")
+        drawing.drop(str(kind))
         return
     drawing.notes.add_read(f"geometry_{str(kind).lower()}", f"{kind} geometries", 1)
 
 
-def _listed(value: Any, drawing: Drawing) -> list[Any]:
+def _listed(value: Any) -> list[Any]:
     if not isinstance(value, list):
         raise MalformedFileError(f"expected coordinates in lists, found {kind_of(value)}")
     return value

@@ -31,8 +31,6 @@ def read_json(path: Path, drawing: Drawing) -> None:
         found = kind_of(told)
         if isinstance(told, dict):
             found = f"{kind_of(told['segments'])}" if "segments" in told else f"an object with {first_of(list(told))}"
-        if isinstance(told, dict) and "features" in told:
-            found += ", as in GeoJSON: rename the file to .geojson" if "type" in told else "; convert it to GeoJSON"
         raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}')
     drawing.metres = 1.0
     _take_properties(told, drawing)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -122,7 +121,7 @@ ONE, TWO = [[0, 0, 7, 2.5]], [[0, 0, 4, 0], [4, 0, 4, 3]]
     ("text", "expected"),
     [
         ("0,00;0,00;7,00;2,50\n", ONE), ("0,0 0,0 7,0 2,5\n", ONE), ('"0,0","0,0","7,0","2,5"', ONE),
-        ("x1;y1;x2;y2\n0,0;0;7;2,5\n", ONE), ("sep=;\nx1;y1;x2;y2\n0;0;7;2.5\n", ONE), ("0,0,7,2.5,A-WALL\n", ONE),
+        ("x1;y1;x2;y2\n0,0;0;7;2,5\n", ONE), ("0,0,7,2.5,A-WALL\n", ONE),
         ("start_x,start_y,end_x,end_y\n0,0,7,2.5\n", ONE), ("x0,y0,x1,y1\n0,0,7,2.5\n", ONE),
         ("x1_mm,y1_mm,x2_mm,y2_mm\n0,0,7000,2500\n", ONE), ("A\t0\t0\t7\t2.5\n", ONE),
         ("x1;y1;x2;y2\n0;\u22120;7;2.5\n", ONE), ("% walls\nP1X|P1Y|P2X|P2Y\n0|0|7|2.5\n|||\n", ONE),
@@ -199,11 +198,6 @@ def test_the_coordinate_system_of_a_geojson(
     imported = read_map(path, ImportOptions(drawn="faces", **options))
     assert sum(imported.map.segments.lengths) == pytest.approx(24.0, abs=1e-4)
     assert ("crs" in notes(imported)) == bool(options)
-
-
-def test_features_on_lines_of_their_own(tmp_path: Path) -> None:
-    path = written(tmp_path, "a.geojson", "\n".join(f"\x1e{json.dumps(line(y))}" for y in (1, 2)))
-    assert len(rows(read_map(path, METRES))) == 2
 
 
 def test_an_option_that_says_nothing_of_a_file_is_refused(tmp_path: Path) -> None:
