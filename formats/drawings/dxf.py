@@ -6,13 +6,12 @@ import io
 import logging
 import re
 import struct
-from collections import Counter
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ezdxf import bbox, recover
 from ezdxf import path as ezpath
+from ezdxf import recover
 from ezdxf.audit import AuditError
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.lwpolyline import LWPolyline
@@ -184,21 +183,10 @@ def _without_frame(entity: DXFEntity) -> DXFEntity:
 
 
 def _note_paper_space(document: Document, drawing: Drawing) -> None:
-    """Note what is in paper space, and where on its sheets."""
+    """Note the number of entities in paper space, by its layouts."""
     for layout in document.layouts:
-        if layout.is_modelspace:
-            continue
-        kinds = Counter(entity.dxftype() for entity in layout if entity.dxftype() != "VIEWPORT")
-        if not kinds:
-            continue
-        box = bbox.extents(
-            (entity for entity in islice(layout, MAX_CURVE_POINTS) if entity.dxftype() in LINES), fast=True
-        )
-        where = " from ({:g}, {:g}) to ({:g}, {:g})".format(*box.extmin.vec2, *box.extmax.vec2) if box.has_data else ""
-        drawing.notes.add_dropped(
-            f"paper_space_{shown(layout.name)}",
-            f"entities in paper space, layout {shown(layout.name)}: "
-            f"{', '.join(f'{count} {shown(kind)}' for kind, count in kinds.most_common(3))}{where}; move walls "
-            "to the model space (CHSPACE)",
-            kinds.total(),
-        )
+        count = 0 if layout.is_modelspace else sum(entity.dxftype() != "VIEWPORT" for entity in layout)
+        if count:
+            name = shown(layout.name)
+            told = f"entities in paper space, layout {name}; move walls to the model space (CHSPACE)"
+            drawing.notes.add_dropped(f"paper_space_{name}", told, count)

@@ -47,9 +47,6 @@ class Clip:
         return list(InvertedClippingPolygon2d(self.polygon, bounds).clip_polyline(line))
 
 
-Clips = tuple[Clip, ...]
-
-
 class Placed(NamedTuple):
     """An entity with its layers, those of the references that it is in first, what these clip, their blocks, its line.
 
@@ -58,7 +55,7 @@ class Placed(NamedTuple):
 
     entity: Any
     layers: tuple[str, ...]
-    clips: Clips = ()
+    clips: tuple[Clip, ...] = ()
     blocks: tuple[str, ...] = ()
     linetype: str = "Continuous"
 

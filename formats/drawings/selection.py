@@ -80,8 +80,7 @@ def lower_keys(properties: Mapping[str, Any]) -> dict[str, Any]:
 
 def kinds_of(properties: Mapping[str, Any]) -> str:
     """Return what an entity is, by its properties, such as ``indoor=wall``; empty where these do not say."""
-    named = [f"{key}={properties[key]}" for key in SEEN if isinstance(properties.get(key), str)]
-    return ", ".join(named)
+    return ", ".join(f"{key}={properties[key]}" for key in SEEN if isinstance(properties.get(key), str))
 
 
 def excluded_by(properties: Mapping[str, Any], where: tuple[str, ...]) -> tuple[str, str] | None:

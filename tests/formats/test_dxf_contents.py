@@ -108,8 +108,7 @@ def test_walls_in_paper_space(tmp_path: Path) -> None:
         sheet.add_line(a, b)
     sheet.add_text("Hall")
     message = refused(tmp_path, document)
-    assert "layout Layout1: 5 LINE, 1 TEXT from (0, 0) to (7, 6)" in message
-    assert "CHSPACE" in message
+    assert "entities in paper space, layout Layout1; move walls to the model space (CHSPACE) (6)" in message
 
 
 def test_an_external_reference(tmp_path: Path) -> None:

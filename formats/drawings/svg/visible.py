@@ -244,10 +244,8 @@ class Visible:
         link = element.get("href", element.get(LINK, "")).strip()
         target = self._by_id.get(link[1:]) if link.startswith("#") and len(link) > 1 else None
         if target is None or target in outer.copied or target is self._root:
-            why = "refers to itself" if target is not None else "refers to nothing in this file"
-            self._drawing.notes.add_dropped(
-                f"use_{'itself' if target is not None else 'nothing'}", f"use that {why}", 1
-            )
+            told = "use elements that refer to nothing in this file, or to themselves"
+            self._drawing.notes.add_dropped("use", told, 1)
             return
         measure = Measure(element, outer.viewport)
         moved = svgelements.Matrix.translate(measure.length("x", "x"), measure.length("y", "y")) * outer.matrix
