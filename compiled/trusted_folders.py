@@ -31,8 +31,7 @@ def why_untrusted(folder: Path) -> str | None:
             continue
         except OSError as error:
             return f"{path} cannot be looked at ({error.strerror}): expected a folder of this user"
-        found = _found(state, is_parent=path != whole)
-        if found is not None:
+        if found := _found(state, is_parent=path != whole):
             return f"{path} {found}: expected this user's own folder with mode 0755; chmod go-w, or name another folder"
     return None
 
