@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
@@ -88,34 +89,14 @@ def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix,
     assert linefix.done("locate", "corridor.json", "walls.json", "--json").answer["probability"] is None
 
 
-LASER_YAML = """header:
-  stamp:
-    sec: 12
-    nanosec: 5
-  frame_id: laser
-angle_min: {angle_min}
-angle_max: {angle_max}
-angle_increment: {increment}
-time_increment: 0.0
-scan_time: 0.0
-range_min: 0.05
-range_max: 30.0
-ranges:
-{ranges}
-intensities: []
----
-"""
-
-
 def laser_message() -> dict[str, Any]:
     """Return a LaserScan taken in the room, with a beam without return, one too near and an unknown one."""
     scanner = Scanner(beams=360, angle_increment=math.tau / 360)
     pose = RigidTransform(1.0, 1.0, 0.5)
     ranges = scan(Segments.from_array(ROOM), pose, scanner, np.random.default_rng(3)).ranges.tolist()
     ranges[10], ranges[200], ranges[300] = math.inf, -math.inf, math.nan
-    return {"angle_min": scanner.angle_min, "angle_increment": scanner.angle_increment, "range_max": 30.0} | {
-        "ranges": ranges
-    }
+    step = scanner.angle_increment
+    return {"angle_min": scanner.angle_min, "angle_increment": step, "range_max": 30.0, "ranges": ranges}
 
 
 def test_a_laser_scan_with_infinity_and_nan_is_read(linefix: Linefix, folder: Path) -> None:
@@ -130,23 +111,19 @@ def test_a_laser_scan_with_infinity_and_nan_is_read(linefix: Linefix, folder: Pa
         assert lasting(linefix.done("locate", "room.json", "laser.json", "--json").answer) == expected
 
 
-def echoed(ranges: list[str]) -> str:
-    message = laser_message()
-    step = message["angle_increment"]
-    return LASER_YAML.format(
-        angle_min=message["angle_min"],
-        angle_max=message["angle_min"] + 359 * step,
-        increment=step,
-        ranges="\n".join(f"- {value}" for value in ranges),
-    )
+def echoed(message: dict[str, Any], ranges: Any) -> str:
+    """Return a message with other ranges as `ros2 topic echo` prints it."""
+    header = {"stamp": {"sec": 12, "nanosec": 5}, "frame_id": "laser"}
+    last = message["angle_min"] + 359 * message["angle_increment"]
+    more = {"angle_max": last, "time_increment": 0.0, "scan_time": 0.0, "range_min": 0.05, "intensities": []}
+    return yaml.safe_dump({"header": header, **message, **more, "ranges": ranges}, sort_keys=False) + "---\n"
 
 
 def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> None:
     message = laser_message()
     known = {**message, "ranges": [r if math.isfinite(r) else None for r in message["ranges"]]}
-    bare = echoed([repr(r) for r in message["ranges"]])  # inf and nan, as rostopic echo prints them
-    dotted = echoed([repr(r) if math.isfinite(r) else repr(r).replace("inf", ".inf").replace("nan", ".nan")
-                     for r in message["ranges"]])  # fmt: skip
+    dotted = echoed(message, message["ranges"])
+    bare = dotted.replace(" .inf", " inf").replace("-.inf", "-inf").replace(".nan", "nan")  # of rostopic echo
     lost = "A message was lost!!!\n\ttotal count change:1\n\ttotal count: 1---\n"
     wrapped = json.dumps({"op": "publish", "topic": "/scan", "msg": known})
     for name, content in (
@@ -162,14 +139,14 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
     answer = linefix.done("locate", "room.json", "ros2.yaml", "--json").answer
     assert (answer["usable"], answer["stamp"]) == (True, {"sec": 12, "nanosec": 5})
     assert answer["pose"]["x"] == pytest.approx(1.0, abs=0.05)
-    (folder / "noarr.yaml").write_text(echoed([]).replace("ranges:", "ranges: '<array type: float32>'"))
+    (folder / "noarr.yaml").write_text(echoed(message, "<array type: float32>"))
     assert "without --noarr" in refused(linefix("locate", "room.json", "noarr.yaml"), 3)
     (folder / "table.csv").write_text("%time,field.header.seq,field.ranges0\n1,2,3.0\n")
     assert "table.csv: is not YAML" in refused(linefix("locate", "room.json", "table.csv"), 3)
 
 
 def test_ranges_that_ros2_topic_echo_has_cut_are_refused(linefix: Linefix, folder: Path) -> None:
-    (folder / "scan.yaml").write_text(echoed([*["2.0"] * 128, "'...'"]))
+    (folder / "scan.yaml").write_text(echoed(laser_message(), [*[2.0] * 128, "..."]))
     said = refused(linefix("locate", "room.json", "scan.yaml"), 3)
     assert "after 128 values" in said
     assert "--full-length" in said

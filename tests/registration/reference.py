@@ -164,9 +164,3 @@ def one_step_sums(
         total[:-1] += w * np.array([1.0, *v**2, v[0] * v[1], *point, c**2, a, a**2, *turn])
         total[-1] += 1.0
     return total
-
-
-def reliability(map_directions: Floats, weights: Floats) -> float:
-    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E."""
-    e = sum(w * np.outer(v, v) for v, w in zip(map_directions, weights, strict=True)) / sum(weights)
-    return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))
