@@ -49,13 +49,6 @@ def test_what_a_drawing_does_not_say_is_said_by_options(linefix: Linefix) -> Non
     assert answer["check"]["size"]["length"] == pytest.approx(14 * 0.3048)
 
 
-def test_the_file_and_the_option_are_named(linefix: Linefix, folder: Path) -> None:
-    (folder / "plan.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><rect width="4" height="3"/></svg>')
-    asked = ("map", "import", "plan.svg")
-    assert "linefix: plan.svg: does not state its unit" in refused(linefix(*asked), 3)
-    assert "linefix: --units: expected one of mm" in refused(linefix(*asked, "--units", "parsec"), 3)
-
-
 @pytest.mark.parametrize("where", ["here", "at a server"])
 def test_maps_are_stored_listed_and_forgotten(
     linefix: Linefix, folder: Path, patient: RunningService, where: str

@@ -70,7 +70,8 @@ REFUSED: dict[str, tuple[int, str]] = {
     "map put a/b floor.json": (2, "the id is not valid"),
     "map import nowhere.yaml": (2, "nowhere.yaml: there is no such file"),
     "map import broken.svg --units m": (3, "broken.svg: is not XML"),
-    "map import plan.csv --units parsec": (3, "--units: expected one of mm"),
+    "map import plan.svg": (3, "linefix: plan.svg: does not state its unit"),
+    "map import plan.csv --units parsec": (3, "linefix: --units: expected one of mm"),
     "map import plan.csv --point 99 99": (3, "--point: lies on a line or outside"),
     "map import plan.csv --out plan.dwg": (3, "plan.dwg: expected a name"),
     "map update floor.json": (2, "Missing argument"),
@@ -87,6 +88,7 @@ def _files(folder: Path) -> None:
     documents |= {"short.json": {"segments": [[0, 0, 0, 0]]}, "floor.json": {"segments": faces().tolist()}}
     texts = {name: json.dumps(one) for name, one in documents.items()}
     texts |= {"broken.json": '{"segments": 3', "broken.svg": "<svg", "empty.log": "# nothing\n", "drive.txt": ""}
+    texts["plan.svg"] = '<svg xmlns="http://www.w3.org/2000/svg"><rect width="4" height="3"/></svg>'
     for name, text in texts.items():
         (folder / name).write_text(text)
     (folder / "utf-16.json").write_text(texts["scan.json"], encoding="utf-16")

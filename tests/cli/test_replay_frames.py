@@ -20,7 +20,7 @@ from tests.running import RunningService
 from vectorization import LaserScan
 
 from .drives import write_log
-from .running import Ended, Linefix, refused
+from .running import Ended, Linefix
 
 SCANS = 4
 MOUNT = RigidTransform(0.4, -0.2, 1.2)
@@ -108,12 +108,6 @@ def test_where_a_server_refuses_every_scan_so_is_the_log(
     ended = linefix(*asked)
     assert [line["usable"] for line in lines(ended, 3)] == [False] * SCANS
     assert "at most 100 ranges" in ended.err
-
-
-def test_a_map_that_is_refused_ends_it_at_once(linefix: Linefix, folder: Path) -> None:
-    with_wrong_map = ("replay", "drive.log", "--map", "short.json", "--json")
-    (folder / "short.json").write_text('{"segments": [[0, 0, 0, 0]]}')
-    assert "short.json: /segments/0: is shorter" in refused(linefix(*with_wrong_map), 3)
 
 
 def test_what_comes_before_the_place_where_a_log_is_broken_counts(linefix: Linefix, folder: Path) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rosbags.rosbag2 import Writer
 
 from cli.inputs import FILES
 from formats import MAP_SUFFIXES
 from linefix.documents import examples
-from tests.formats.bags import GRID, TYPES, grid_bytes
+from tests.formats.bags import GRID, TYPES, grid_bytes, room_cells
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
@@ -79,12 +78,9 @@ def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None
 
 
 def test_the_folder_of_a_bag_is_one_map(linefix: Linefix, files: Path) -> None:
-    cells = np.full((50, 60), -1)
-    cells[9:41, 9:51] = 100
-    cells[10:40, 10:50] = 0
     with Writer(files.parent / "bag", version=8) as writer:
         maps = writer.add_connection("/map", GRID, typestore=TYPES["cdr"])
-        writer.write(maps, 0, grid_bytes(cells))
+        writer.write(maps, 0, grid_bytes(room_cells()))
     answer = linefix.done("locate", "bag", "floors/hall.json", "scan.json", "--json").answer
     assert {one["map_id"] for one in answer["maps"]} == {"bag", "hall"}
 

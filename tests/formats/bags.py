@@ -104,6 +104,14 @@ class Messages:
         return bytes((store.serialize_ros1 if self.encoding == "ros1" else store.serialize_cdr)(message, kind))
 
 
+def room_cells() -> Any:
+    """Return the cells of a grid of a room of 4 by 3 m."""
+    cells = np.full((50, 60), -1)
+    cells[9:41, 9:51] = 100
+    cells[10:40, 10:50] = 0
+    return cells
+
+
 scan_bytes, grid_bytes = Messages().scan, Messages().grid
 
 

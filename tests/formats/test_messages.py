@@ -13,15 +13,8 @@ import pytest
 from formats import ImportedMap, ImportOptions, IncompleteFileError, Log, MalformedFileError, read_log, read_map
 from vectorization import LaserScan
 
-from .bags import BEGUN, GRID, SECOND, USUAL, Laser, Recording, grid_bytes, scan_bytes
+from .bags import BEGUN, GRID, SECOND, USUAL, Laser, Recording, grid_bytes, room_cells, scan_bytes
 from .reading import counts, notes
-
-
-def room() -> Any:
-    cells = np.full((50, 60), -1)
-    cells[9:41, 9:51] = 100
-    cells[10:40, 10:50] = 0
-    return cells
 
 
 def inflated(cells: Any) -> Any:
@@ -36,7 +29,7 @@ def inflated(cells: Any) -> Any:
     return cost
 
 
-MAP, COSTS = room(), inflated(room())
+MAP, COSTS = room_cells(), inflated(room_cells())
 
 
 def read(recording: Recording, grids: dict[str, Any], times: int = 1) -> ImportedMap:

@@ -10,13 +10,12 @@ from typing import Any
 from urllib.parse import quote
 
 import ezdxf
-import numpy as np
 import pytest
 
 from linefix.documents.errors import InvalidRequestError
 from service.errors import ServiceError
 from service.importing.reader import Bounds, read_files
-from tests.formats.bags import GRID, Robots
+from tests.formats.bags import GRID, Robots, room_cells
 
 from .forms import SQUARE, TYPE, YAML, form, room_grid
 
@@ -27,9 +26,7 @@ BOUNDS = Bounds(1_000_000_000, 32_000_000, 200_000)
 def elsewhere(tmp_path: Path) -> Path:
     """Return a bag of SQLite that lies on this machine, and was not sent."""
     bag = Robots("sqlite3", tmp_path)
-    cells = np.zeros((60, 80))
-    cells[[0, -1]] = cells[:, [0, -1]] = 100
-    bag.write("/map", GRID, 1, bag.messages.grid(cells))
+    bag.write("/map", GRID, 1, bag.messages.grid(room_cells()))
     (path,) = bag.done().glob("*.db3")
     return path
 
