@@ -82,18 +82,6 @@ def bounds(pieces: Records) -> list[tuple[int, int]]:
     return [(int(piece["first"]), int(piece["end"])) for piece in pieces]
 
 
-@settings(deadline=None, max_examples=100)
-@given(
-    values=st.lists(st.floats(0.0, 9.0) | st.sampled_from([1.0, 2.0]), min_size=1, max_size=60), place=st.floats(0, 1)
-)
-def test_select(values: list[float], place: float) -> None:
-    k, got = int(place * (len(values) - 1)), np.array(values)
-    beams.select(got, k)
-    assert got[k] == np.partition(values, k)[k]
-    assert got[:k].max(initial=-1.0) <= got[k] <= got[k:].min()
-    assert sorted(got) == sorted(values)
-
-
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, increment=st.sampled_from([0.0, 0.01]), max_gap=st.sampled_from([0.05, math.inf]))
 def test_gaps_are_where_the_twin_finds_them(seed: int, increment: float, max_gap: float) -> None:

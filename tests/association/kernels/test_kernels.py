@@ -73,33 +73,6 @@ def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
     return MeasuredSegments(segments, lines["sigma"], lines["points"], centroids, lines["spread"], counted)
 
 
-def joined(
-    measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE, *, directed: bool = True
-) -> tuple[list[int], Records]:
-    """Return the line of each segment, and the lines."""
-    labels, lines = join_lines(given_of(measured), np.array([[lateral, cosine]]), measured.counted, directed)
-    return labels.tolist(), lines
-
-
-def same_groups(one: list[int], other: list[int]) -> bool:
-    """Return whether labels mean the same groups, whatever their numbers are."""
-    return [one.index(label) for label in one] == [other.index(label) for label in other]
-
-
-@given(SEEDS)
-@settings(max_examples=60, deadline=None)
-def test_collinear_segments(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    ends = in_pieces(rng)
-    turned = rng.random(len(ends)) < 0.3
-    ends[turned] = ends[turned][:, [2, 3, 0, 1]]
-    measured = measured_of(rng, ends)
-    for lateral, cosine in ((LINE_LATERAL, LINE_COSINE), (CUT_LATERAL, CUT_COSINE)):
-        for directed in (True, False):
-            expected = twin.collinear_segments(measured, lateral, cosine, directed=directed)
-            assert same_groups(joined(measured, lateral, cosine, directed=directed)[0], expected)
-
-
 @pytest.mark.parametrize(
     ("ends", "points", "expected"),
     [
@@ -116,7 +89,7 @@ def test_collinear_segments(seed: int) -> None:
 )
 def test_points_of_a_line(ends: list[list[float]], points: list[float] | None, expected: float) -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.03, points)
-    (line,) = joined(measured)[1]
+    (line,) = join_lines(given_of(measured), np.array([[LINE_LATERAL, LINE_COSINE]]), measured.counted, True)[1]
     assert line["variance"] == pytest.approx(0.03**2 / expected)
 
 
@@ -128,17 +101,21 @@ def assert_rows(got: Records, expected: Records, rtol: float) -> None:
     assert_records(got, expected, rtol=rtol, atol=1e-9)
 
 
+@pytest.mark.parametrize("directed", [True, False])
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
-def test_lines_of_a_view(seed: int) -> None:
+def test_lines_of_a_view(directed: bool, seed: int) -> None:
     """First what was cut is joined, then what lies about on a line; the longest comes first."""
-    rng, options = np.random.default_rng(seed), AssociationOptions()
-    measured = measured_of(rng, in_pieces(rng))
-    cut = twin.collinear_segments(measured, CUT_LATERAL, CUT_COSINE)
+    rng, options = np.random.default_rng(seed), AssociationOptions(oriented=directed)
+    ends = in_pieces(rng)
+    turned = rng.random(len(ends)) < 0.3
+    ends[turned] = ends[turned][:, [2, 3, 0, 1]]
+    measured = measured_of(rng, ends)
+    cut = twin.collinear_segments(measured, CUT_LATERAL, CUT_COSINE, directed=directed)
     once = as_measured(twin.join_segments(replace(measured, counted=True), cut), counted=measured.counted)
     if len(once) == len(measured):
         once, cut = measured, list(range(len(measured)))
-    apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE)
+    apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE, directed=directed)
     variances, model = variances_of(0.01, options, with_beams=False)
     order, expected = twin.describe_lines(twin.join_segments(once, apart), variances[0], model[0])
     lines = ScanLines.of(Scan(measured), 0.01, options)
