@@ -191,21 +191,6 @@ UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, 
     "no mount": (messages.TFMessage, scan(1), 'no transform from "laser" to "base_link"'),
     "no step": (mount, replace(scan(1), angle_increment=0.0), 'the scan of "laser" cannot be used'),
     "no frame": (mount, replace(scan(1), header=messages.Header(messages.Time(1))), "empty frame_id"),
-    "optical": (
-        lambda: transform("base_link", "laser", rotation=messages.Quaternion(-0.5, 0.5, -0.5, 0.5)),
-        scan(1),
-        '"laser" is tilted by 90 degrees',
-    ),
-    "angles that contradict each other": (
-        mount,
-        replace(scan(1), angle_max=-scan(1).angle_min / 2),
-        'the scan of "laser" cannot be used: angle_max: angle_min -3.14159 rad, angle_max',
-    ),
-    "degrees": (
-        mount,
-        replace(scan(1), angle_min=-180.0, angle_max=179.5, angle_increment=0.5),
-        "Check for degrees in the driver",
-    ),
     "nothing but unknown ranges": (mount, replace(scan(1), ranges=[math.nan] * 720), "none of 720 ranges is a number"),
     "no range": (mount, replace(scan(1), ranges=[]), "expected at least one range, found none"),
     "steep": (

@@ -22,14 +22,6 @@ def test_the_command_has_the_defaults_of_the_node() -> None:
     assert found == {name: getattr(NodeOptions(), name) for name in found} | {"map_topic": "map"}
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("scan", "/r1/scan"), ("/scan", "/scan"), ("front/scan", "/r1/front/scan"), ("~/pose", "/r1/linefix/pose")],
-)
-def test_a_relative_name_is_in_the_namespace(name: str, expected: str) -> None:
-    assert absolute_name(name, "/r1") == expected
-
-
 def test_remappings_hold_for_relative_and_absolute_names() -> None:
     rules = dict(map(remapping_of, ["scan:=/front", "/tf:=tf", "initialpose:=pose_in"]))
     options = NodeOptions(namespace="/r1", remappings=rules)
@@ -38,6 +30,8 @@ def test_remappings_hold_for_relative_and_absolute_names() -> None:
     assert options.topic("/tf") == "/r1/tf"
     assert options.topic("initialpose") == "/r1/pose_in"
     assert options.topic("odom") == "/r1/odom"
+    assert options.topic("front/scan") == "/r1/front/scan"
+    assert options.topic("~/pose") == "/r1/linefix/pose"
     for rule in ("scan", "scan:=", ":=x", "a=b"):
         with pytest.raises(OptionError, match="FROM:=TO"):
             remapping_of(rule)

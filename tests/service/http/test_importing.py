@@ -14,7 +14,6 @@ from PIL import Image
 
 from formats import read_map
 from linefix.documents import examples
-from tests.running import RunningService
 from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
 
 URL = "/v1/maps:import"
@@ -68,14 +67,11 @@ def test_a_picture_of_a_hundred_million_pixels(client: httpx.Client) -> None:
     assert "pixels" in refused(send(client, {"a.yaml": YAML % b"a.png", "a.png": bomb}), 413, "too_large")
 
 
-def test_a_body_is_held_to_what_every_body_is(client: httpx.Client, guarded: RunningService) -> None:
+def test_a_body_is_held_to_what_every_body_is(client: httpx.Client) -> None:
     packed = gzip.compress(form({"a.csv": b"0" * 40_000_000}))
-    told = {"content-type": TYPE}
-    answer = client.post(URL, content=packed, headers={**told, "content-encoding": "gzip"})
+    answer = client.post(URL, content=packed, headers={"content-type": TYPE, "content-encoding": "gzip"})
     assert "bytes, unpacked" in refused(answer, 413, "too_large")
     assert "multipart/form-data" in refused(client.post(URL, content=b"{}"), 415, "unsupported_media_type")
-    assert guarded.client.post(URL, content=bytes(form({})), headers=told).status_code == 401
-    assert client.get(URL).status_code == 405
     assert client.get("/livez").status_code == 200
 
 

@@ -104,10 +104,6 @@ LASERS = [
     ({"header": {"stmp": 1}}, "/header/stmp", UNKNOWN),
     # A driver that sets one of the angles wrong turns, mirrors or stretches its scans.
     ({"angle_max": -0.4}, "/angle_max", ANGLES),
-    ({"angle_max": 22.9}, "/angle_max", ANGLES),
-    ({"angle_max": 0.6}, "/angle_max", ANGLES),
-    ({"angle_max": 0.4, "angle_increment": -0.1}, "/angle_max", ANGLES),
-    ({"angle_max": 0.4, "angle_increment": 0.05}, "/angle_max", ANGLES),
     ({"angle_max": 0.4, "ranges": [2.0] * 18}, "/angle_max", ANGLES),
 ]
 ONE_OF_SCANS = "expected exactly one of segments, laser, points and views"
