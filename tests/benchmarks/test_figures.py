@@ -47,19 +47,16 @@ def quote(shown: str, unit: str = "") -> Quote:
 
 
 @pytest.mark.parametrize("document", documents(), ids=lambda path: path.name)
-def test_quoted_figures_are_those_of_the_file(document: Path) -> None:
+def test_every_figure_of_quality_or_speed_is_quoted_as_it_is_in_the_file(document: Path) -> None:
     assert [fault for one in quotes(document) if (fault := wrong(one, results()))] == []
-
-
-@pytest.mark.parametrize("document", documents(), ids=lambda path: path.name)
-def test_every_figure_of_quality_or_speed_is_quoted(document: Path) -> None:
     text = PRINTED.sub("", QUOTED.sub("", document.read_text()))
     allowed = SETTINGS.get(str(document.relative_to(ROOT)), [])
     assert [found[0] for found in MEASURED.finditer(text) if found[0] not in allowed] == []
 
 
-def test_the_documents_quote_many() -> None:
+def test_the_documents_have_many_quotes_and_tables() -> None:
     assert sum(1 for document in documents() for _ in quotes(document)) > 40
+    assert any("<!-- table: localization -->" in page.read_text() for page in pages_with_tables())
 
 
 def test_every_run_names_its_origin() -> None:
@@ -100,10 +97,6 @@ def test_a_figure_that_differs_is_found_and_corrected(tmp_path: Path, monkeypatc
 @pytest.mark.parametrize("page", pages_with_tables(), ids=lambda path: path.name)
 def test_tables_are_those_of_the_file(page: Path) -> None:
     assert list(wrong_tables(page, results())) == []
-
-
-def test_some_page_has_tables() -> None:
-    assert any("<!-- table: localization -->" in page.read_text() for page in pages_with_tables())
 
 
 def test_a_table_that_differs_is_found_and_filled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

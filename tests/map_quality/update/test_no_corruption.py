@@ -23,6 +23,7 @@ from .hall import PILLAR, RACK, SCANNER, box, segments, update, visit
 
 HALL = segments(RACK, PILLAR)
 TODAY = segments(PILLAR)
+OTHER = [[0.0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10], [11, 10, 0, 10], [0, 10, 0, 0]]  # another building
 
 
 def days(
@@ -50,9 +51,7 @@ def test_scans_of_a_mirrored_laser_change_nothing() -> None:
 
 
 def test_scans_of_another_building_change_nothing_and_the_visits_are_named() -> None:
-    other = Segments.from_array(np.array([*box(1, 1, 4, 3), [0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10],
-                                          [11, 10, 0, 10], [0, 10, 0, 0]], dtype=float))  # fmt: skip
-    found = update(index(), days(other))
+    found = update(index(), days(Segments.from_array(np.array([*box(1, 1, 4, 3), *OTHER]))))
     assert found.changes == ()
     assert [one.visit for one in found.refused_visits] == ["day 0", "day 1", "day 2"]
     assert "usable" in found.refused_visits[0].message
@@ -60,8 +59,7 @@ def test_scans_of_another_building_change_nothing_and_the_visits_are_named() -> 
 
 def test_a_visit_counts_though_most_of_its_scans_are_off_the_map() -> None:
     """As where the map shows a part of the building."""
-    other = Segments.from_array(np.array([[0, 0, 15, 0], [15, 0, 15, 4], [15, 4, 11, 10], [11, 10, 0, 10],
-                                          [0, 10, 0, 0]], dtype=float))  # fmt: skip
+    other = Segments.from_array(np.array(OTHER))
     with_a_cart = MapIndex.build(segments(RACK, PILLAR, box(6.0, 5.0, 7.2, 5.8)), 0.005)
     found = update(with_a_cart, [*days(HALL), *days(other) * 2])
     assert found.refused_visits == ()

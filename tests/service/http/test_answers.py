@@ -223,9 +223,8 @@ def test_a_map_s_directions_count_unless_the_request_says_otherwise(client: http
 def test_a_bad_scan_in_a_batch_is_one_error_item(client: httpx.Client) -> None:
     """A prior, or a view that is wrong, too; the others are answered as they are alone."""
     rows = {"segments": [[0, 0, 1, 0], [1, 2, 3]]}
-    scans = [VIEW, rows, {"segments": examples.SEEN}, 5, {"views": [VIEW, {**VIEW, "relative_to": 5}]}]
+    scans = [{"views": [VIEW]}, rows, {"segments": examples.SEEN}, 5, {"views": [VIEW, {**VIEW, "relative_to": 5}]}]
     priors = [None, None, {**AT, "radius": "far", "angle": 1}, None, None]
-    scans[0] = {"views": [VIEW]}
     results = answered(client, BATCH, map=of_map(None), scans=scans, priors=priors)["results"]
     assert [one["index"] for one in results] == [*range(5)]
     assert [one["status_code"] for one in results] == [200, 422, 422, 422, 422]
