@@ -26,11 +26,6 @@ def answered(client: httpx.Client, path: str, body: Any = None, /, **parts: Any)
     return response.json()
 
 
-def associated(client: httpx.Client, **parts: Any) -> Any:
-    """Return the answer to the example, with parts in place of its own."""
-    return answered(client, "/v1/associate", examples.ASSOCIATE, **parts)
-
-
 def pose_json(at: RigidTransform) -> dict[str, float]:
     return {"x": at.x, "y": at.y, "theta": at.theta}
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Deadline, MapIndex
 from linefix import LaserScan, scan_of
 from map_quality import MapUpdate, VisitScan, finished, updating
 from registration import RigidTransform, Segments
@@ -55,16 +55,9 @@ def visit(
     return out
 
 
-def update(
-    index: MapIndex,
-    scans: Sequence[VisitScan],
-    deadline: Deadline | None = None,
-    *,
-    accept: float | None = None,
-    refuse: Collection[int] = (),
-) -> MapUpdate:
-    """Take all steps of an update."""
-    return finished(updating(index, scans, deadline, accept=accept, refuse=refuse))
+def update(*asked: Any, **options: Any) -> MapUpdate:
+    """Take all steps of `updating`."""
+    return finished(updating(*asked, **options))
 
 
 def told(update: MapUpdate) -> list[tuple[str, tuple[int, ...]]]:

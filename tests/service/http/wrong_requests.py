@@ -48,7 +48,6 @@ OPTIONS = [
     ([], "", ""),
 ]
 AT = {"x": 0.0, "y": 0.0, "theta": 0.0}
-DEGREES = "radians, found degrees"
 PRIORS = [
     (AT, "", "expected exactly one of covariance, or radius with angle"),
     ({**AT, "radius": 1, "covariance": []}, "", "expected exactly one of covariance, or radius with angle"),
