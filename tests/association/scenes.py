@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
@@ -53,6 +56,18 @@ BEAMS = 360
 REACH = 20.0  # m
 PERIOD = 0.1  # s, of one scan
 NOISE = 0.01  # m
+
+
+@contextmanager
+def allocates_less_than(count: float) -> Iterator[None]:
+    """Fail where the block holds this many bytes at a time."""
+    tracemalloc.start()
+    try:
+        yield
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < count
 
 
 def pose(x: float = 0.0, y: float = 0.0, theta: float = 0.0) -> RigidTransform:

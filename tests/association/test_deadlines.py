@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
@@ -30,6 +29,7 @@ from .scenes import (
     INSIDE,
     ROOM,
     Floats,
+    allocates_less_than,
     answer_of,
     as_json,
     equal_rooms,
@@ -230,10 +230,5 @@ def test_an_answer_takes_little_memory() -> None:
     scan = scan_of(ends, viewpoint=(0.0, 0.0))
     first = answer_of(index, scan)
     assert len(ends) > 150
-    tracemalloc.start()
-    try:
+    with allocates_less_than(48e6):
         assert as_json(answer_of(index, scan)) == as_json(first)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 48e6

@@ -7,8 +7,8 @@ holds little, whatever the map, and ends wherever it is cancelled.
 from __future__ import annotations
 
 import time
-import tracemalloc
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from association import CancelledError, Deadline, IndexingEndedError, MapIndex
 from map_quality import check_map
 from registration import Segments
 from registration.layout import Floats
+from tests.association.scenes import allocates_less_than
 
 COUNT = 40_000
 MOST_HELD = 100_000_000  # bytes in addition to the index
@@ -82,15 +83,8 @@ class Looks(Deadline):
 def test_a_check_holds_little(kind: str) -> None:
     """Until the search of views, which has a deadline of its own."""
     index = MapIndex.build(Segments.from_array(MAPS[kind]()))
-    tracemalloc.start()
-    try:
+    with allocates_less_than(MOST_HELD), suppress(CancelledError):
         check_map(index, Looks(most=4_000))
-    except CancelledError:
-        pass
-    finally:
-        held = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-    assert held < MOST_HELD
 
 
 def test_a_check_is_given_up_wherever_it_is_cancelled() -> None:

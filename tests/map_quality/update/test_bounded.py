@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from association import Deadline, MapIndex
 from map_quality.update.beams import Chunks, follow
 from map_quality.update.scans import Localized, search
 from registration import Segments
+from tests.association.scenes import allocates_less_than
 
 from .hall import PILLAR, RACK, SCANNER, segments, update, visit
 
@@ -37,15 +37,10 @@ def test_memory_is_that_of_what_the_scans_see() -> None:
     index = MapIndex.build(walls, SIGMA)
     scans = [one for k in range(10) for one in visit(segments(PILLAR), f"day {k}", k)[::3]]
     update(index, scans, Deadline())
-    tracemalloc.start()
-    try:
+    with allocates_less_than(100e6):  # the index takes half of it
         found = update(index, scans)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
     assert [one.segments for one in found.changes] == [(12, 13, 14, 15)]
     assert len(found.sharpened.segments) > 8
-    assert peak < 100e6  # the index takes half of it
 
 
 def test_memory_is_bounded_where_thousands_of_beams_pass_thousands_of_walls() -> None:
@@ -54,14 +49,9 @@ def test_memory_is_bounded_where_thousands_of_beams_pass_thousands_of_walls() ->
     localized = Localized(0, one, search(MapIndex.build(hall, SIGMA), one, Deadline()), False)
     y = np.linspace(0.1, 7.9, 12_000)
     walls = Chunks.of(Segments.from_array(np.stack([np.full_like(y, 0.1), y, np.full_like(y, 11.9), y], axis=1)))
-    tracemalloc.start()
-    try:
+    with allocates_less_than(100e6):
         seen = follow(walls, localized, SIGMA, Deadline(), oriented=True)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
     assert seen.counts[:, 0].sum() > 10_000
-    assert peak < 100e6
 
 
 @pytest.mark.parametrize("looks", [1, 30, 100, 300, 1000])
