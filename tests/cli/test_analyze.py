@@ -17,12 +17,10 @@ BOX = [[1, 1, 1, 2], [1, 2, 2, 2], [2, 2, 2, 1], [2, 1, 1, 1]]
 TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (tmp_path / "two.json").write_text(json.dumps({"segments": TWO}))
-    (tmp_path / "box.json").write_text(json.dumps(BOX))
-    return tmp_path
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "two.json").write_text(json.dumps({"segments": TWO}))
+    (folder / "box.json").write_text(json.dumps(BOX))
 
 
 @pytest.mark.long

@@ -30,8 +30,6 @@ def lasting(answer: Any) -> dict[str, Any]:
 
 @pytest.fixture(autouse=True)
 def _files(folder: Path) -> None:
-    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (folder / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
     (folder / "pairs.json").write_text(json.dumps([[0, 0], [1, 1], [2, 3], [3, 4]]))
     (folder / "points.json").write_text(json.dumps({"points": POINTS, "frame_id": "front"}))
 

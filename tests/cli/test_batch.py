@@ -11,14 +11,13 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from tests.batch.logs import rows, write_log, write_room
+from tests.batch.logs import rows, write_log
 
 from .running import Linefix
 
 
 def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 30)
-    write_room(tmp_path)
     asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "out/poses.parquet", "--block", "10")
     ended = linefix(*asked, "--workers", "1")
     assert pq.read_schema(tmp_path / "out/poses.parquet").names[:5] == ["log", "index", "stamp", "map_id", "status"]
@@ -26,9 +25,8 @@ def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, l
     told = [line.split() for line in ended.out.splitlines()]
     assert ["scans", "30"] in told
     assert ["ok", "30"] in told
-    assert [(row["index"], row["status"]) for row in rows(tmp_path / "out/poses.parquet")] == [
-        (k, "ok") for k in range(30)
-    ]
+    written = [(row["index"], row["status"]) for row in rows(tmp_path / "out/poses.parquet")]
+    assert written == [(k, "ok") for k in range(30)]
 
 
 def test_a_missing_extra_is_named_with_its_package() -> None:
@@ -42,19 +40,16 @@ def test_a_missing_extra_is_named_with_its_package() -> None:
 @pytest.mark.long
 def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 400)
-    write_room(tmp_path)
     asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "poses.parquet", "--block", "5", "--workers", "1")
     command = [sys.executable, "-c", "from cli.entry import main; main()", *asked]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment)
-    parts = tmp_path / "poses.parquet.parts" / "poses"
-    while process.poll() is None and len(list(parts.glob("*.parquet"))) < 1:
+    while process.poll() is None and not any((tmp_path / "poses.parquet.parts" / "poses").glob("*.parquet")):
         time.sleep(0.005)
     process.kill()
     process.wait()
     assert not (tmp_path / "poses.parquet").exists()
-    ended = linefix(*asked, "--json")
-    told = ended.answer
+    told = linefix.done(*asked, "--json").answer
     assert (told["scans"], told["taken_over"] >= 5) == (400, True)
     assert [row["index"] for row in rows(tmp_path / "poses.parquet")] == list(range(400))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json", "scan.json"]

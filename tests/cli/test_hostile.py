@@ -10,19 +10,13 @@ from linefix_client import Client, ProblemError, UnreachableError
 from linefix_client import asking as requests
 
 from cli import asking
-from tests.batch.logs import ROOM, SEEN
+from tests.batch.logs import ROOM
 from tests.formats.bags import BEGUN, Recording
 from tests.running import sending
 
 from .running import Linefix, refused
 
 MARK = b"\xef\xbb\xbf"
-
-
-@pytest.fixture(autouse=True)
-def _files(folder: Path) -> None:
-    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (folder / "scan.json").write_text(json.dumps({"segments": SEEN}))
 
 
 ENDLESS = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n"
@@ -86,17 +80,14 @@ def test_an_answer_of_another_shape_is_named(
         assert "check the URL" in line
 
 
-@pytest.mark.parametrize("body", [b"{}", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b'{"detail": []}'])
-def test_a_refusal_of_another_shape_ends_a_command(linefix: Linefix, body: bytes) -> None:
-    head = b"HTTP/1.1 422 No\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
-    with sending(head % len(body) + body) as (url, _):
+@pytest.mark.parametrize(
+    "body", [b"{}", b"[]", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b'{"detail": []}', b"<html>"]
+)
+def test_a_refusal_of_another_shape_ends_a_command_and_is_a_problem(linefix: Linefix, body: bytes) -> None:
+    head = b"HTTP/1.1 %d No\r\nConnection: close\r\nRetry-After: \xb2\r\nContent-Length: %d\r\n\r\n"
+    with sending(head % (422, len(body)) + body) as (url, _):
         refused(linefix("locate", "hall", "scan.json", "--server", url), 3)
-
-
-@pytest.mark.parametrize("body", [b"[]", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b"<html>"])
-def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
-    head = b"HTTP/1.1 429 No\r\nRetry-After: \xb2\r\nContent-Length: %d\r\n\r\n"
-    with sending(head % len(body) + body) as (url, _), Client(url, retries=0) as client:
+    with sending(head % (429, len(body)) + body) as (url, _), Client(url, retries=0) as client:
         with pytest.raises(ProblemError) as told:
             client.version()
         assert told.value.status == 429

@@ -29,7 +29,6 @@ def seen(count: int) -> list[Laser]:
 
 
 def write(folder: Path, lasers: list[Laser]) -> None:
-    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
     recording = Recording(folder / "drive.mcap")
     for k, laser in enumerate(lasers):
         at = BEGUN + k * SECOND
@@ -80,7 +79,7 @@ def test_a_batch_keeps_what_was_assumed_of_its_logs(linefix: Linefix, folder: Pa
     ended = linefix.done(*BATCH[:1], "one.mcap", *BATCH[1:])
     rows = [line.split() for line in ended.out.splitlines()]
     assert ["usable", "5"] in rows
-    assert [(row[0], row[-2:]) for row in rows if "range_max" in row[1:4]] == [("assumed", ["5", "2"])]
+    assert [(*row[:2], *row[-2:]) for row in rows if "range_max" in row[2:3]] == [("one.mcap", "assumed", "5", "2")]
 
 
 def test_the_grid_of_a_recording_that_is_the_map_is_named(linefix: Linefix, folder: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from association import AssociationOptions
 from cli.options import UsableOptions
-from tests.batch.logs import ROOM, SEEN, rows
+from tests.batch.logs import rows
 from tests.batch.logs import write_log as write_table
 from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
@@ -23,8 +23,6 @@ HALF, SURE = ("--on-map", "0.5"), ("--on-map", "1")
 
 @pytest.fixture(autouse=True)
 def _files(folder: Path) -> None:
-    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (folder / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
     (folder / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
     write_log(folder / "drive.log", 1)
     write_table(folder / "scans.parquet", 1)
