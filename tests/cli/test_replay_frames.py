@@ -89,7 +89,8 @@ def test_a_scan_that_a_server_refuses_is_a_row_and_the_replay_goes_on(
     rows = (folder / "drive.log").read_text().splitlines()
     words = rows[2].split()
     beams = int(words[8])
-    rows[2] = " ".join([*words[:4], "0.01", *words[5:8], str(beams + 9), *["1.0"] * 9, *words[9:]])
+    words[3:5] = str(0.01 * (beams + 8)), "0.01"
+    rows[2] = " ".join([*words[:8], str(beams + 9), *["1.0"] * 9, *words[9:]])
     (folder / "drive.log").write_text("\n".join(rows) + "\n")
     asked = (*ASKED, "--server", start_service(max_beams=beams).url)
     found = lines(linefix(*asked, "--json"))

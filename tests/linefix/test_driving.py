@@ -55,7 +55,7 @@ def look(at: RigidTransform, *, clutter: int = 0, seed: int = 5, with_beams: boo
     return Scan(measured, (0.0, 0.0), beams)
 
 
-def drive(clutter: int = 20, *, with_beams: bool = False) -> list[View]:
+def drive(clutter: int = 12, *, with_beams: bool = False) -> list[View]:
     """Return a drive to INSIDE, the latest view first; the others see so many things that are on no map."""
     views = [View(look(RigidTransform(0, 0, 0), with_beams=with_beams))]
     for k in range(1, 4):

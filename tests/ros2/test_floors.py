@@ -129,7 +129,7 @@ def test_a_file_of_parameters_names_the_maps(domain: int, tmp_path: Path) -> Non
     maps = ", ".join(str(tmp_path / f"{name}.json") for name in FLOORS)
     parameters.write_text(f"linefix:\n  ros__parameters:\n    agree: 1\n    maps: [{maps}]\n")
     with bridge("--namespace", "file", "--params-file", str(parameters)) as started:
-        assert b"; maps hq-1, hq-2; " in started.logged
+        assert b"; map: hq-1, hq-2; " in started.logged
         robot = Rider(domain, "/file")
         for floor in ("hq-1", "hq-2"):
             robot.until_on(floor)

@@ -6,6 +6,7 @@ import re
 from base64 import b64encode
 from hashlib import sha256
 from importlib.resources import files
+from os import stat_result
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -18,7 +19,7 @@ from ..exchange import JSON, Admitted
 router = APIRouter(include_in_schema=False)
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _POLICY = (
-    "default-src 'none'; script-src 'self' {scripts}; style-src 'self' {styles}; img-src 'self' data:; "
+    "default-src 'none'; script-src 'self'{scripts}; style-src 'self'{styles}; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _START = files("service.page").joinpath("built", "index.html").read_text()
@@ -26,6 +27,10 @@ _START = files("service.page").joinpath("built", "index.html").read_text()
 
 class PageFiles(StaticFiles):
     """Files of the page, which a browser requests each time: a newer service has newer ones."""
+
+    def lookup_path(self, path: str) -> tuple[str, stat_result | None]:
+        """Find a file, but not the page itself, which has headers of its own."""
+        return ("", None) if path in ("index.html", "manifest.json") else super().lookup_path(path)
 
     def file_response(self, *file: Any, **how: Any) -> Response:
         """Return a file, or that it is unchanged."""
@@ -62,12 +67,12 @@ async def docs() -> HTMLResponse:
         swagger_css_url="/docs/assets/swagger-ui.css",
         swagger_favicon_url="/docs/assets/favicon.png",
     )
-    return _page(bytes(page.body).decode(), styles="'unsafe-inline'")
+    return _page(bytes(page.body).decode(), styles=" 'unsafe-inline'")
 
 
 def _page(text: str, styles: str = "") -> HTMLResponse:
     """Return a page that runs nothing but files next to it and its own scripts, and stands in no other."""
     digests = (b64encode(sha256(script.encode()).digest()).decode() for script in _SCRIPT.findall(text))
-    policy = _POLICY.format(scripts=" ".join(f"'sha256-{digest}'" for digest in digests), styles=styles)
+    policy = _POLICY.format(scripts="".join(f" 'sha256-{digest}'" for digest in digests), styles=styles)
     headers = {"Content-Security-Policy": policy, "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
     return HTMLResponse(text, headers={**headers, "Cross-Origin-Opener-Policy": "same-origin"})
