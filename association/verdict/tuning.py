@@ -37,9 +37,9 @@ MOST_UNMATCHED = 16.0  # m, tables; more clutter says no more
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
-# Of the first explanation or a similar place, at even odds of being elsewhere; tables. Of held-out scans, two thirds of
-# those from other kinds of buildings are below it, and 1 in 200 of the right answers, none of which is usable.
-NO_MATCH_PROBABILITY = 0.15
+# Of the first explanation or a similar place, at even odds of being elsewhere; tables. Of held-out scans, half of those
+# from other kinds of buildings are below it, and 1 in 400 of the right answers, none of which is usable.
+NO_MATCH_PROBABILITY = 0.1
 CONTRADICTED = 0.5  # the greatest probability of an answer then
 FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 NO_ALTERNATIVE = 0.99  # tables; an answer that is so probable among its alternatives has none
