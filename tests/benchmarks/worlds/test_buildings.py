@@ -1,4 +1,4 @@
-"""Drawn buildings have free sides, and a clean scan shows its map. What else is drawn is pinned by `test_as_drawn`."""
+"""Drawn buildings have free sides, and a clean scan shows its map. Other tests are in `test_as_drawn`."""
 
 from __future__ import annotations
 
