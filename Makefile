@@ -32,8 +32,7 @@ demo: $(VENV)/.runs  ## start the service, ask it where a robot is, draw the ans
 	$(BIN)/python -m examples.demo
 
 test: lint layers  ## lint, import layers, types and tests, these in three processes or as JOBS= says
-	$(MAKE) --no-print-directory -j 2 types kernels
-	$(MAKE) --no-print-directory unit
+	$(MAKE) --no-print-directory -j 2 types unit
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

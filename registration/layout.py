@@ -83,6 +83,11 @@ POSE = np.dtype(
 )  # fmt: skip
 
 
+def floats(rows: Records, *names: str) -> tuple[Floats, ...]:
+    """Return fields of an array of records."""
+    return tuple(rows[name] for name in names)
+
+
 def record(dtype: np.dtype[Any], /, **values: float) -> Records:
     """Return an array of one record; what is not named is 0."""
     # numpy's own zeros of such a type go through its fields one by one: a bytearray takes a tenth of the time.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments, Segments
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from . import tuning
 from .kernels.corners import cut_corners, share_corners
@@ -79,7 +79,8 @@ def _scanner(points: Records, increment: float, sigma: float, options: Vectoriza
     max_gap = math.inf if options.max_gap is None else options.max_gap
     default_gap, longest = 0.0, tuning.LONGEST_STEP
     if increment == 0.0:
-        spacing = float(np.median(np.hypot(np.diff(points["x"]), np.diff(points["y"]))))
+        x, y = floats(points, "x", "y")
+        spacing = float(np.median(np.hypot(np.diff(x), np.diff(y))))
         default_gap = longest = tuning.SPACINGS * spacing + tuning.GAP_NOISE * sigma
     asked = options.min_points, options.min_length
     scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap), *asked)

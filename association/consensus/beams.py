@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from ..context import SearchContext
 from ..layout import SHOWN
@@ -72,8 +72,8 @@ def cast(context: SearchContext, beams: BeamSet, poses: Records) -> Records:
 
 def evidence_of(context: SearchContext, beams: BeamSet, table: Records, wider: float = 1.0) -> BeamEvidence:
     """Return what beams say at poses, all of (k, m), by a table of what the map shows; gates `wider` times as wide."""
-    ranges, obstacles = beams.rows["range"], context.index.obstacles.walls
-    lengths = obstacles["end"] - obstacles["begin"]
+    (ranges,), (begins, ends) = floats(beams.rows, "range"), floats(context.index.obstacles.walls, "begin", "end")
+    lengths = ends - begins
     known = (table["wall"] >= 0) & np.isfinite(ranges)
     with np.errstate(invalid="ignore"):
         off = (ranges - table["distance"]) * np.maximum(LEAST_INCIDENCE, table["incidence"])
@@ -92,7 +92,7 @@ def score_of_beams(beams: BeamSet, evidence: BeamEvidence) -> Floats:
 def penalty_of_sight(context: SearchContext, beams: BeamSet, table: Records, matches: Records) -> Floats:
     """Return the penalty of lines of sight at each pose, (k,) nats: for walls that should have blocked the view."""
     poses, walls, to_matched, to_clutter = passed_walls(beams.rows, beams.line, beams.sensor, table, matches)
-    rows = context.index.obstacles.walls[walls]
-    lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
+    begins, ends = floats(context.index.obstacles.walls[walls], "begin", "end")
+    lengths = np.minimum(BLOCKING_LENGTH, ends - begins)
     rays = np.minimum(1.0, to_matched / BLOCKING_RAYS) + np.minimum(1.0, to_clutter / BLOCKING_RAYS)
     return np.bincount(poses, BLOCKED * lengths * rays, len(table)).astype(np.float64)

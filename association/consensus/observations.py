@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from ..context import SearchContext
 from ..layout import OBSERVATION
@@ -94,7 +94,8 @@ def _set_times(context: SearchContext, lines: Records) -> None:
     sweep = last - first
     if scan.sweep_s == 0.0 or not abs(sweep) > 0.0:
         return
-    x, y = lines["centroid_x"] - context.sensor[0], lines["centroid_y"] - context.sensor[1]
+    x, y, dx, dy = floats(lines, "centroid_x", "centroid_y", "dx", "dy")
+    x, y = x - context.sensor[0], y - context.sensor[1]
     bearings = math.copysign(1.0, sweep) * (np.arctan2(y, x) - first) % math.tau
     lines["time"] = bearings / abs(sweep) - 0.5
-    lines["pace"] = (x * lines["dy"] - y * lines["dx"]) / np.maximum(1e-6, x * x + y * y) / sweep
+    lines["pace"] = (x * dy - y * dx) / np.maximum(1e-6, x * x + y * y) / sweep

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Records
+from registration.layout import Records, floats
 
 from ..layout import ENDS, GRID_SHAPE, WALL, Integers, as_records, record
 from ..tables import Grid, Place, Raster, Sweep, Walls
@@ -54,13 +54,14 @@ def stopping_beams(place: Place, points: MapPoints) -> Place:
 
 def swept_chains(chains: Walls) -> Sweep:
     """Return the chains, those that are near one another together, and which of them lie on each cell."""
-    ends = ends_of(chains)
-    squares = np.round(0.5 * (ends[:, :2] + ends[:, 2:]) / NEIGHBOURHOOD)
+    corners = ends_of(chains)
+    squares = np.round(0.5 * (corners[:, :2] + corners[:, 2:]) / NEIGHBOURHOOD)
     order = np.lexsort((squares[:, 0], squares[:, 1]))
     rows = chains.rows[order]
-    swept, present = _grid(ends[order], rows, SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    swept, present = _grid(corners[order], rows, SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
     swept = swept._replace(items=swept.items * np.int32(SECTORS) + _sectors(rows)[swept.items])
-    return Sweep(rows, rows["end"] - rows["begin"], swept, present)
+    begins, ends = floats(rows, "begin", "end")
+    return Sweep(rows, ends - begins, swept, present)
 
 
 def directions_near(walls: Walls, chains: Walls) -> Raster:

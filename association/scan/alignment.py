@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from ..deadline import Deadline
 from ..layout import Flags, Indices
@@ -159,14 +159,18 @@ class _Pairs:
     @classmethod
     def of(cls, found: _Lines, first: Indices, second: Indices) -> _Pairs:
         a, b, rows = found.lines[first], found.lines[second], np.stack([first, second], axis=1)
-        dx, dy, views = b["dx"], b["dy"], found.of_view[rows]
-        middle = dx * (a["x"] - b["x"]) + dy * (a["y"] - b["y"])
-        low = np.maximum(middle - 0.5 * a["length"], -0.5 * b["length"])
-        high = np.minimum(middle + 0.5 * a["length"], 0.5 * b["length"])
-        x, y = b["x"] + 0.5 * (low + high) * dx, b["y"] + 0.5 * (low + high) * dy
-        along = a["dx"] * (x - a["centroid_x"]) + a["dy"] * (y - a["centroid_y"])
-        offset = dx * (a["centroid_y"] + along * a["dy"] - y) - dy * (a["centroid_x"] + along * a["dx"] - x)
-        apart = np.stack([offset, dx * a["dy"] - dy * a["dx"]], axis=1)
+        views = found.of_view[rows]
+        a_x, a_y, a_dx, a_dy, a_length, to_x, to_y = floats(
+            a, "x", "y", "dx", "dy", "length", "centroid_x", "centroid_y"
+        )
+        b_x, b_y, dx, dy, b_length = floats(b, "x", "y", "dx", "dy", "length")
+        middle = dx * (a_x - b_x) + dy * (a_y - b_y)
+        low = np.maximum(middle - 0.5 * a_length, -0.5 * b_length)
+        high = np.minimum(middle + 0.5 * a_length, 0.5 * b_length)
+        x, y = b_x + 0.5 * (low + high) * dx, b_y + 0.5 * (low + high) * dy
+        along = a_dx * (x - to_x) + a_dy * (y - to_y)
+        offset = dx * (to_y + along * a_dy - y) - dy * (to_x + along * a_dx - x)
+        apart = np.stack([offset, dx * a_dy - dy * a_dx], axis=1)
         variances = np.add(*(np.stack([_variances_at(line, x, y), _angle_variances(line)], 1) for line in (a, b)))
         steps = np.zeros((len(rows), 2, 2, 3))
         steps[:, 0, :, 0], steps[:, 0, :, 1], steps[:, 1, :, 2] = -dy[:, None], dx[:, None], 1.0
@@ -200,8 +204,9 @@ class _Pairs:
 
 def _variances_at(lines: Records, x: Floats, y: Floats) -> Floats:
     """Return the variance of each line's offset at the point of it nearest to a place, m^2."""
-    along = lines["dx"] * (x - lines["centroid_x"]) + lines["dy"] * (y - lines["centroid_y"])
-    return np.asarray(ROUGHNESS**2 + lines["variance"] * (1.0 + along**2 / np.maximum(lines["spread"], LEAST_SPREAD)))
+    to_x, to_y, dx, dy, spread, variance = floats(lines, "centroid_x", "centroid_y", "dx", "dy", "spread", "variance")
+    along = dx * (x - to_x) + dy * (y - to_y)
+    return np.asarray(ROUGHNESS**2 + variance * (1.0 + along**2 / np.maximum(spread, LEAST_SPREAD)))
 
 
 def _angle_variances(lines: Records) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments
-from registration.layout import Records
+from registration.layout import Records, floats
 
 from ..layout import GATES, LINE_PARTS, MODEL, SIGHTING, VARIANCES, Indices, as_records, record
 from ..options import AssociationOptions
@@ -94,7 +94,8 @@ class ScanLines:
         rows, seen, model = self.rows.copy(), self.sightings.copy(), self.model.copy()
         for values in (rows["dx"], rows["y"], rows["centroid_y"], seen["dx"], seen["y"], model["sensor_y"]):
             np.negative(values, out=values)
-        np.arctan2(rows["dy"], rows["dx"], out=rows["angle"])
+        dx, dy = floats(rows, "dx", "dy")
+        rows["angle"] = np.arctan2(dy, dx)
         return ScanLines(self.row_of, rows, model, seen)
 
 
@@ -135,8 +136,8 @@ def parts_of(
         labels, lines = join_lines(given[own], JOINTS, measured.counted, directed)
         part_of[own] = labels + before
         block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
-        levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)
-        g = np.stack([-lines["dy"], lines["dx"], levers], axis=1)
+        x, y, dx, dy = floats(lines, "centroid_x", "centroid_y", "dx", "dy")
+        g = np.stack([-dy, dx, dx * (x - pose.x) + dy * (y - pose.y)], axis=1)
         lines["common_offset"] = np.maximum(0.0, np.einsum("ij,jk,ik->i", g, block, g))
         lines["common_angle"] = max(0.0, block[2, 2])
         found.append(lines)

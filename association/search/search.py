@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from ..consensus.kernels.distinct import pick_distinct
 from ..consensus.kernels.scoring import score_poses
@@ -268,7 +268,8 @@ class _Search:
             return
         fraction = self.effort.kept_fraction if self.context.with_beams else self.effort.complete_above
         floor = fraction * slides.best_value
-        sines = scan["dx"][:m, None] * scan["dy"] - scan["dy"][:m, None] * scan["dx"]
+        dx, dy = floats(scan, "dx", "dy")
+        sines = dx[:m, None] * dy - dy[:m, None] * dx
         parallel = np.abs(sines) < PARALLEL_SINE
         reach = parallel @ scan["gain"]
         chosen: list[int] = []

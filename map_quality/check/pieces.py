@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from ..views import in_time
 from . import tuning
@@ -100,18 +100,20 @@ def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
     one, other = walls["dx"][pairs], walls["dy"][pairs]
     pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < tuning.PARALLEL]
     a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
-    along = a["dx"] * b["dx"] + a["dy"] * b["dy"] > 0.0
+    (a_dx, a_dy, a_offset, a_begin, a_end), (b_dx, b_dy, b_offset, b_begin, b_end) = (
+        floats(rows, "dx", "dy", "offset", "begin", "end") for rows in (a, b)
+    )
+    along = a_dx * b_dx + a_dy * b_dy > 0.0
     places = []
-    for name in ("begin", "end"):
-        x = b["dx"] * b[name] - b["dy"] * b["offset"]
-        y = b["dy"] * b[name] + b["dx"] * b["offset"]
-        places.append((a["dx"] * x + a["dy"] * y, a["dx"] * y - a["dy"] * x - a["offset"]))
+    for at in (b_begin, b_end):
+        x, y = b_dx * at - b_dy * b_offset, b_dy * at + b_dx * b_offset
+        places.append((a_dx * x + a_dy * y, a_dx * y - a_dy * x - a_offset))
     (s1, o1), (s2, o2) = places
-    low, high = np.maximum(a["begin"], np.minimum(s1, s2)), np.minimum(a["end"], np.maximum(s1, s2))
+    low, high = np.maximum(a_begin, np.minimum(s1, s2)), np.minimum(a_end, np.maximum(s1, s2))
     slope = (o2 - o1) / np.where(np.abs(s2 - s1) > 1e-9, s2 - s1, 1.0)
     # The length that both run next to each other, and how far the second lies to the left of the first there, metres.
     shared, off = high - low, o1 + slope * (0.5 * (low + high) - s1)
-    shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
+    shorter = np.minimum(a_end - a_begin, b_end - b_begin)
     for_long = (shared > tuning.DOUBLE_LENGTH) & (shared > tuning.DOUBLE_SHARE * shorter)
     on_it, apart = np.abs(off) < tuning.SAME_LINE, np.abs(off)
     near.opposite[pairs[for_long & on_it & ~along]] = True

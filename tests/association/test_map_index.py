@@ -26,7 +26,7 @@ from association.layout import ENDS, POINT, as_records
 from association.tables import Walls
 from association.tuning import REACH, SECTORS
 from registration import Segments
-from registration.layout import Floats, Records
+from registration.layout import Floats, Records, floats
 
 from .kernels import reference as twin
 from .kernels.reference import SEEDS
@@ -115,7 +115,8 @@ def cell_of(shape: Records, at: Floats) -> int | None:
 
 
 def lengths(walls: Walls) -> Floats:
-    return np.asarray(walls.rows["end"] - walls.rows["begin"])
+    begins, ends = floats(walls.rows, "begin", "end")
+    return ends - begins
 
 
 def test_collinear_pieces_become_one_wall() -> None:

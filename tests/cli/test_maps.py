@@ -116,6 +116,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     assert "of 5 usable" in told
 
 
+@pytest.mark.long
 def test_the_surface_of_a_grid_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:
     """A grid whose walls are drawn 0.1 m thicker on each side than they are: two cells."""
     write_log(folder / "drive.log", 5)

@@ -100,7 +100,7 @@ def test_a_server_proposes_the_same(linefix: Linefix, folder: Path, patient: Run
     assert "expected the id of a stored map with --server" in wrong.err
 
 
-@pytest.mark.parametrize("where", ["here", "server"])
+@pytest.mark.parametrize("where", ["here", pytest.param("server", marks=pytest.mark.long)])
 def test_odometry_of_the_logs_localizes_scans_in_rooms_that_look_alike(
     where: str, linefix: Linefix, folder: Path, patient: RunningService
 ) -> None:

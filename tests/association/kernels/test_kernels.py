@@ -25,7 +25,7 @@ from association.tables import Model, Pieces
 from association.verdict.kernels.things import compare_things
 from association.verdict.tuning import LEAST_OF_BEAM, THING_WIDTH, THINGS_APART
 from registration import MeasuredSegments, Segments
-from registration.layout import LEAST_POINTS, POSE, Floats, Records
+from registration.layout import LEAST_POINTS, POSE, Floats, Records, floats
 
 from ..scenes import maze
 from . import reference as twin
@@ -66,11 +66,12 @@ def given_of(measured: MeasuredSegments) -> Records:
 
 def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
     """Return lines as segments that were measured so."""
-    middles, half = np.stack([lines["x"], lines["y"]], 1), 0.5 * lines["length"][:, None]
-    along = half * np.stack([lines["dx"], lines["dy"]], 1)
+    x, y, dx, dy, length, *centroids, spread = floats(
+        lines, "x", "y", "dx", "dy", "length", "centroid_x", "centroid_y", "spread"
+    )
+    middles, along = np.stack([x, y], 1), 0.5 * length[:, None] * np.stack([dx, dy], 1)
     segments = Segments.derived(np.hstack([middles - along, middles + along]))
-    centroids = np.stack([lines["centroid_x"], lines["centroid_y"]], 1)
-    return MeasuredSegments(segments, lines["sigma"], lines["points"], centroids, lines["spread"], counted)
+    return MeasuredSegments(segments, lines["sigma"], lines["points"], np.stack(centroids, 1), spread, counted)
 
 
 @pytest.mark.parametrize(
@@ -144,10 +145,9 @@ def drawn(rng: np.random.Generator, views: int) -> Model:
     seen = np.zeros(n, OBSERVATION)
     angles, turn = rng.uniform(-np.pi, np.pi, n), rng.normal(0.0, 0.01)
     seen["dx"], seen["dy"] = np.cos(angles), np.sin(angles)
-    seen["centroid_x"], seen["centroid_y"] = rng.uniform(-8.0, 8.0, (2, n))
-    seen["normal_x"], seen["normal_y"] = -np.sin(angles + turn), np.cos(angles + turn)
-    seen["offset"] = seen["normal_x"] * seen["centroid_x"] + seen["normal_y"] * seen["centroid_y"]
-    seen["offset"] += rng.normal(0.0, 0.03, n)
+    x, y = seen["centroid_x"], seen["centroid_y"] = rng.uniform(-8.0, 8.0, (2, n))
+    normal_x, normal_y = seen["normal_x"], seen["normal_y"] = -np.sin(angles + turn), np.cos(angles + turn)
+    seen["offset"] = normal_x * x + normal_y * y + rng.normal(0.0, 0.03, n)
     seen["spread"], seen["variance"] = rng.uniform(0.1, 2.0, n), rng.uniform(1e-6, 1e-4, n)
     seen["wall"], seen["of_view"] = np.arange(n) % m, np.arange(n) % views
     seen["time"], seen["pace"] = rng.uniform(-0.5, 0.5, n), rng.normal(0.0, 0.05, n)
@@ -217,7 +217,7 @@ def test_things_are_connected_places(seed: int) -> None:
         more = values[0] - values[other]
         differs = np.abs(more) > LEAST_OF_BEAM
         away = np.where(more > 0.0, distances[other], distances[0])[differs]
-        places = (away * np.stack([beams["dx"], beams["dy"]])[:, differs]).T
+        places = (away * np.stack([np.cos(angles), np.sin(angles)])[:, differs]).T
         near = np.hypot(*np.moveaxis(places[:, None] - places, 2, 0)) <= THINGS_APART
         count, thing = connected_components(near, directed=False) if len(places) else (0, np.zeros(0, int))
         gap = 0.0

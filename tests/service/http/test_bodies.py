@@ -216,10 +216,13 @@ def test_many_wrong_things_cost_no_more_than_a_few(service: RunningService, body
 @pytest.mark.parametrize(
     "body",
     [
-        b" " * 16_000_000 + b"{}",
-        b'{"map": ' + large_map(190_000).replace(b"[[-4.0,", b"[[-2e5,", 1) + b', "scan": {"segments": []}}',
+        pytest.param(b" " * 16_000_000 + b"{}", id="refused where it is parsed"),
+        pytest.param(
+            b'{"map": ' + large_map(190_000).replace(b"[[-4.0,", b"[[-2e5,", 1) + b', "scan": {"segments": []}}',
+            id="refused where it is indexed",
+            marks=pytest.mark.long,
+        ),
     ],
-    ids=["refused where it is parsed", "refused where it is indexed"],
 )
 def test_refused_bodies_are_not_held(service: RunningService, body: bytes) -> None:
     assert service.client.post("/v1/associate", content=body).status_code == 422

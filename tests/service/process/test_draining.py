@@ -16,7 +16,7 @@ from tests.running import running as running_service
 from tests.service.searches import searched_for, store_hard_map
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService], workers: int) -> None:
     running = start_service(drain_s=1.0, workers=workers, searches=workers)
     store_hard_map(running, workers)
