@@ -70,7 +70,8 @@ def _on_map(context: SearchContext, index: JointIndex, result: AssociationResult
             wall = replace(wall, map=tuple(i - first for i in wall.map))
         diagnostics = replace(_registered_on_map(context, index, diagnostics, pairs, (m, pose)), critical_wall=wall)
     missing = tuple(i - first for i in result.missing_map if first <= i < last)
-    return replace(result, pose=pose, correspondences=pairs, missing_map=missing, diagnostics=diagnostics)
+    result = replace(result, frame_id=index.parts[m].frame_id, pose=pose, diagnostics=diagnostics)
+    return replace(result, correspondences=pairs, missing_map=missing)
 
 
 def _registered_on_map(

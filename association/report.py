@@ -48,6 +48,9 @@ def report(context: SearchContext, explanations: Explanations, verdict: Verdict)
         alternatives=alternatives,
         search=search,
         warnings=warnings_of(context, search, verdict),
+        frame_id=context.index.frame_id,
+        child_frame_id=context.scan.frame_id,
+        stamp=context.scan.stamp,
     )
     if answer is None:
         return found

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -296,6 +296,11 @@ class AssociationResult:
         Of several maps the one that the pose is on; None for `no_match`, and where a single map was searched.
     maps : tuple of MapVerdict
         Of several maps each, the best first; empty where a single map was searched.
+    frame_id, child_frame_id : str or None
+        Names of the frame of the map, of several the one of the pose or the first, and of that of the scan. None where
+        the map, or the scan, has none.
+    stamp : any
+        Of the scan, as it was given; None where it has none.
     """
 
     status: Status
@@ -314,6 +319,9 @@ class AssociationResult:
     diagnostics: AssociationDiagnostics | None = None
     map_id: str | None = None
     maps: tuple[MapVerdict, ...] = ()
+    frame_id: str | None = None
+    child_frame_id: str | None = None
+    stamp: Any = None
 
     @property
     def message(self) -> str:

@@ -187,7 +187,7 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
         stored = store.load("m")
         found = FoundMaps({None: stored.record}, stored.document)
         ready = lookup.indexed(found, oriented=None, deadline=deadline)
-        target = Target(ready.maps, ready.frames, found.references)
+        target = Target(ready.maps, found.references)
         answer = associator.find(target, wanted, wanted.options, deadline, Stopwatch())
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),

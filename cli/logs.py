@@ -104,22 +104,16 @@ class Frames:
         return one if self.first.mount is not None else replace(one, mount=None)
 
     @property
-    def name(self) -> str:
-        """The frame whose poses are reported; empty before the first scan."""
-        first = self.first
-        return "" if first is None else first.base_frame if first.mount is not None else first.frame_id or "laser"
-
-    @property
     def told(self) -> str:
         """The frame whose poses are reported and the reason, for people."""
         first = self.first
         if first is None:
             return "none"
         if first.mount is None:
-            return f"of the laser (frame {self.name}); set --mount X Y THETA for those of the robot"
+            return f"of the laser (frame {first.located_frame}); set --mount X Y THETA for those of the robot"
         way, by = "upside down " if first.flipped else "", "the log" if self.given is None else "--mount"
         where = f"({first.mount.x:.3f}, {first.mount.y:.3f}) m, {math.degrees(first.mount.theta):.1f} degrees"
-        return f"of the robot (frame {self.name}), with {first.frame_id} mounted {way}at {where}, from {by}"
+        return f"of the robot (frame {first.located_frame}), with {first.frame_id} mounted {way}at {where}, from {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:

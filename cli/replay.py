@@ -100,7 +100,7 @@ def replay(
                 show("scans", len(found), total)
                 refused = answer.get("error", refused)
                 if output.as_json:
-                    print_json(_line(one, answer, frames, several=len(maps) > 1))
+                    print_json(_line(one, answer, several=len(maps) > 1))
         except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
             if not found:
                 raise
@@ -143,8 +143,8 @@ def located(
         yield one, found
 
 
-def _line(one: LoggedScan, found: Json, frames: Frames, *, several: bool) -> Json:
-    line = {"stamp": one.stamp, **{name: found.get(name) for name in FIELDS}, "child_frame_id": frames.name}
+def _line(one: LoggedScan, found: Json, *, several: bool) -> Json:
+    line = {"stamp": one.stamp, **{name: found.get(name) for name in FIELDS}, "child_frame_id": one.located_frame}
     line["error"] = found.get("error")
     return {**line, "map_id": map_of(found)} if several else line
 

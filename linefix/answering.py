@@ -144,10 +144,10 @@ class LocalService:
         """Return the map of a request, or its maps, indexed; raises `InputError` when one cannot be searched."""
         named = {one.map_id: one for one in asked.maps} if isinstance(asked.maps, list) else {None: asked.map}
         found = {name: self._document_of(one) for name, one in named.items() if one is not None}
-        parts, frames = inputs.parts_of(((name, document) for name, (document, _) in found.items()), how.oriented)
+        parts = inputs.parts_of(((name, document) for name, (document, _) in found.items()), how.oriented)
         references = {name: one or inputs.reference_of(name) for name, (_, one) in found.items()}
-        maps = MapSet(parts) if asked.maps else inputs.indexed(parts[""])
-        return Target(maps, frames, references, asked.map_weights)
+        maps = MapSet(parts) if asked.maps else parts[""].indexed()
+        return Target(maps, references, asked.map_weights)
 
     def _map_at(self, on: Json) -> tuple[MapDocument, Json | None]:
         """Return the map of a request, and the id and revision of a stored one."""

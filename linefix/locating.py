@@ -183,8 +183,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     """
     if isinstance(map, MapIndex):
         return map
-    part = map_part(map, "map")
-    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented, points=part.points)
+    return map_part(map, "map").indexed()
 
 
 def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
@@ -226,7 +225,7 @@ def map_part(map: Any, argument: str) -> MapPart:
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
         points = MapPoints.of(inner.points, inner.points_sigma, path=f"{argument}.")
-        return MapPart(segments, inner.sigma, inner.oriented, points)
+        return MapPart(segments, inner.sigma, inner.oriented, points, inner.frame_id)
     return MapPart(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument=argument))
 
 
@@ -243,7 +242,7 @@ def _document_part(document: Mapping[str, Any], argument: str) -> MapPart:
         raise InvalidArgumentError(fault.message, argument=argument + fault.pointer.replace("/", ".")) from None
     segments = Segments.from_array(document.get("segments", []), argument=f"{argument}.segments")
     points = MapPoints.of(document.get("points", []), fields.points_sigma, path=f"{argument}.")
-    return MapPart(segments, fields.sigma, fields.oriented is not False, points)
+    return MapPart(segments, fields.sigma, fields.oriented is not False, points, fields.frame_id)
 
 
 def scan_of(
@@ -278,7 +277,8 @@ def scan_of(
     if isinstance(scan, LaserScan):
         return ranges_scan(scan)
     if isinstance(scan, MountedScan):
-        return assemble([view_of(scan)])
+        frame, stamp = (getattr(scan, name, None) for name in ("located_frame", "stamp"))
+        return replace(assemble([view_of(scan)]), frame_id=frame, stamp=stamp)
     shape = np.shape(scan)
     if len(shape) == 1:
         if angles is None:

@@ -75,16 +75,13 @@ class Target:
     Attributes
     ----------
     maps : MapIndex or MapSet
-    frames : mapping
-        Frame of each of several maps by name; of the first, or of the single map, by None.
     references : mapping
-        Id and revision of each, likewise; None of a map that came with the request.
+        Id and revision of each of several maps by name, of a single map by None; None if it came with the request.
     weights : mapping, or None
         Of several maps, as sent.
     """
 
     maps: MapIndex | MapSet
-    frames: Mapping[str | None, str]
     references: Mapping[str | None, Json | None]
     weights: Mapping[str, float] | None = None
 
@@ -128,8 +125,7 @@ def find(
         raise DeadlinePassedError from None
     watch.lap("search")
     references = {name: one for name, one in target.references.items() if name is not None and one is not None}
-    included = inputs.included_of(sought.scan, options, scanned, target.frames[result.map_id])
-    answer = results.association_json(result, included, references)
+    answer = results.association_json(result, inputs.included_of(options, scanned), references)
     return result, answer if references else {**answer, "map": target.references[None]}
 
 

@@ -34,6 +34,8 @@ class MountedScan(Protocol):
         base_from_sensor; None: not known, poses are those of the sensor.
     flipped : bool
         True: the sensor is mounted upside down, y becomes -y in its data before `mount` applies.
+
+    The answer has its `located_frame` and its `stamp`, if it has such attributes.
     """
 
     @property

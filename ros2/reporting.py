@@ -92,6 +92,7 @@ def values_of(answer: linefix.AssociationResult, milliseconds: float) -> dict[st
         "status": answer.status.value,
         "usable": str(answer.usable).lower(),
         "probability": "" if answer.probability is None else f"{answer.probability:.4f}",
+        "message": answer.message,
         "reasons": ", ".join(reason.code for reason in answer.reasons),
         "warnings": ", ".join(warning.code for warning in answer.warnings),
         "milliseconds": f"{milliseconds:.1f}",

@@ -49,18 +49,26 @@ class MapPart:
         True if free space lies on the left of its segments.
     points : MapPoints
         Objects too small for a wall.
+    frame_id : str or None
+        Name of the map's own frame.
     """
 
     segments: Segments
     sigma: float | None = None
     oriented: bool = True
     points: MapPoints = NO_POINTS
+    frame_id: str | None = None
 
     @classmethod
     def of(cls, index: MapIndex) -> MapPart:
         """Return the map of an index."""
         segments = index.segments if index.oriented else index.segments.take(np.arange(index.directed))
-        return cls(segments, index.sigma, index.oriented, index.points)
+        return cls(segments, index.sigma, index.oriented, index.points, index.frame_id)
+
+    def indexed(self, deadline: Deadline | None = None) -> MapIndex:
+        """Return the index of this map alone; raises `InvalidMapError` and `IndexingEndedError` as `MapIndex.build`."""
+        how, points, frame = self.oriented, self.points, self.frame_id
+        return MapIndex.build(self.segments, self.sigma, oriented=how, points=points, frame_id=frame, deadline=deadline)
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,7 @@ class JointIndex(MapIndex):
         starts = np.concatenate([[0], np.cumsum(counts)])
         boxes = own + np.tile(shifts, 2)
         together = tuple(parts), float(gap), shifts, starts, boxes
-        return cls(either, sigma, np.zeros(2), directed, points, *tables, *together).warmed()
+        return cls(either, sigma, np.zeros(2), directed, points, parts[0].frame_id, *tables, *together).warmed()
 
     def _undirected(self, deadline: Deadline | None) -> JointIndex:
         return JointIndex.of_parts(self.parts, self.gap, oriented=False, deadline=deadline)

@@ -52,6 +52,8 @@ class MapIndex:
         Number of segments as sent; piece i stands for segment ``i % directed``.
     points : MapPoints
         Objects too small for a wall, in the map frame: evidence for beams.
+    frame_id : str or None
+        Name of the map frame; of several maps together that of the first.
     wall_of_piece : (n,) the wall that each segment is part of
     pieces : Pieces
         Which segments each wall consists of.
@@ -73,6 +75,7 @@ class MapIndex:
     origin: Floats
     directed: int
     points: MapPoints
+    frame_id: str | None
     wall_of_piece: Integers
     pieces: Pieces
     walls: Walls
@@ -90,6 +93,7 @@ class MapIndex:
         *,
         oriented: bool = True,
         points: MapPoints = NO_POINTS,
+        frame_id: str | None = None,
         deadline: Deadline | None = None,
     ) -> MapIndex:
         """Index a map; some 10 microseconds a segment.
@@ -106,6 +110,8 @@ class MapIndex:
         points : MapPoints, optional
             Objects too small for a wall, in the map frame: evidence for the beams of a scan. Those more than 40 m
             outside the box around the segments are left out.
+        frame_id : str, optional
+            Name of the map frame.
         deadline : Deadline, optional
             Looked at every few tenths of a second.
 
@@ -120,7 +126,7 @@ class MapIndex:
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
         tables = tables_of(either.shifted(-origin), sigma, deadline)
-        return cls(either, sigma, origin, len(segments), points.near(low, high), *tables).warmed()
+        return cls(either, sigma, origin, len(segments), points.near(low, high), frame_id, *tables).warmed()
 
     @staticmethod
     def require(segments: Segments, sigma: float | None, path: str) -> tuple[Floats, Floats]:
@@ -180,7 +186,9 @@ class MapIndex:
         return undirected
 
     def _undirected(self, deadline: Deadline | None) -> MapIndex:
-        return MapIndex.build(self.segments, self.sigma, oriented=False, points=self.points, deadline=deadline)
+        return MapIndex.build(
+            self.segments, self.sigma, oriented=False, points=self.points, frame_id=self.frame_id, deadline=deadline
+        )
 
     @cached_property
     def obstacles(self) -> Place:

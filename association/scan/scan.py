@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +119,10 @@ class Scan:
     sweep_s : float or None
         Seconds from the first beam to the last, during which the sensor may have turned; 0 if its motion is known and
         corrected, or none; None if the duration is not known.
+    frame_id : str or None
+        Name of its frame.
+    stamp : any
+        When it was taken, in any form; the answer repeats it.
     """
 
     measured: MeasuredSegments
@@ -127,6 +132,8 @@ class Scan:
     ordered: bool = True
     warnings: tuple[AssociationWarning, ...] = ()
     sweep_s: float | None = None
+    frame_id: str | None = None
+    stamp: Any = None
 
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
@@ -139,9 +146,8 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     seen = scan.measured
     measured = replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
     measured = measured if segments else MeasuredSegments.from_segments(Segments.from_array(()))
-    return Scan(
-        measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings, scan.sweep_s
-    )
+    at, views = at and (at[0], -at[1]), views and views.mirrored()
+    return replace(scan, measured=measured, viewpoint=at, beams=beams, views=views)
 
 
 def turned_round(scan: Scan) -> Scan:
@@ -167,7 +173,7 @@ def scaled(scan: Scan, factor: float) -> Scan:
     )
     place = at and (at[0] * factor, at[1] * factor)
     views = views and views.scaled(factor)
-    return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings, scan.sweep_s)
+    return replace(scan, measured=measured, viewpoint=place, beams=beams and beams.scaled(factor), views=views)
 
 
 def shifted(scan: Scan, by: Floats) -> Scan:

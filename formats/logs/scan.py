@@ -102,6 +102,11 @@ class LoggedScan:
         """Seconds since the log's epoch."""
         return self.stamp_ns * SECONDS
 
+    @property
+    def located_frame(self) -> str:
+        """The frame whose pose is located: that of the robot, or of the sensor where its mount is not known."""
+        return self.frame_id or "laser" if self.mount is None else self.base_frame or "base_link"
+
 
 @dataclass(slots=True, eq=False)
 class Log:
@@ -227,7 +232,7 @@ def scan_json(one: LoggedScan) -> dict[str, Any]:
     }
     if laser.motion is not None:
         view["twist"] = {"vx": laser.motion.vx, "vy": laser.motion.vy, "omega": laser.motion.omega}
-    return {"views": [view], "stamp": one.stamp}
+    return {"views": [view], "stamp": one.stamp, "frame_id": one.located_frame}
 
 
 def _ranges(laser: LaserScan, most: float) -> list[float | None]:

@@ -19,7 +19,6 @@ from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields,
 from .requests import CheckRequest, RegisterRequest
 from .results import Included
 from .scans import Scanned, scanned_of, transform_of
-from .sensors import LaserScan, OneScan, ViewsScan
 from .updates import ApplyRequest, SharpenedWalls, UpdateRequest
 
 # Options of a search that have the same names and values in a request.
@@ -41,16 +40,10 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
     return AssociationOptions(oriented=oriented, include=include, **{name: getattr(options, name) for name in _AS_SENT})
 
 
-def included_of(scan: OneScan | ViewsScan, options: SearchOptions, scanned: Scanned, frame_id: str) -> Included:
-    """Return the fields that the answer repeats of a request; `frame_id` is the map's."""
+def included_of(options: SearchOptions, scanned: Scanned) -> Included:
+    """Return the parts of an answer that are requested, and the segments that were found in a scan."""
     parts = frozenset[str](options.include)
-    segments = scanned.listed if "segments" in parts else None
-    child_frame_id, stamp = scan.frame_id, scan.stamp
-    if isinstance(scan, LaserScan) and scan.laser.header is not None:  # what the scan does not say itself
-        header = scan.laser.header
-        child_frame_id = child_frame_id if "frame_id" in scan.model_fields_set else header.frame_id or child_frame_id
-        stamp = header.stamp if stamp is None else stamp
-    return Included(parts, frame_id, child_frame_id, stamp, segments, scanned.starts)
+    return Included(parts, scanned.listed if "segments" in parts else None, scanned.starts)
 
 
 def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:
@@ -132,7 +125,7 @@ def part_of(document: MapDocument, *, oriented: bool | None = None, path: str = 
     """
     segments = Segments.from_array(document.segments, argument=f"{path}segments")
     points = MapPoints.of(document.points, document.points_sigma, path=path)
-    return MapPart(segments, document.sigma, is_oriented(oriented, document.oriented), points)
+    return MapPart(segments, document.sigma, is_oriented(oriented, document.oriented), points, document.frame_id)
 
 
 def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -147,20 +140,16 @@ def require_map(document: MapDocument, path: str = "") -> tuple[NDArray[np.float
     return MapIndex.require(part.segments, part.sigma, path)
 
 
-def parts_of(
-    documents: Iterable[tuple[str | None, MapDocument]], oriented: bool | None
-) -> tuple[dict[str, MapPart], dict[str | None, str]]:
-    """Return maps by name as the search takes them, and their frames, that of the first also by None.
+def parts_of(documents: Iterable[tuple[str | None, MapDocument]], oriented: bool | None) -> dict[str, MapPart]:
+    """Return maps by name as the search takes them.
 
     A single map has the name None, for which that of its part is empty. `oriented` None: as each map states.
     """
-    parts, frames = dict[str, MapPart](), dict[str | None, str]()
+    parts = dict[str, MapPart]()
     for number, (name, document) in enumerate(documents):
         path = "map." if name is None else f"maps.{number}."
         parts[name or ""] = part_of(document, oriented=oriented, path=path)
-        frames[name] = document.frame_id
-        frames.setdefault(None, document.frame_id)
-    return parts, frames
+    return parts
 
 
 def reference_of(name: str | None, revision: int | None = None) -> dict[str, object] | None:
@@ -168,14 +157,9 @@ def reference_of(name: str | None, revision: int | None = None) -> dict[str, obj
     return None if name is None else {"map_id": name, "revision": revision}
 
 
-def indexed(part: MapPart, deadline: Deadline | None = None) -> MapIndex:
-    """Return the index of a map; raises `IndexingEndedError` when the deadline passes."""
-    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented, points=part.points, deadline=deadline)
-
-
 def index_of(document: MapDocument, *, oriented: bool | None = None, deadline: Deadline | None = None) -> MapIndex:
     """Return the index of a map, `oriented` as of `part_of`; raises `IndexingEndedError` when the deadline passes."""
-    return indexed(part_of(document, oriented=oriented), deadline)
+    return part_of(document, oriented=oriented).indexed(deadline)
 
 
 def replacements_of(asked: ApplyRequest) -> dict[int, Replacement]:

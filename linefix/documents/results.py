@@ -97,16 +97,12 @@ def registration_json(result: RegistrationResult, pairs: Indices, listed: Listed
 
 @dataclass(frozen=True, slots=True)
 class Included:
-    """Fields of an answer that come from the request and its map.
+    """Parts of an answer that are requested, and the segments that were found in the scan.
 
     Attributes
     ----------
     include : frozenset of str
         Names of the requested parts.
-    frame_id, child_frame_id : str
-        Of the map and of the scan.
-    stamp : JSON
-        Of the scan, as sent.
     segments : list or None
         Of the scan, where the caller sent ranges or points: rows of four numbers, metres; of several views one list or
         None each.
@@ -115,9 +111,6 @@ class Included:
     """
 
     include: frozenset[str]
-    frame_id: str
-    child_frame_id: str
-    stamp: Any = None
     segments: list[Any] | None = None
     starts: Indices | None = None
 
@@ -140,8 +133,7 @@ def association_json(
 
     `references` are id and revision of each of several maps, by name.
     """
-    given: Json = {name: getattr(included, name) for name in ("frame_id", "child_frame_id", "stamp")}
-    given["unmatched_scan"] = included.listed(result.unmatched_scan)
+    given: Json = {"unmatched_scan": included.listed(result.unmatched_scan)}
     given["diagnostics"] = _diagnostics_json(result.diagnostics, included)
     given["correspondences"] = [
         answer_of(found.CorrespondenceAnswer, pair, **included.named(pair.scan)) for pair in result.correspondences

@@ -80,12 +80,16 @@ def scanned_of(scan: OneScan | ViewsScan, *, timed: bool = True) -> Scanned:
 
     If not `timed`, an unknown motion during a scan counts as none.
     """
-    if not isinstance(scan, ViewsScan):
-        return Scanned(assemble([_view_of(scan, "/scan", timed=timed)]), (isinstance(scan, MeasuredFields),))
-    views = [_view_of(view, f"/scan/views/{k}", timed=timed) for k, view in enumerate(scan.views)]
+    parts = {"": scan} if not isinstance(scan, ViewsScan) else {f"/views/{k}": one for k, one in enumerate(scan.views)}
+    views = [_view_of(one, f"/scan{place}", timed=timed) for place, one in parts.items()]
+    sent = tuple(isinstance(one, MeasuredFields) for one in parts.values())
+    frame_id, stamp, header = scan.frame_id, scan.stamp, getattr(getattr(scan, "laser", None), "header", None)
+    if header is not None:  # what the scan does not say itself
+        frame_id = frame_id if "frame_id" in scan.model_fields_set else header.frame_id or frame_id
+        stamp = header.stamp if stamp is None else stamp
     counts = np.array([len(view.scan.measured) for view in views])
-    sent = tuple(isinstance(view, MeasuredFields) for view in scan.views)
-    return Scanned(assemble(views), sent, np.cumsum(counts) - counts)
+    starts = np.cumsum(counts) - counts if isinstance(scan, ViewsScan) else None
+    return Scanned(replace(assemble(views), frame_id=frame_id, stamp=stamp), sent, starts)
 
 
 def _view_of(seen: OneScan | OneView, place: str, *, timed: bool) -> View:

@@ -71,7 +71,7 @@ async def look_up_maps(exchange: Exchange, asked: AssociateRequest | BatchReques
         find = partial(services.lookup.find_together, asked.maps, prefix)
         found = await ask_store(exchange, find)
     ready = await index(exchange, found, oriented=oriented)
-    return Target(ready.maps, ready.frames, found.references, asked.map_weights)
+    return Target(ready.maps, found.references, asked.map_weights)
 
 
 async def index(exchange: Exchange, found: FoundMaps, *, oriented: bool | None) -> CachedMap:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -27,13 +27,10 @@ class CachedMap:
     Attributes
     ----------
     maps : MapIndex or MapSet
-    frames : mapping
-        Frame that poses on each of several maps are in, by name; on the first, or on the single map, by None.
     bytes : int
     """
 
     maps: MapIndex | MapSet
-    frames: Mapping[str | None, str]
     bytes: int
 
 

@@ -9,7 +9,7 @@ from functools import partial
 
 from association import Deadline, IndexingEndedError, MapIndex, MapSet
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
-from linefix.documents.inputs import index_of, indexed, parts_of, reference_of, require_map
+from linefix.documents.inputs import index_of, parts_of, reference_of, require_map
 from linefix.documents.parts import MOST_MAPS, InlineMap, MapDocument, MapPrefix, NamedMap, StoredMap, is_oriented
 from linefix.documents.reading import read_stored
 
@@ -192,7 +192,7 @@ class MapLookup:
             yield name, self.document(one, found.document)
 
     def _index(self, found: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMap:
-        parts, frames = parts_of(self._documents(found, deadline), oriented)
+        parts = parts_of(self._documents(found, deadline), oriented)
         # The old goes before the new comes: two of the largest at once would take too much.
         each = 1 if all(part.oriented for part in parts.values()) else 2
         count = sum(each * len(part.segments) + len(part.points) for part in parts.values())
@@ -200,13 +200,13 @@ class MapLookup:
         self._cache.make_room(INDEXED_BYTES * count * (1 if single is not None else 2))
         maps: MapIndex | MapSet
         if single is not None:
-            maps = indexed(single)
+            maps = single.indexed()
         else:
             try:
                 maps = MapSet(parts, deadline)
             except IndexingEndedError:
                 raise IndexNotReadyError from None
-        return CachedMap(maps, frames, maps.nbytes + OVERHEAD)
+        return CachedMap(maps, maps.nbytes + OVERHEAD)
 
 
 def _count(one: InlineMap | MapRecord, kind: str) -> int:

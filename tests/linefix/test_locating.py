@@ -16,7 +16,7 @@ import linefix
 from association import AssociationDiagnostics, Corrections
 from examples.building import draw_cases
 from examples.demo import as_laser
-from formats import ImportedMap, ImportOptions, ImportReport
+from formats import ImportedMap, ImportOptions, ImportReport, LoggedScan, scan_json
 from linefix.answering import LocalService
 from linefix.documents.found import AssociationDiagnosticsAnswer
 from linefix.documents.results import Included, association_json, checked_json
@@ -79,18 +79,14 @@ def test_a_scanner_that_moved_saw_from_the_middle_of_its_way() -> None:
     assert scan.viewpoint == pytest.approx((0.05, 0.0), abs=1e-3)
 
 
-@pytest.mark.parametrize("undirected", ["map", "options"])
-def test_directions_count_only_where_map_and_options_agree(undirected: str) -> None:
+def test_directions_count_only_where_map_and_options_agree() -> None:
     """Every other wall runs the wrong way: found where directions mean nothing, and there alone."""
     walls = ROOM.copy()
     walls[::2] = walls[::2][:, [2, 3, 0, 1]]
     segments = linefix.Segments.from_array(walls)
     assert not linefix.locate(segments, laser()).usable
-    if undirected == "map":
-        answer = linefix.locate(linefix.LineMap(segments, oriented=False), laser())
-    else:
-        answer = linefix.locate(segments, laser(), options=linefix.AssociationOptions(oriented=False))
-    assert is_found(answer)
+    assert is_found(linefix.locate(linefix.LineMap(segments, oriented=False), laser()))
+    assert is_found(linefix.locate(segments, laser(), options=linefix.AssociationOptions(oriented=False)))
 
 
 def test_a_map_keeps_what_is_known_of_its_error(tmp_path: Path) -> None:
@@ -150,7 +146,7 @@ def test_corrections_and_the_turn_rate_are_in_the_diagnostics() -> None:
     assert isinstance(answer.diagnostics, AssociationDiagnostics)
     for corrections, turn_rate in ((Corrections(1.01, -0.02, (0.001, -0.002, 0.003)), 0.5), (None, None)):
         diagnostics = replace(answer.diagnostics, corrections=corrections, turn_rate=turn_rate)
-        found = association_json(replace(answer, diagnostics=diagnostics), Included(frozenset(), "map", "laser"))
+        found = association_json(replace(answer, diagnostics=diagnostics), Included(frozenset()))
         document = json.loads(json.dumps(found))["diagnostics"]
         told = {"scale": 1.01, "offset": -0.02, "strain": [0.001, -0.002, 0.003]}
         assert document["corrections"] == (None if corrections is None else told)
@@ -158,11 +154,25 @@ def test_corrections_and_the_turn_rate_are_in_the_diagnostics() -> None:
         AssociationDiagnosticsAnswer.model_validate(document)
 
 
-def test_the_message_is_that_of_http() -> None:
+def test_message_frames_and_stamp_are_those_of_http() -> None:
+    room = linefix.LineMap(linefix.Segments.from_array(ROOM), frame_id="floor")
+    logged = LoggedScan(1_500_000_000, "/scan", "front", laser(), base_frame="base")
+    floor = {"segments": ROOM.tolist(), "frame_id": "floor"}
+    for mount, frame in ((None, "front"), (linefix.RigidTransform(0.1, 0.0, 0.0), "base")):
+        scan = replace(logged, mount=mount)
+        document = LocalService().associate({"map": floor, "scan": scan_json(scan)})
+        for on in (linefix.index_map(room), linefix.index_maps([ROOM[:5], room])):
+            answer = linefix.locate(on, scan)
+            assert (answer.frame_id, answer.child_frame_id, answer.stamp) == ("floor", frame, 1.5)
+        assert all(document[name] == getattr(answer, name) for name in ("frame_id", "child_frame_id", "stamp"))
     answer = linefix.locate(ROOM, SEEN)
-    document = association_json(answer, Included(frozenset(), "map", "laser"))
-    assert answer.message == document["message"]
-    assert answer.message.startswith("The robot is at this pose with a probability of ")
+    assert (answer.frame_id, answer.child_frame_id, answer.stamp) == (None, None, None)
+    document = association_json(answer, Included(frozenset()))
+    assert (
+        document["message"]
+        == answer.message
+        == f"The robot is at this pose with a probability of {100.0 * (answer.probability or 0.0):.2f} %."
+    )
 
 
 FIELDS = {"findings", "size", "advice", "places", "viewpoints", "complete", "samples"}

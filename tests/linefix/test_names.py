@@ -13,6 +13,7 @@ import typer
 from linefix_client import schema as client
 
 import association
+import formats
 import linefix
 import registration
 from cli.program import app
@@ -53,7 +54,7 @@ def options_of(command: Any) -> Iterator[str]:
 
 def is_in_python(name: str) -> bool:
     owner, _, part = name.removesuffix(")").replace("(", ".").partition(".")
-    found = next(getattr(one, owner) for one in (linefix, association, registration) if hasattr(one, owner))
+    found = next(getattr(one, owner) for one in (linefix, association, registration, formats) if hasattr(one, owner))
     return part in inspect.signature(found).parameters if name.endswith(")") else not part or hasattr(found, part)
 
 

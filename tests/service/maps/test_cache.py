@@ -31,7 +31,7 @@ INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
 
 
 def a_map(size: int) -> CachedMap:
-    return CachedMap(INDEX, {None: "map"}, size)
+    return CachedMap(INDEX, size)
 
 
 # Maps that are looked up, and room that is made before something is built; what was built; maps and bytes at the end.
@@ -98,7 +98,7 @@ def test_the_default_cache_keeps_the_largest_map() -> None:
     index = MapIndex.build(Segments.from_array(np.hstack([middles - half, middles + half])))
     cache = IndexCache(Settings().cache_bytes, Metrics())
     for _ in range(2):
-        cache.get("a", lambda: CachedMap(index, {None: "map"}, index.nbytes), NO_END)
+        cache.get("a", lambda: CachedMap(index, index.nbytes), NO_END)
     assert cache.has("a")
     assert cache.bytes <= Settings().cache_bytes
 
@@ -136,7 +136,7 @@ def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, part
     assert revision is None
     other, _ = lookup.look(inline(**parts), oriented=True)
     assert other is not plain
-    assert other.frames[None] == parts.get("frame_id", "map")
+    assert other.maps.frame_id == parts.get("frame_id", "map")
     assert isinstance(other.maps, MapIndex)
     assert other.maps.sigma == parts.get("sigma")
     assert lookup.look(inline(), oriented=True)[0] is plain
@@ -163,7 +163,7 @@ def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup)
 
     lookup.store.load = changing  # type: ignore[method-assign]
     found, revision = lookup.look(StoredMap(map_id="m"), oriented=True)
-    assert (found.frames[None], revision) == ("change 1", 3)
+    assert (found.maps.frame_id, revision) == ("change 1", 3)
 
 
 def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(lookup: Lookup) -> None:
@@ -172,7 +172,7 @@ def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(
     found = lookup.find("m", oriented=True)
     assert found.document is None
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
-    assert lookup.indexed(found, oriented=True, deadline=Deadline()).frames[None] == "map"  # read again
+    assert lookup.indexed(found, oriented=True, deadline=Deadline()).maps.frame_id == "map"  # read again
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
     lookup.put("m", segments=examples.WALLS, frame_id="other")
     with pytest.raises(BusyStoreError):
