@@ -17,6 +17,14 @@ type Line = (segment: Segment, colour: string, width: number, dashes?: number[])
 
 const oldWalls = (one: Change) => one.segments.map((k) => state.walls[k]);
 const newWalls = (one: Change) => one.new.map((each) => each.segment);
+const lengthOf = ([x1, y1, x2, y2]: Segment) => Math.hypot(x2 - x1, y2 - y1);
+
+/** The mean of the ends of its walls, old and new. */
+function middleOf(one: Change): [number, number] {
+  const ends = [...oldWalls(one), ...newWalls(one)];
+  const middle = (axis: number) => ends.reduce((sum, wall) => sum + wall[axis] + wall[axis + 2], 0) / (2 * ends.length);
+  return [middle(0), middle(1)];
+}
 
 export function drawChanges(context: CanvasRenderingContext2D, colours: Record<string, string>, line: Line): void {
   state.proposal?.changes.forEach((one, k) => {
@@ -35,10 +43,8 @@ function drawNumbers(context: CanvasRenderingContext2D, colours: Record<string, 
   const written: [number, number][] = [];
   Object.assign(context, { font: `600 ${LETTERS}px sans-serif`, textAlign: "center", textBaseline: "middle", lineWidth: 4, strokeStyle: colours.paper });
   state.proposal?.changes.forEach((one, k) => {
-    const ends = [...oldWalls(one), ...newWalls(one)];
-    const middle = (axis: number) => ends.reduce((sum, wall) => sum + wall[axis] + wall[axis + 2], 0) / (2 * ends.length);
-    const longest = Math.max(...ends.map(([x1, y1, x2, y2]) => Math.hypot(x2 - x1, y2 - y1)));
-    let [x, y] = toPixels(middle(0), middle(1));
+    const longest = Math.max(...[...oldWalls(one), ...newWalls(one)].map(lengthOf));
+    let [x, y] = toPixels(...middleOf(one));
     if (longest * view.scale < 2 * LETTERS) y -= LETTERS;
     while (written.some(([a, b]) => Math.abs(a - x) < LETTERS && Math.abs(b - y) < LETTERS)) y += LETTERS;
     written.push([x, y]);
@@ -62,9 +68,12 @@ export function changeAt(x: number, y: number, near: number): number {
 
 export const counted = (count: number, what: string) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
+/** What has changed, where its number is on the plan, and the lengths of its walls. */
 export function titleOf(one: Change): string {
-  const parts = [one.segments.length ? counted(one.segments.length, "old wall") : "", one.new.length ? `${one.new.length} new` : ""];
-  return `${one.code}, ${parts.filter(Boolean).join(", ")}`;
+  const [x, y] = middleOf(one).map((part) => part.toFixed(1));
+  const metres = (walls: Segment[]) => `${walls.reduce((sum, wall) => sum + lengthOf(wall), 0).toFixed(2)} m`;
+  const parts = [one.segments.length ? `${metres(oldWalls(one))} before` : "", one.new.length ? `${metres(newWalls(one))} after` : ""];
+  return `${one.code} near (${x}, ${y}): ${parts.filter(Boolean).join(", ")}`;
 }
 
 /** 4 digits above 99 %, as 99.99 % and 99.9 % are not the same. */

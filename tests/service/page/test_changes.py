@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -91,8 +92,8 @@ def test_changes_have_colours_evidence_and_a_map_with_the_accepted_ones(
     assert REMOVED in middle  # its number
 
     told = next(one for one in proposal["changes"] if one["code"] == "removed")["evidence"]
-    beams, places, visits = (told[name] for name in ("beams_through", "poses", "visits"))
-    evidence = f"{beams} beams pass through the old walls; from {places} places on {visits} visits"
+    evidence = "{beams_through} beams pass through the old walls; from {poses} places on {visits} visits".format(**told)
+    expect(row(page, "added")).to_contain_text(re.compile(r"added near \(9\.3, 4\.6\): 1\.\d\d m after"))
     page.mouse.move(*drawn(page).at(*PILLAR_SIDE))
     expect(page.locator("#hover")).to_contain_text(evidence)
     page.mouse.move(*drawn(page).at(6.0, 6.0))
