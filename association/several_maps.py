@@ -129,6 +129,11 @@ class KnownOfMaps:
     prior_map: str | None = None
     map_weights: Mapping[str, float] | None = None
 
+    def __post_init__(self) -> None:
+        """Raise `InvalidSearchError` where the prior is none."""
+        if not isinstance(self.prior, Prior | None):
+            raise InvalidSearchError(f"expected a SoftPrior or a HardPrior, found {self.prior!r}", argument="prior")
+
 
 NOTHING_KNOWN = KnownOfMaps()
 

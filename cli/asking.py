@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -37,14 +37,9 @@ class Where:
 
     server: str | None = option(None, "Use the service at this URL; the key is read from LINEFIX_KEY.", "URL")
 
-    @contextmanager
-    def opened(self) -> Iterator[Here | Server]:
+    def opened(self) -> AbstractContextManager[Here | Server]:
         """Give the service, for several requests."""
-        if self.server is None:
-            yield Here()
-        else:
-            with server_at(self.server) as remote:
-                yield remote
+        return nullcontext(Here()) if self.server is None else server_at(self.server)
 
     def ask(self, method: str, *arguments: Any, names: Names = NO_NAMES, **more: Any) -> Json:
         """Return an answer, see `Here.ask`."""

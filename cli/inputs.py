@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import RefusedError, WrongUseError, needing
-from .printing import Json, noted, print_lines, rows, write_json
+from .printing import Json, noted, print_lines, rows
 
 if TYPE_CHECKING:
     from formats import LineMap
@@ -111,13 +111,6 @@ def line_map_of(document: Json) -> LineMap:
 
     part, points_sigma = map_part(document, "map"), document.get("points_sigma")
     return LineMap(part.segments, part.sigma, part.oriented, points=part.points.positions, points_sigma=points_sigma)
-
-
-def write_document(document: Json, out: Path) -> None:
-    """Write a map as a map file; raises `RefusedError` where the name has another ending."""
-    if out.suffix.lower() != ".json":
-        raise RefusedError(f"{out.name}: expected a name that ends in .json")
-    write_json(document, out)
 
 
 def draw_picture(document: Json, out: Path, *poses: Any, **more: Any) -> None:

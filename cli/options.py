@@ -39,7 +39,7 @@ def argument(help: str, metavar: str) -> Any:
 
 
 A_MAP = "A map file: json, yaml of map_server, dxf, svg, geojson or csv;"
-WRITE_MAP = "Write the map to this file: json, dxf, svg, geojson or csv."
+WRITE_MAP = "Write the map to this JSON file."
 LIKELY = "PROBABILITY"
 
 MapArgument = Annotated[str, argument(f"{A_MAP} or the id of a stored map.", "MAP")]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+from .errors import RefusedError
 from .options import flag
 
 Json = dict[str, Any]
@@ -19,6 +20,8 @@ Lines = Iterable[str]
 
 LOOK_SECONDS = 0.3
 REPORT_SECONDS = 10.0  # between two lines where there is no terminal
+UNLIKELY = 0.1  # probability of a pose below which the map may be wrong
+HINT = "linefix map check MAP --log LOG{} tests the scale, the handedness and the directions of the map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +53,11 @@ def print_json(answer: Any) -> None:
 
 
 def write_json(document: Any, out: Path) -> None:
-    """Write one document to a file."""
+    """Write one document to a file; raises `RefusedError` where its name ends otherwise than in ``.json``."""
     from linefix.documents.encoding import encode
 
+    if out.suffix.lower() != ".json":
+        raise RefusedError(f"{out.name}: expected a name that ends in .json")
     out.write_bytes(encode(document) + b"\n")
 
 
@@ -125,12 +130,10 @@ def noted(note: Json) -> str:
 
 def verdict_rows(answer: Json) -> list[tuple[str, str]]:
     """Return the rows that show a person whether a pose was found, and which."""
-    told = f"{answer['status']}, {'usable' if answer['usable'] else 'not usable'}"
-    if answer.get("probability") is not None:
-        told += f", probability {answer['probability']:.4f}"
-    found = [("verdict", told), ("pose", pose_text(answer["pose"]))]
-    covariance = answer["covariance"]
-    if covariance is not None:
+    usable, probability = "usable" if answer["usable"] else "not usable", answer.get("probability")
+    sure = "" if probability is None else f", probability {probability:.4f}"
+    found = [("verdict", f"{answer['status']}, {usable}{sure}"), ("pose", pose_text(answer["pose"]))]
+    if (covariance := answer["covariance"]) is not None:
         x, y, theta = (math.sqrt(max(0.0, covariance[k][k])) for k in range(3))
         found.append(("sigma", f"x {x:.4f} m, y {y:.4f} m, theta {math.degrees(theta):.3f} degrees"))
     if answer["unobservable"] is not None:
@@ -138,6 +141,8 @@ def verdict_rows(answer: Json) -> list[tuple[str, str]]:
         found.append(("free along", f"({dx:.3f}, {dy:.3f})"))
     for name in ("reasons", "warnings"):
         found += [(name.rstrip("s"), f"{one['code']}: {one['message']}") for one in answer.get(name, [])]
+    if 0.0 < (probability or 0.0) < UNLIKELY:
+        found.append(("hint", HINT.format("")))
     return found
 
 

@@ -14,7 +14,7 @@ from .errors import NoSuchMapError, RefusedError
 from .inputs import NamedMap, draw_picture, places_of, read_maps, target_of
 from .logs import Frames, Tracker, map_of, mount_of, opened, pose_of, print_notes, scans_of
 from .options import TopicOptions, UsableOptions, argument, grouped, option, required
-from .printing import Json, Output, print_json, print_lines, progress, rows, table
+from .printing import HINT, Json, Output, print_json, print_lines, progress, rows, table
 
 if TYPE_CHECKING:
     from formats import LoggedScan
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 REFUSED = "refused"
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
-HINT = "linefix map check MAP --log LOG{} tests the scale, the handedness and the directions of the map"
 MODE = "track: the prior is by odometry from the last usable pose; global: no prior."
 NOTHING: Json = {"status": None, "usable": False, "pose": None, "reasons": [], "warnings": []}  # of a refused scan
 FIELDS = ("status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms")  # of a line of --json

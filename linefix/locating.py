@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -221,6 +222,8 @@ def map_part(map: Any, argument: str) -> MapPart:
         return MapPart.of(map)
     if isinstance(map, Mapping):
         return _document_part(map, argument)
+    if isinstance(map, str | PathLike):
+        raise InvalidArgumentError(f"found the name {str(map)!r}, expected a map; use read_map", argument=argument)
     inner: Any = getattr(map, "map", map)  # an imported map comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):

@@ -125,7 +125,9 @@ def find(
         raise DeadlinePassedError from None
     watch.lap("search")
     references = {name: one for name, one in target.references.items() if name is not None and one is not None}
-    answer = results.association_json(result, inputs.included_of(options, scanned), references)
+    segments = scanned.listed if "segments" in options.include else None
+    included = results.Included(frozenset(options.include), segments, scanned.starts)
+    answer = results.association_json(result, included, references)
     return result, answer if references else {**answer, "map": target.references[None]}
 
 

@@ -83,7 +83,7 @@ class Segments:
         found = cls._lines(e)
         if not _are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
             _refuse(found.lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
-            _refuse(found.lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
+            _refuse(found.lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m; check the unit", argument)
         return found
 
     @classmethod

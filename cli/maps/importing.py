@@ -8,10 +8,10 @@ from typing import Annotated
 
 from ..asking import Where, answering
 from ..errors import flags_of, needing
-from ..inputs import draw_picture, existing, write_document
+from ..inputs import draw_picture, existing
 from ..logs import some_scans
 from ..options import DRAW_RESULT, ORIENTED, WRITE_MAP, TopicOptions, argument, flag, grouped, option
-from ..printing import Json, Output, noted, rows
+from ..printing import Json, Output, noted, rows, write_json
 from .checking import SAMPLES, check_rows, of_sensor
 
 UNIT = "Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, us-ft, or metres per unit."
@@ -58,7 +58,7 @@ def import_map(
     if picture is not None:
         draw_picture(answer["map"], picture)
     if out is not None:
-        write_document(answer["map"], out)
+        write_json(answer["map"], out)
     output.print(answer, rows([*report_rows(answer), *check_rows(answer["check"], answer["map"])]))
 
 

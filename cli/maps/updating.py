@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from ..asking import Where
 from ..errors import WrongUseError, flags_of, needing
-from ..inputs import draw_picture, line_map_of, read_map_or_id, write_document
+from ..inputs import draw_picture, line_map_of, read_map_or_id
 from ..logs import some_scans
 from ..options import DRAW_RESULT, WRITE_MAP, MapArgument, TopicOptions, argument, grouped, option
-from ..printing import Json, Output, rows
+from ..printing import Json, Output, rows, write_json
 from .checking import of_sensor
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def update(
     request = {"visits": visits, "accept": result.accept, "refuse": result.refuse or []}
     answer = where.ask("update_map", target, request, names=names)
     if result.out is not None:
-        write_document(answer["map"], result.out)
+        write_json(answer["map"], result.out)
     old = where.whole_map(target)
     if result.picture is not None:
         draw_changes(old, answer, result.picture)

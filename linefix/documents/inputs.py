@@ -17,8 +17,7 @@ from .analysis import AnalyzeRequest
 from .errors import Fault, InvalidRequestError, RequestError, fault_of
 from .parts import HardPriorFields, MapDocument, SearchOptions, SoftPriorFields, is_oriented
 from .requests import CheckRequest, RegisterRequest
-from .results import Included
-from .scans import Scanned, scanned_of, transform_of
+from .scans import scanned_of, transform_of
 from .updates import ApplyRequest, SharpenedWalls, UpdateRequest
 
 # Options of a search that have the same names and values in a request.
@@ -38,12 +37,6 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
     """Return how to search a map whose directions count, or do not."""
     include = tuple(part for part in options.include if part != "segments")  # those of a scan are not searched for
     return AssociationOptions(oriented=oriented, include=include, **{name: getattr(options, name) for name in _AS_SENT})
-
-
-def included_of(options: SearchOptions, scanned: Scanned) -> Included:
-    """Return the parts of an answer that are requested, and the segments that were found in a scan."""
-    parts = frozenset[str](options.include)
-    return Included(parts, scanned.listed if "segments" in parts else None, scanned.starts)
 
 
 def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:
@@ -145,11 +138,10 @@ def parts_of(documents: Iterable[tuple[str | None, MapDocument]], oriented: bool
 
     A single map has the name None, for which that of its part is empty. `oriented` None: as each map states.
     """
-    parts = dict[str, MapPart]()
-    for number, (name, document) in enumerate(documents):
-        path = "map." if name is None else f"maps.{number}."
-        parts[name or ""] = part_of(document, oriented=oriented, path=path)
-    return parts
+    return {
+        name or "": part_of(document, oriented=oriented, path="map." if name is None else f"maps.{number}.")
+        for number, (name, document) in enumerate(documents)
+    }
 
 
 def reference_of(name: str | None, revision: int | None = None) -> dict[str, object] | None:

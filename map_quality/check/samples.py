@@ -103,7 +103,8 @@ def try_sample(
         index.undirected_by(deadline)  # the search takes it from there
     result = associate(index, scan, None, AssociationOptions(oriented=oriented, on_map=1.0), deadline)
     trials = {Hypothesis(oriented, index.sigma): result}
-    for one in hypotheses(oriented, index.sigma):
+    # In another unit no hypothesis but that of the scale says anything, and searches take seconds.
+    for one in hypotheses(oriented, index.sigma) if index.diagonal <= tuning.LARGEST else ():
         if not deadline.passed:
             with suppress(IndexingEndedError):
                 place = replace(index if one.oriented else index.undirected_by(deadline), sigma=one.sigma)

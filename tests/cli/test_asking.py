@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
+from cli.printing import HINT, verdict_rows
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 from tests.batch.logs import ROOM, SEEN
@@ -47,6 +48,8 @@ def test_locate_tells_people_the_verdict(linefix: Linefix, folder: Path) -> None
     ended = linefix.done("locate", "room.json", "scan.json")
     assert "ok, usable" in ended.out
     assert "x 0.999 m, y 1.001 m" in ended.out
+    unlikely = {**linefix.done("locate", "room.json", "scan.json", "--json").answer, "probability": 0.05}
+    assert ("hint", HINT.format("")) in verdict_rows(unlikely)
     (folder / "nothing.json").write_text('{"segments": []}')
     assert "no_match" in linefix.done("locate", "room.json", "nothing.json").out  # no answer, and no failure
 

@@ -44,33 +44,21 @@ def is_found(answer: linefix.AssociationResult) -> bool:
     return answer.usable and math.hypot(pose.x - TRUTH.x, pose.y - TRUTH.y) < 0.02
 
 
-@pytest.mark.parametrize("form", ["array", "list", "segments", "map", "imported", "index"])
-def test_a_map_is_taken_in_each_form(form: str) -> None:
+def test_a_map_is_taken_in_each_form() -> None:
     segments = linefix.Segments.from_array(ROOM)
     line_map = linefix.LineMap(segments)
-    maps: dict[str, Any] = {
-        "array": ROOM,
-        "list": ROOM.tolist(),
-        "segments": segments,
-        "map": line_map,
-        "imported": ImportedMap(line_map, ImportReport("json", ("room.json",))),
-        "index": linefix.index_map(segments),
-    }
-    assert is_found(linefix.locate(maps[form], laser()))
+    imported = ImportedMap(line_map, ImportReport("json", ("room.json",)))
+    maps: list[Any] = [ROOM, ROOM.tolist(), segments, line_map, imported, linefix.index_map(segments)]
+    for form in maps:
+        assert is_found(linefix.locate(form, laser())), form
 
 
-@pytest.mark.parametrize("form", ["ranges", "laser", "points", "segments", "rows", "scan"])
-def test_a_scan_is_taken_in_each_form(form: str) -> None:
+def test_a_scan_is_taken_in_each_form() -> None:
     found = linefix.vectorize(laser()).measured.segments
-    scans: dict[str, Any] = {
-        "ranges": ranges(),
-        "laser": laser(),
-        "points": laser().points(),
-        "segments": found,
-        "rows": found.endpoints.tolist(),
-        "scan": linefix.scan_of(laser()),
-    }
-    assert is_found(linefix.locate(ROOM, scans[form], ANGLES if form == "ranges" else None))
+    scans: list[Any] = [laser(), laser().points(), found, found.endpoints.tolist(), linefix.scan_of(laser())]
+    for form in scans:
+        assert is_found(linefix.locate(ROOM, form)), form
+    assert is_found(linefix.locate(ROOM, ranges(), ANGLES))
 
 
 def test_a_scanner_that_moved_saw_from_the_middle_of_its_way() -> None:
@@ -104,11 +92,14 @@ def test_a_map_keeps_what_is_known_of_its_error(tmp_path: Path) -> None:
         (ROOM, np.ones((3, 5)), "scan"),
         ([[0, 0, 1]], np.ones((3, 2)), "map"),
         ([], np.ones((3, 2)), "map"),
+        ("room.json", np.ones((3, 2)), "map: found the name 'room.json'"),
     ],
 )
 def test_what_is_no_map_or_scan_is_refused_by_name(map: Any, scan: Any, named: str) -> None:
     with pytest.raises(linefix.InputError, match=named):
         linefix.locate(map, scan)
+    with pytest.raises(linefix.InputError, match="prior: expected a SoftPrior or a HardPrior, found 3"):
+        linefix.locate(ROOM, SEEN, prior=3)  # type: ignore[arg-type]
 
 
 def test_a_map_document_is_indexed_as_its_file_says() -> None:

@@ -277,6 +277,7 @@ def test_what_the_samples_show_together(
         pytest.param(25.4, "millimetres taken for inches", marks=LONG),
         *(pytest.param(one, "", marks=LONG) for one in (1.01, 0.62, 2.5, 1.0 / 0.3048)),
         pytest.param(1.0 / 0.0254, "inches taken for metres", marks=LONG),
+        pytest.param(304.8, "millimetres taken for feet", marks=LONG),
         pytest.param(1e-3, "metres taken for millimetres", marks=LONG),
     ],
 )
