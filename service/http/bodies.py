@@ -8,8 +8,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
+from pydantic import BaseModel
+
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
 from linefix.documents.limits import Limits
+from linefix.documents.reading import read_model
 
 from ..admission.budget import Take
 from ..errors import BodyBrokenError, BodyTooSlowError, EncodingError, MediaTypeError
@@ -17,6 +20,7 @@ from ..parsing.child import LARGE
 from .exchange import JSON, Exchange
 
 T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
 Reader = Callable[[bytes | bytearray, Limits], T]
 """A function from JSON to a checked request; a module's function, so that another process can call it."""
 FORM = "multipart/form-data"
@@ -24,16 +28,15 @@ _PIECE = 1 << 20  # bytes that are unpacked at a time
 _GZIP = zlib.MAX_WBITS | 16
 
 
-async def read(exchange: Exchange, reader: Reader[T]) -> T:
-    """Receive the body and check it, off the event loop where that takes long; raises as `receive`.
+async def read(exchange: Exchange, model: type[M]) -> M:
+    """Receive the body and check it against a model; raises as `receive`."""
+    return await read_by(exchange, partial(read_model, model))
 
-    The deadline counts from the moment when the body is there.
-    """
+
+async def read_by(exchange: Exchange, reader: Reader[T]) -> T:
+    """Receive the body and check it; the deadline counts from the moment when the body is there."""
     with exchange.services.bodies.account(exchange.ticket.holder) as take:
-        data = await receive(exchange, take)
-        if len(data) <= LARGE:
-            return reader(data, exchange.services.limits)
-        return await exchange.unless_hung_up(parse(exchange, reader, data))
+        return await parse(exchange, reader, await receive(exchange, take))
 
 
 async def receive(exchange: Exchange, take: Take, taken: str = JSON) -> bytearray:

@@ -1,6 +1,6 @@
 """One request while it is served, from its head to its line in the log; routes get it by `Depends`.
 
-`middleware` makes and ends it, `bodies` reads its body, `stages` has its map looked up and searched, `respond` answers.
+`middleware` makes and ends it, `bodies` reads its body, `stages` has its map looked up and searched, `answer` ends it.
 
 A server that closes a connection with bytes unread has the system reset it, and the reset overtakes the answer: the
 client sees a broken connection in place of a refusal. So the rest of a body that no route reads is dropped first. Data
@@ -11,12 +11,12 @@ pieces.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
-from fastapi import Depends, Request
+from fastapi import Depends, Path, Request
 from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
@@ -147,9 +147,9 @@ class Exchange(Job):
         """Run a part of this request in a slot of a gate, left out: that of the searches; it is not refused later."""
         return await (gate or self.services.gate).run(call, self.deadline, self.ticket)
 
-    async def respond(self, work: Coroutine[Any, Any, bytes]) -> Response:
-        """Wait for the work of this request and return its JSON as a response; raises also `HangUpError`."""
-        return self.json(await self.unless_hung_up(work))
+    async def answer(self, call: Callable[[], bytes], gate: Gate | None = None) -> Response:
+        """Run the last part of this request, as `run` does, and return its JSON as a response."""
+        return self.json(await self.run(call, gate))
 
     def json(self, data: bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
         """Return JSON as a response. A large one counts as held until the client has taken it, all but the last few.
@@ -163,8 +163,8 @@ class Exchange(Job):
             self.held.enter_context(self.services.answers.account(self.ticket.holder))(len(data))
         return Response(data, status, headers, JSON)
 
-    async def unless_hung_up(self, work: Coroutine[Any, Any, T]) -> T:
-        """Wait for work, and cancel it when the client hangs up first; the body has been read before.
+    async def unless_hung_up(self, work: Awaitable[T]) -> T:
+        """Wait for work, and cancel it when the client hangs up first, after it has sent its body.
 
         The work stays in the task of the request, and the watch starts later: each would cost a request tens of
         microseconds.
@@ -177,18 +177,17 @@ class Exchange(Job):
         watches: list[asyncio.Task[None]] = []
 
         async def watch() -> None:
+            while self.unread:
+                await asyncio.sleep(WATCH_AFTER)
             while (await self.receive())["type"] != "http.disconnect":
                 pass
+            self.deadline.cancel()
             limit.reschedule(0.0)
 
         begin = asyncio.get_running_loop().call_later(WATCH_AFTER, lambda: watches.append(asyncio.create_task(watch())))
         try:
             async with asyncio.timeout(None) as limit:
-                try:
-                    return await work
-                except asyncio.CancelledError:
-                    self.deadline.cancel()
-                    raise
+                return await work
         except TimeoutError:
             if not limit.expired():
                 raise
@@ -211,6 +210,9 @@ async def _searching(request: Request) -> Exchange:
     return exchange
 
 
+MapIdPath = Annotated[
+    str, Path(pattern="^[A-Za-z0-9._-]+$", min_length=1, max_length=128, examples=["hq-3"], description="the map's id")
+]
 Admitted = Annotated[Exchange, Depends(_any)]
 """A request that was let in."""
 Searching = Annotated[Exchange, Depends(_searching)]

@@ -22,6 +22,7 @@ logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would send again at once
 OTHER = "unmatched"
+WRITES = ("PUT", "DELETE")
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
@@ -56,7 +57,9 @@ class RequestMiddleware:
         state[KEY] = exchange
         try:
             exchange.ticket = services.entrance.admit(inner)
-            await self._app(inner, exchange.receive, exchange.send)
+            serving = self._app(inner, exchange.receive, exchange.send)
+            # What a client has sent to be stored is stored, and logged, though it has gone.
+            await (serving if scope["method"] in WRITES else exchange.unless_hung_up(serving))
         except HangUpError:
             exchange.status = CLIENT_CLOSED_REQUEST
         except Exception as error:

@@ -36,14 +36,15 @@ PROBLEM: dict[int | str, dict[str, Any]] = {
 _READ: dict[str, type[BaseModel]] = {}  # models of the bodies that the routes read by themselves
 
 
-def takes(model: type[BaseModel], examples: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the documentation of a body that the route itself reads."""
+def takes(model: type[BaseModel], answer: type[BaseModel], examples: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """Return the documentation of a route that reads its body by itself, as arguments of its decorator."""
     _READ[model.__name__] = model
     content = {
         "schema": {"$ref": _REF.format(model=model.__name__)},
         "examples": {name: {"value": value} for name, value in examples.items()},
     }
-    return takes_content(JSON, content, "May be gzip (Content-Encoding). Metres and radians.")
+    described = takes_content(JSON, content, "May be gzip (Content-Encoding). Metres and radians.")
+    return {"response_model": answer, "openapi_extra": described | more}
 
 
 def takes_content(media_type: str, content: dict[str, Any], description: str) -> dict[str, Any]:

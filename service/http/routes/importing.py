@@ -49,14 +49,14 @@ async def import_map(exchange: Searching) -> Response:
     Convert files of another tool to a map, and report conversions and findings; nothing is stored.
     """
 
-    async def work(read: ReadFiles) -> bytes:
+    async def work(read: ReadFiles) -> Response:
         """Index the map in a slot of its own, and check it in one of an operation; searches go before both."""
         exchange.watch.lap("read")
         services = exchange.services
         line_map = await parse(exchange, partial(read_model, InlineMap), read.content)
         indexing = partial(index_import, services.lookup, line_map, exchange.deadline)
         index = await exchange.run(indexing, services.indexing)
-        return await exchange.run(partial(answer_import, index, line_map, read, exchange), services.operations)
+        return await exchange.answer(partial(answer_import, index, line_map, read, exchange), services.operations)
 
     return await _import(exchange, work)
 
@@ -68,14 +68,14 @@ async def import_scans(exchange: Searching) -> Response:
     Read some scans of a bag or another log, evenly spread; nothing is stored.
     """
 
-    async def work(read: ReadFiles) -> bytes:
-        return await exchange.run(partial(answer_scans, read, exchange), exchange.services.operations)
+    async def work(read: ReadFiles) -> Response:
+        return await exchange.answer(partial(answer_scans, read, exchange), exchange.services.operations)
 
     return await _import(exchange, work, scans=True)
 
 
 async def _import(
-    exchange: Exchange, work: Callable[[ReadFiles], Awaitable[bytes]], *, scans: bool = False
+    exchange: Exchange, work: Callable[[ReadFiles], Awaitable[Response]], *, scans: bool = False
 ) -> Response:
     """Have a form read in a slot of imports, and answer with what `work` makes of its files."""
     services = exchange.services
@@ -83,11 +83,7 @@ async def _import(
         content = await receive(exchange, take, FORM)
         kind = exchange.headers.get("content-type", "")
         reading = partial(read_apart, content, kind, services.import_bounds, exchange.deadline, scans=scans)
-
-        async def whole() -> bytes:
-            return await work(await exchange.run(reading, services.importing))
-
         try:
-            return await exchange.respond(whole())
+            return await work(await exchange.run(reading, services.importing))
         except DeadlinePassedError:  # it is no search that has not begun
             raise ImportTooLateError from None

@@ -14,11 +14,10 @@ from linefix.documents.reading import read_map
 
 from ...maps.lookup import outline_of
 from ..answers import MapList, MapSummaryAnswer
-from ..bodies import read
+from ..bodies import read_by
 from ..etags import demands_of, etag
-from ..exchange import Admitted
+from ..exchange import Admitted, MapIdPath
 from ..openapi import PROBLEM, takes
-from ..searching import MapIdPath
 from ..stages import ask_store
 
 router = APIRouter(tags=["maps"], responses=PROBLEM)
@@ -36,12 +35,11 @@ def _conditional(*names: str) -> dict[str, Any]:
 
 @router.put(
     "/v1/maps/{map_id}",
-    response_model=MapSummaryAnswer,
+    **takes(MapDocument, MapSummaryAnswer, {"a room": examples.MAP}, **_conditional("If-Match", "If-None-Match")),
     responses={
         200: {"description": "A new revision", "headers": ETAG},
         201: {"description": "A new map", "headers": ETAG, "model": MapSummaryAnswer},
     },
-    openapi_extra={**takes(MapDocument, {"a room": examples.MAP}), **_conditional("If-Match", "If-None-Match")},
 )
 async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Store a map.
@@ -50,7 +48,7 @@ async def put_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """
     demands = demands_of(exchange.headers)
     services = exchange.services
-    asked, document = await read(exchange, read_map)
+    asked, document = await read_by(exchange, read_map)
     outline = await services.parse_threads.run(partial(outline_of, asked))
     put = partial(services.store.put, map_id, document, outline, demands, exchange.ticket.maps)
     revision, created = await ask_store(exchange, put)

@@ -18,42 +18,43 @@ from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, U
 from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps, worked
 
 from ...maps.lookup import FoundMaps
-from ..exchange import Exchange, Searching
-from ..openapi import PROBLEM
-from ..searching import MapIdPath, searching
+from ..bodies import read
+from ..exchange import Exchange, MapIdPath, Searching
+from ..openapi import PROBLEM, takes
 from ..stages import index, look_up_map
 
-router = APIRouter(responses=PROBLEM)
+router = APIRouter(tags=["maps"], responses=PROBLEM)
 Operation = Callable[[MapIndex, FoundMaps], Steps]
 """Give the steps of an operation on a map, with its index."""
 
 
-@searching(router, "/v1/maps/{map_id}:analyze", AnalyzeRequest, AnalyzeAnswer, {"a robot": examples.ANALYZE})
-async def analyze_map(exchange: Exchange, asked: AnalyzeRequest) -> bytes:
+@router.post("/v1/maps/{map_id}:analyze", **takes(AnalyzeRequest, AnalyzeAnswer, {"a robot": examples.ANALYZE}))
+async def analyze_map(exchange: Searching, map_id: MapIdPath) -> Response:
     """Analyze a stored map.
 
     Simulate scans on a grid of poses and report where localization succeeds.
     """
-    return await _analyze(exchange, _stored(exchange), asked)
+    return await _analyze(exchange, StoredMap(map_id=map_id), await read(exchange, AnalyzeRequest))
 
 
-@searching(router, "/v1/analyze", MapAnalyzeRequest, AnalyzeAnswer, {"a room": examples.ANALYZE_ROOM})
-async def analyze(exchange: Exchange, asked: MapAnalyzeRequest) -> bytes:
+@router.post("/v1/analyze", **takes(MapAnalyzeRequest, AnalyzeAnswer, {"a room": examples.ANALYZE_ROOM}))
+async def analyze(exchange: Searching) -> Response:
     """Analyze a map that comes with the request.
 
     Simulate scans on a grid of poses of a map in the request.
     """
+    asked = await read(exchange, MapAnalyzeRequest)
     return await _analyze(exchange, asked.map, asked)
 
 
-async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> bytes:
+async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
     def steps(index: MapIndex, _: FoundMaps) -> Steps:
         return analysis_steps(index, asked, exchange.deadline)
 
     return await _answer(exchange, on, steps, asked, {"places": lambda found: found["summary"]["places"]})
 
 
-@router.get("/v1/maps/{map_id}:check", tags=["maps"], response_model=CheckAnswer)
+@router.get("/v1/maps/{map_id}:check", response_model=CheckAnswer)
 async def check_map(
     exchange: Searching,
     map_id: MapIdPath,
@@ -68,60 +69,57 @@ async def check_map(
     """
     exchange.services.gate.enter(exchange.ticket)
     asked = NO_SAMPLES.model_copy(update={"deadline_ms": deadline_ms})
-    return await exchange.respond(_check(exchange, asked))
+    return await _check(exchange, map_id, asked)
 
 
-@searching(router, "/v1/maps/{map_id}:check", CheckRequest, CheckAnswer, {"two scans": examples.CHECK})
-async def check_map_with_scans(exchange: Exchange, asked: CheckRequest) -> bytes:
+@router.post("/v1/maps/{map_id}:check", **takes(CheckRequest, CheckAnswer, {"two scans": examples.CHECK}))
+async def check_map_with_scans(exchange: Searching, map_id: MapIdPath) -> Response:
     """Check a map with sample scans.
 
     Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved.
     """
-    return await _check(exchange, asked)
+    return await _check(exchange, map_id, await read(exchange, CheckRequest))
 
 
-async def _check(exchange: Exchange, asked: CheckRequest) -> bytes:
+async def _check(exchange: Exchange, map_id: str, asked: CheckRequest) -> Response:
     def steps(index: MapIndex, source: FoundMaps) -> Steps:
         # An index of its own: one without directions, which a check may add to it, goes with the check, for the cache
         # does not count it.
         return check_steps(replace(index), source.maps[None].oriented, asked, exchange.deadline)
 
     noted = {"findings": lambda found: [one["code"] for one in found["findings"]]}
-    return await _answer(exchange, _stored(exchange), steps, asked, noted, oriented=True)
+    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, noted, oriented=True)
 
 
-@searching(router, "/v1/maps/{map_id}:update", UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE})
-async def update_map(exchange: Exchange, asked: UpdateRequest) -> bytes:
+@router.post("/v1/maps/{map_id}:update", **takes(UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE}))
+async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
     """Propose changes of a stored map.
 
     Propose changes of a map that scans of several visits show; nothing is stored.
     """
+    asked = await read(exchange, UpdateRequest)
 
     def steps(index: MapIndex, source: FoundMaps) -> Steps:
         old = exchange.services.lookup.document(source.maps[None], source.document)
         return update_steps(index, old, asked, exchange.deadline)
 
     noted = {"changes": lambda found: len(found["changes"])}
-    return await _answer(exchange, _stored(exchange), steps, asked, noted, name="based_on")
+    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, noted, name="based_on")
 
 
-@searching(router, "/v1/maps:apply", ApplyRequest, ApplyAnswer, {"a rack is gone": examples.APPLY})
-async def apply_changes(exchange: Exchange, asked: ApplyRequest) -> bytes:
+@router.post("/v1/maps:apply", **takes(ApplyRequest, ApplyAnswer, {"a rack is gone": examples.APPLY}))
+async def apply_changes(exchange: Searching) -> Response:
     """Apply the accepted changes of an update.
 
     Return a map with those changes of an update that are accepted; nothing is searched or stored.
     """
+    asked = await read(exchange, ApplyRequest)
     accepted = sum(one.accepted for one in asked.changes)
 
     def work() -> bytes:
         return exchange.encoded({**applied(asked, exchange.watch), "client_ref": asked.client_ref}, changes=accepted)
 
-    return await exchange.run(work)
-
-
-def _stored(exchange: Exchange) -> StoredMap:
-    """Return the map that the path names, which has been checked."""
-    return StoredMap(map_id=exchange.scope["path_params"]["map_id"])
+    return await exchange.answer(work)
 
 
 async def _answer(
@@ -133,7 +131,7 @@ async def _answer(
     *,
     oriented: bool | None = None,
     name: str = "map",
-) -> bytes:
+) -> Response:
     """Answer with an operation on a map; `noted` are fields of the log, `name` is that of the map's reference."""
     exchange.limit(asked.deadline_ms)
     source = await look_up_map(exchange, on, oriented=oriented)
@@ -146,4 +144,4 @@ async def _answer(
         fields = {field: read(found) for field, read in noted.items()}
         return exchange.encoded({**found, name: reference, "client_ref": asked.client_ref}, map=reference, **fields)
 
-    return await exchange.run(work, exchange.services.operations)
+    return await exchange.answer(work, exchange.services.operations)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from functools import partial
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
 from association import CancelledError
 from linefix.documents import examples
@@ -18,13 +18,13 @@ from linefix.operations import registered, vectorized
 
 from ...work.results import BatchResult, batch_done
 from ..answers import BatchAnswer
-from ..exchange import Exchange
-from ..openapi import PROBLEM
+from ..bodies import read, read_by
+from ..exchange import Searching
+from ..openapi import PROBLEM, takes
 from ..problems import problem_or_defect
-from ..searching import searching
 from ..stages import look_up_maps
 
-router = APIRouter(responses=PROBLEM)
+router = APIRouter(tags=["scans"], responses=PROBLEM)
 _EXAMPLES = {
     "a room": examples.ASSOCIATE,
     "a stored map": examples.ASSOCIATE_STORED,
@@ -32,24 +32,25 @@ _EXAMPLES = {
 }
 
 
-@searching(router, "/v1/associate", AssociateRequest, AssociateAnswer, _EXAMPLES)
-async def associate(exchange: Exchange, asked: AssociateRequest) -> bytes:
+@router.post("/v1/associate", **takes(AssociateRequest, AssociateAnswer, _EXAMPLES))
+async def associate(exchange: Searching) -> Response:
     """Find the pose without knowing correspondences.
 
     Estimate the pose of a scan in a map, or on one of several, with a verdict and its probability.
     """
+    asked = await read(exchange, AssociateRequest)
     exchange.limit(asked.options.deadline_ms)
     target = await look_up_maps(exchange, asked)
-    return await exchange.run(partial(exchange.services.associator.answer, asked, target, exchange))
+    return await exchange.answer(partial(exchange.services.associator.answer, asked, target, exchange))
 
 
-@searching(router, "/v1/associate:batch", BatchRequest, BatchAnswer, {"two scans": examples.BATCH}, read_batch)
-async def associate_batch(exchange: Exchange, read: tuple[BatchRequest, list[BatchItem | Exception]]) -> bytes:
+@router.post("/v1/associate:batch", **takes(BatchRequest, BatchAnswer, {"two scans": examples.BATCH}))
+async def associate_batch(exchange: Searching) -> Response:
     """Find several scans in one map.
 
     Estimate the poses of several scans in one map, or on several; an invalid scan yields one problem item.
     """
-    asked, items = read
+    asked, items = await read_by(exchange, read_batch)
     exchange.limit(asked.options.deadline_ms)
     services, deadline = exchange.services, exchange.deadline
     target = await look_up_maps(exchange, asked)
@@ -77,7 +78,7 @@ async def associate_batch(exchange: Exchange, read: tuple[BatchRequest, list[Bat
             raise raised.exceptions[0] from None
         exchange.watch.lap("search")
         results = [task.result() for task in tasks]
-        return await services.parse_threads.run(partial(batch_done, asked, target, results, exchange))
+        return exchange.json(await services.parse_threads.run(partial(batch_done, asked, target, results, exchange)))
 
 
 def _refused(index: int, error: Exception, request_id: str) -> BatchResult:
@@ -96,19 +97,21 @@ def _in_batch(index: int, pointer: str) -> str:
     return pointer
 
 
-@searching(router, "/v1/register", RegisterRequest, RegisterAnswer, {"a corner": examples.REGISTER})
-async def register(exchange: Exchange, asked: RegisterRequest) -> bytes:
+@router.post("/v1/register", **takes(RegisterRequest, RegisterAnswer, {"a corner": examples.REGISTER}))
+async def register(exchange: Searching) -> Response:
     """Find the pose from known correspondences.
 
     Lay scan segments on the map segments that they are known to belong to.
     """
-    return await exchange.run(lambda: exchange.encoded(registered(asked, exchange.watch, encode_list)))
+    asked = await read(exchange, RegisterRequest)
+    return await exchange.answer(lambda: exchange.encoded(registered(asked, exchange.watch, encode_list)))
 
 
-@searching(router, "/v1/vectorize", VectorizeRequest, VectorizeAnswer, {"a corner": examples.VECTORIZE})
-async def vectorize(exchange: Exchange, asked: VectorizeRequest) -> bytes:
+@router.post("/v1/vectorize", **takes(VectorizeRequest, VectorizeAnswer, {"a corner": examples.VECTORIZE}))
+async def vectorize(exchange: Searching) -> Response:
     """Find the segments in ranges or points.
 
     Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points.
     """
-    return await exchange.run(lambda: exchange.encoded(vectorized(asked, exchange.watch)))
+    asked = await read(exchange, VectorizeRequest)
+    return await exchange.answer(lambda: exchange.encoded(vectorized(asked, exchange.watch)))
