@@ -24,7 +24,7 @@ from linefix.warmup import warm_up
 from .errors import StoreError
 from .http.middleware import RequestMiddleware
 from .http.openapi import describe
-from .http.problems import pass_on
+from .http.problems import raise_ours
 from .http.routes import importing, maps, operations, pages, quality, scans
 from .http.services import Services
 from .importing.folders import remove_abandoned
@@ -56,7 +56,7 @@ def create_app(settings: Settings, started: Started | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
-        exception_handlers=dict.fromkeys((HTTPException, RequestValidationError), pass_on),
+        exception_handlers=dict.fromkeys((HTTPException, RequestValidationError), raise_ours),
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
         lifespan=partial(_lifespan, services=services, started=started),
     )

@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import MissingKeyError, NotHttpError, ShareUsedError, UnknownKeyError
 from .exchange import KEY, Exchange, HangUpError
-from .problems import as_ours, problem_or_defect
+from .problems import problem_or_defect
 from .services import Services
 
 logger = logging.getLogger("linefix")
@@ -72,7 +72,7 @@ class RequestMiddleware:
 
     async def _refuse(self, error: Exception, exchange: Exchange) -> None:
         """Answer with a problem; a defect after the answer has begun can only end the connection."""
-        problem = problem_or_defect(as_ours(error, exchange.scope), exchange.request_id)
+        problem = problem_or_defect(error, exchange.request_id)
         if exchange.status:
             raise error
         if isinstance(error, ShareUsedError):

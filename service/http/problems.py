@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import NoReturn
 
 import orjson
@@ -17,25 +16,15 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Match
-from starlette.types import Scope
 
 from association import CancelledError
-from linefix.documents.errors import (
-    BodyTooLargeError,
-    DeadlinePassedError,
-    Fault,
-    InvalidRequestError,
-    NotJsonError,
-    TooManyError,
-    fault_of,
-    in_one_line,
-)
+from linefix.documents import errors as documents
+from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
 from linefix.documents.limits import MAX_FAULTS
 from linefix.documents.reading import faults_of
 from registration import InputError
 
 from .. import errors
-from .etags import etag
 
 logger = logging.getLogger("linefix")
 MEDIA_TYPE = "application/problem+json"
@@ -60,10 +49,10 @@ STRANGE = (errors.UnknownKeyError, errors.ForeignHostError, errors.ForeignOrigin
 WRONG_KIND = (errors.MediaTypeError, errors.EncodingError, errors.FormatsMissingError, errors.UnknownFormatError)
 BUSY = (errors.QueueFullError, errors.TooMuchHeldError, errors.BusyStoreError)
 SHARES = (errors.ShareUsedError, errors.ShareHeldError)
-LATE = (DeadlinePassedError, errors.IndexNotReadyError, errors.ImportTooLateError)
-TOO_LARGE = (TooManyError, BodyTooLargeError, errors.FileTooLargeError)
+LATE = (documents.DeadlinePassedError, errors.IndexNotReadyError, errors.ImportTooLateError)
+TOO_LARGE = (TooManyError, documents.BodyTooLargeError, errors.FileTooLargeError)
 TABLE = (
-    Kind("invalid_json", 400, "The body is not JSON", (NotJsonError,)),
+    Kind("invalid_json", 400, "The body is not JSON", (documents.NotJsonError,)),
     Kind("invalid_http", 400, "The request is not HTTP", NOT_HTTP),
     Kind("unauthorized", 401, "A key is required", (errors.MissingKeyError,)),
     Kind("forbidden", 403, "The request is not permitted", (*STRANGE, errors.MissingRoleError)),
@@ -84,8 +73,8 @@ TABLE = (
     Kind("deadline_exceeded", 504, "The deadline passed", LATE),
     Kind("storage_full", 507, "The store is full", (errors.StoreFullError,)),
 )
-KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})
-RAISED: Mapping[type[Exception], Kind] = MappingProxyType({error: kind for kind in TABLE for error in kind.raised_as})
+KINDS: Mapping[str, Kind] = {kind.code: kind for kind in TABLE}
+RAISED: Mapping[type[Exception], Kind] = {error: kind for kind in TABLE for error in kind.raised_as}
 """Every exception that becomes a problem; any other is a defect."""
 
 
@@ -105,7 +94,7 @@ class Problem:
             "type": f"urn:linefix:problem:{self.kind.code}",
             "title": self.kind.title,
             "status": self.kind.status,
-            "detail": in_one_line(faults) if faults else self.detail[:MAX_DETAIL],
+            "detail": documents.in_one_line(faults) if faults else self.detail[:MAX_DETAIL],
             "code": self.kind.code,
             "request_id": request_id,
         }
@@ -135,7 +124,7 @@ def problem_of(error: Exception) -> Problem | None:
     faults: Sequence[Fault] = ()
     match error:
         case InputError():
-            faults = [fault_of(error)]
+            faults = [documents.fault_of(error)]
         case InvalidRequestError():
             faults = error.faults
         case TooManyError(pointer=pointer) if pointer:
@@ -151,23 +140,15 @@ def problem_or_defect(error: Exception, request_id: str) -> Problem:
     return problem or INTERNAL
 
 
-async def pass_on(request: Request, error: Exception) -> NoReturn:
-    """Leave an error of the framework to the middleware, which makes a problem of it as of any other."""
-    raise error
-
-
-def as_ours(error: Exception, scope: Scope) -> Exception:
-    """Return an exception of ours for what FastAPI and Starlette refuse by themselves."""
-    match error:
-        case RequestValidationError():
-            return InvalidRequestError(faults_of(error.errors()))
-        case HTTPException(status_code=405):  # the framework names the methods of one route only
-            matching = (route for route in scope["app"].routes if route.matches(scope)[0] is not Match.NONE)
-            methods = {method for route in matching for method in getattr(route, "methods", ("GET",))}
-            return errors.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
-        case HTTPException():
-            return errors.NotFoundError()
-    return error
+async def raise_ours(request: Request, error: Exception) -> NoReturn:
+    """Raise an exception of ours for what FastAPI and Starlette refuse by themselves."""
+    if isinstance(error, RequestValidationError):
+        raise InvalidRequestError(faults_of(error.errors()))
+    if isinstance(error, HTTPException) and error.status_code == 405:  # the framework names the methods of one route
+        matching = (route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE)
+        methods = {method for route in matching for method in getattr(route, "methods", ("GET",))}
+        raise errors.MethodNotAllowedError(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+    raise errors.NotFoundError
 
 
 def _bounded(pointer: str) -> str:
@@ -180,7 +161,7 @@ def _headers_of(error: Exception) -> Mapping[str, str]:
         case errors.MissingKeyError():
             return {"WWW-Authenticate": 'Bearer realm="linefix"'}
         case errors.RevisionConflictError(revision=int(revision)):
-            return {"ETag": etag(revision)}
+            return {"ETag": f'"{revision}"'}
         case errors.MethodNotAllowedError(allowed=allowed):
             return {"Allow": ", ".join(allowed)}
         case errors.EncodingError():
