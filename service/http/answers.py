@@ -175,12 +175,17 @@ class GridPictureAnswer(Answer):
     resolution: float
 
 
-class ImportTimingAnswer(Answer):
-    """Duration of an import, milliseconds."""
+class ScansTimingAnswer(Answer):
+    """Duration of reading a log, milliseconds."""
 
     read: Milliseconds = Field(description="reading the files, waiting for that included")
-    check: Milliseconds = Field(description="indexing and checking the map")
     total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+
+
+class ImportTimingAnswer(ScansTimingAnswer):
+    """Duration of an import, milliseconds."""
+
+    check: Milliseconds = Field(description="indexing and checking the map")
 
 
 class ImportAnswer(Answer):
@@ -192,13 +197,6 @@ class ImportAnswer(Answer):
     check: MapCheckAnswer
     request_id: str
     timing_ms: ImportTimingAnswer
-
-
-class ScansTimingAnswer(Answer):
-    """Duration of reading a log, milliseconds."""
-
-    read: Milliseconds = Field(description="reading the files, waiting for that included")
-    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
 
 
 class ScansAnswer(Answer):

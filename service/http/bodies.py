@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from linefix.documents.errors import BodyTooLargeError, NotJsonError
 from linefix.documents.limits import Limits
 from linefix.documents.reading import read_model
+from linefix.operations import Stopwatch
 
 from ..admission.budget import Take
 from ..errors import BodyBrokenError, BodyTooSlowError, EncodingError, MediaTypeError
@@ -71,7 +72,8 @@ async def receive(exchange: Exchange, take: Take, taken: str = JSON) -> bytearra
         raise BodyTooSlowError(settings.request_timeout_s) from None
     if exchange.scope["method"] == "POST":
         services.gate.enter(exchange.ticket)
-    exchange.begin()
+    exchange.watch = Stopwatch()
+    exchange.limit(None)
     if gzipped:
         packed = data
         data = await exchange.run(partial(unpack, packed, settings.max_body_bytes, take), services.parsing)
@@ -102,24 +104,20 @@ def unpack(packed: bytearray, max_bytes: int, take: Take) -> bytearray:
     BodyTooLargeError
         When it unpacks to more than is allowed.
     """
-    unpacked, stream, end = bytearray(), zlib.decompressobj(wbits=_GZIP), 0
+    unpacked, stream = bytearray(), zlib.decompressobj(wbits=_GZIP)
+    rest: bytes | bytearray = packed
     try:
-        while end < len(packed) and not stream.eof:
-            rest: bytes | bytearray = packed[end : end + _PIECE]
-            end += len(rest)
-            while rest and not stream.eof:
-                piece = stream.decompress(rest, min(_PIECE, max_bytes + 1 - len(unpacked)))
-                take(len(piece))
-                unpacked += piece
-                _require_within(len(unpacked), max_bytes)
-                rest = stream.unconsumed_tail
+        while rest and not stream.eof:
+            piece = stream.decompress(rest, _PIECE)
+            _require_within(len(unpacked) + len(piece), max_bytes)
+            take(len(piece))
+            unpacked += piece
+            rest = stream.unconsumed_tail
     except zlib.error:
-        raise NotJsonError(
-            "the body is not gzip, but Content-Encoding states it; send gzip, or omit the header"
-        ) from None
+        raise NotJsonError("the body is not gzip, but its Content-Encoding is; send gzip, or omit the header") from None
     if not stream.eof:
         raise NotJsonError("the gzip body is cut short; send it completely")
-    if stream.unused_data or end < len(packed):
+    if stream.unused_data:
         raise NotJsonError("more bytes follow the gzip body; expected a single gzip member")
     return unpacked
 
@@ -140,8 +138,8 @@ def _is_gzip(exchange: Exchange, taken: str) -> bool:
     kind = headers.get("content-type", unnamed).partition(";")[0].strip().lower()
     if kind != taken and not (taken == JSON and kind.startswith("application/") and kind.endswith("+json")):
         raise MediaTypeError(taken)
-    encodings = [part.strip() for part in headers.get("content-encoding", "").lower().split(",")]
-    encodings = [part for part in encodings if part not in ("", "identity")]
+    named = map(str.strip, headers.get("content-encoding", "").lower().split(","))
+    encodings = [name for name in named if name not in ("", "identity")]
     if encodings not in ([], ["gzip"], ["x-gzip"]):
         raise EncodingError
     return bool(encodings)

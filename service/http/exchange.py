@@ -21,15 +21,13 @@ from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from linefix.operations import Stopwatch
-
 from ..admission.gate import Gate, Ticket
 from ..work.job import Job
 from .services import Services
 
 T = TypeVar("T")
-KEY = "exchange"
-"""Key of the exchange in the state of a request's scope."""
+KEY = "linefix.exchange"
+"""Key of the exchange in the scope of a request."""
 JSON = "application/json"
 WATCH_AFTER = 0.02  # s until the connection is watched: most answers are ready earlier
 DROP_SECONDS = 3.0  # s that the rest of a body may take to come
@@ -134,11 +132,6 @@ class Exchange(Job):
                 while self.unread and dropped <= most:
                     dropped += len((await self.receive()).get("body", b""))
 
-    def begin(self) -> None:
-        """Start the watch, since the body has arrived, and the service's own deadline."""
-        self.watch = Stopwatch()
-        self.limit(None)
-
     def limit(self, deadline_ms: float | None) -> None:
         """Take the deadline of the request, at most the service's own; None: that."""
         self.deadline = self.watch.deadline(deadline_ms, self.services.settings.max_deadline_ms)
@@ -199,8 +192,7 @@ class Exchange(Job):
 
 
 async def _any(request: Request) -> Exchange:
-    found = request.scope["state"][KEY]
-    assert isinstance(found, Exchange)
+    found: Exchange = request.scope[KEY]
     return found
 
 

@@ -42,7 +42,7 @@ class RequestMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        started, services = time.perf_counter(), self._services
+        services = self._services
         # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
         exchange = Exchange(
@@ -51,10 +51,9 @@ class RequestMiddleware:
             scope=inner,
             source=receive,
             sink=send,
-            arrived=asyncio.get_running_loop().time(),
+            arrived=time.monotonic(),
         )
-        state = inner.setdefault("state", {})
-        state[KEY] = exchange
+        inner[KEY] = exchange
         try:
             exchange.ticket = services.entrance.admit(inner)
             serving = self._app(inner, exchange.receive, exchange.send)
@@ -65,10 +64,10 @@ class RequestMiddleware:
         except Exception as error:
             await self._refuse(error, exchange)
         finally:
-            del state[KEY]  # each refers to the other: heads would wait for the garbage collector
+            del inner[KEY]  # each refers to the other: heads would wait for the garbage collector
             exchange.held.close()
             services.gate.leave(exchange.ticket)
-            self._report(exchange, scope["method"], time.perf_counter() - started)
+            self._report(exchange, scope["method"], time.monotonic() - exchange.arrived)
 
     async def _refuse(self, error: Exception, exchange: Exchange) -> None:
         """Answer with a problem; a defect after the answer has begun can only end the connection."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from ..errors import ENDING, BusyStoreError, NotReadyError, ReadOnlyStoreError, StoreAwayError, StoreError
+from ..errors import ENDING, CorruptMapError, NotReadyError, StoreFullError
 from ..maps import MapStore
 from ..thread_pool import Threads
 
@@ -70,9 +70,7 @@ class Readiness:
                 await asyncio.shield(self._looking)
         except TimeoutError:
             raise NotReadyError("the store does not respond; check that its database runs and is reachable") from None
-        except (ReadOnlyStoreError, BusyStoreError, StoreAwayError):
-            raise
-        except StoreError as error:
+        except (CorruptMapError, StoreFullError) as error:  # of no map that was asked for
             raise NotReadyError(str(error)) from error
 
     def close(self) -> None:

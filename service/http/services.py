@@ -72,17 +72,15 @@ class Services:
         self.parse_threads, self.store_threads, self.key_threads = (
             Threads(count, name) for count, name in ((2, "parse"), (4, "store"), (1, "keys"))
         )
-        for name, what, read in (
-            ("workers_ready", "Processes that take requests", lambda: self.readiness.takes_requests),
-            ("searches_running", "Searches that run", lambda: self.gate.running),
-            ("searches_waiting", "Searches that wait", lambda: self.gate.waiting),
-            ("indexing_running", "Large maps that are indexed", lambda: self.indexing.running),
-            ("operations_running", "Maps that are checked, analyzed or updated", lambda: self.operations.running),
-            ("bodies_bytes", "Bytes of requests held", lambda: self.bodies.held),
-            ("map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes),
-            ("map_cache_maps", "Indexed maps held", lambda: len(cache)),
-        ):
-            self.metrics.watch(f"linefix_{name}", what, read)
+        watch = self.metrics.watch
+        watch("linefix_workers_ready", "Processes that take requests", lambda: self.readiness.takes_requests)
+        watch("linefix_searches_running", "Searches that run", lambda: self.gate.running)
+        watch("linefix_searches_waiting", "Searches that wait", lambda: self.gate.waiting)
+        watch("linefix_indexing_running", "Large maps that are indexed", lambda: self.indexing.running)
+        watch("linefix_operations_running", "Maps checked, analyzed or updated", lambda: self.operations.running)
+        watch("linefix_bodies_bytes", "Bytes of requests held", lambda: self.bodies.held)
+        watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
+        watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(cache))
 
     def _budget(self, most: int) -> ByteBudget:
         """Return what this worker may hold; the largest body always fits."""

@@ -59,16 +59,12 @@ async def look_up_map(exchange: Exchange, asked: InlineMap | StoredMap, *, orien
 
 async def look_up_maps(exchange: Exchange, asked: AssociateRequest | BatchRequest) -> Target:
     """Look up the map of a request, or its maps, and index them; raises as `look_up_map` and `index`."""
-    services, oriented, prefix = exchange.services, asked.options.oriented, exchange.ticket.maps
+    oriented = asked.options.oriented
     if asked.map is not None:
         found = await look_up_map(exchange, asked.map, oriented=oriented)
     else:
         assert asked.maps is not None
-        if isinstance(asked.maps, list) and any(
-            isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked.maps
-        ):
-            raise UnknownMapError
-        find = partial(services.lookup.find_together, asked.maps, prefix)
+        find = partial(exchange.services.lookup.find_together, asked.maps, exchange.ticket.maps)
         found = await ask_store(exchange, find)
     ready = await index(exchange, found, oriented=oriented)
     return Target(ready.maps, found.references, asked.map_weights)

@@ -120,7 +120,7 @@ class MapLookup:
         Raises
         ------
         StoreError
-            When a map is not stored, or is damaged, or the store does not answer.
+            When a map is not stored, or not for this caller, or is damaged, or the store does not answer.
         InvalidRequestError
             When more maps than allowed have the prefix.
         TooManyError
@@ -128,6 +128,8 @@ class MapLookup:
         """
         if isinstance(asked, MapPrefix):
             found: list[NamedMap | MapRecord] = [*self._beginning(asked.prefix, prefix)]
+        elif any(isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked):
+            raise UnknownMapError
         else:
             found = [one if isinstance(one, NamedMap) else self._store.record(one.map_id) for one in asked]
         for kind in ("segments", "points"):

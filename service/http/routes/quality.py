@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
@@ -15,7 +15,7 @@ from linefix.documents.checks import CheckAnswer
 from linefix.documents.parts import InlineMap, StoredMap
 from linefix.documents.requests import NO_SAMPLES, CheckRequest
 from linefix.documents.updates import ApplyAnswer, ApplyRequest, UpdateAnswer, UpdateRequest
-from linefix.operations import Json, Steps, analysis_steps, applied, check_steps, update_steps, worked
+from linefix.operations import Steps, analysis_steps, applied, check_steps, update_steps, worked
 
 from ...maps.lookup import FoundMaps
 from ..bodies import read
@@ -48,10 +48,7 @@ async def analyze(exchange: Searching) -> Response:
 
 
 async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
-    def steps(index: MapIndex, _: FoundMaps) -> Steps:
-        return analysis_steps(index, asked, exchange.deadline)
-
-    return await _answer(exchange, on, steps, asked, {"places": lambda found: found["summary"]["places"]})
+    return await _answer(exchange, on, lambda index, _: analysis_steps(index, asked, exchange.deadline), asked)
 
 
 @router.get("/v1/maps/{map_id}:check", response_model=CheckAnswer)
@@ -87,8 +84,7 @@ async def _check(exchange: Exchange, map_id: str, asked: CheckRequest) -> Respon
         # does not count it.
         return check_steps(replace(index), source.maps[None].oriented, asked, exchange.deadline)
 
-    noted = {"findings": lambda found: [one["code"] for one in found["findings"]]}
-    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, noted, oriented=True)
+    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, oriented=True)
 
 
 @router.post("/v1/maps/{map_id}:update", **takes(UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE}))
@@ -103,8 +99,7 @@ async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
         old = exchange.services.lookup.document(source.maps[None], source.document)
         return update_steps(index, old, asked, exchange.deadline)
 
-    noted = {"changes": lambda found: len(found["changes"])}
-    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, noted, name="based_on")
+    return await _answer(exchange, StoredMap(map_id=map_id), steps, asked, name="based_on")
 
 
 @router.post("/v1/maps:apply", **takes(ApplyRequest, ApplyAnswer, {"a rack is gone": examples.APPLY}))
@@ -114,10 +109,9 @@ async def apply_changes(exchange: Searching) -> Response:
     Return a map with those changes of an update that are accepted; nothing is searched or stored.
     """
     asked = await read(exchange, ApplyRequest)
-    accepted = sum(one.accepted for one in asked.changes)
 
     def work() -> bytes:
-        return exchange.encoded({**applied(asked, exchange.watch), "client_ref": asked.client_ref}, changes=accepted)
+        return exchange.encoded({**applied(asked, exchange.watch), "client_ref": asked.client_ref})
 
     return await exchange.answer(work)
 
@@ -127,12 +121,11 @@ async def _answer(
     on: InlineMap | StoredMap,
     operation: Operation,
     asked: AnalyzeRequest | CheckRequest | UpdateRequest,
-    noted: Mapping[str, Callable[[Json], Any]],
     *,
     oriented: bool | None = None,
     name: str = "map",
 ) -> Response:
-    """Answer with an operation on a map; `noted` are fields of the log, `name` is that of the map's reference."""
+    """Answer with an operation on a map; `name` is that of the map's reference."""
     exchange.limit(asked.deadline_ms)
     source = await look_up_map(exchange, on, oriented=oriented)
     ready = await index(exchange, source, oriented=oriented)
@@ -141,7 +134,6 @@ async def _answer(
     def work() -> bytes:
         assert isinstance(ready.maps, MapIndex)
         found = worked(operation(ready.maps, source), exchange.watch, exchange.deadline)
-        fields = {field: read(found) for field, read in noted.items()}
-        return exchange.encoded({**found, name: reference, "client_ref": asked.client_ref}, map=reference, **fields)
+        return exchange.encoded({**found, name: reference, "client_ref": asked.client_ref}, map=reference)
 
     return await exchange.answer(work, exchange.services.operations)
