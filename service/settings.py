@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_validator
+from pydantic import AllowInfNan, Field, SecretStr, StringConstraints, ValidationError, field_validator
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
@@ -143,7 +143,7 @@ class Settings(BaseSettings):
     database_url: SecretStr | None = None
     keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
     keys_file: Path | None = None
-    hosts: Annotated[tuple[str, ...], NoDecode] = ()
+    hosts: Annotated[tuple[Annotated[str, StringConstraints(to_lower=True)], ...], NoDecode] = ()
     cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
     tls_cert: Path | None = None
     tls_key: Path | None = None

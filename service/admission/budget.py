@@ -36,21 +36,18 @@ class ByteBudget:
 
         def take(count: int) -> None:
             nonlocal taken
-            self._take(holder, count)
-            taken += count
+            with self._lock:
+                if count > 0 and self._held_by[holder] + count > self._share:
+                    raise ShareHeldError
+                if count > 0 and self.held + count > self._most:
+                    raise TooMuchHeldError
+                taken += count
+                self.held += count
+                self._held_by[holder] += count
+                if not self._held_by[holder]:
+                    del self._held_by[holder]
 
         try:
             yield take
         finally:
-            self._take(holder, -taken)
-
-    def _take(self, holder: Holder, count: int) -> None:
-        with self._lock:
-            if count > 0 and self._held_by[holder] + count > self._share:
-                raise ShareHeldError
-            if count > 0 and self.held + count > self._most:
-                raise TooMuchHeldError
-            self.held += count
-            self._held_by[holder] += count
-            if not self._held_by[holder]:
-                del self._held_by[holder]
+            take(-taken)

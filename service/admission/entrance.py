@@ -10,7 +10,8 @@ from __future__ import annotations
 import ipaddress
 import re
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 from linefix.documents.errors import BodyTooLargeError
@@ -31,21 +32,19 @@ _TWO_LENGTHS = {b"transfer-encoding", b"content-length"}
 _PLAIN_HOST = re.compile(r"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 
 
+@dataclass(frozen=True, slots=True)
 class Entrance:
     """Gives tickets, and refuses requests without permission, and searches while the queue is full.
 
-    Without keys, `hosts` are names in addition to `localhost` and every address, and pages of `origins` may send
-    requests.
+    Without keys, `hosts` are names, in small letters, in addition to `localhost` and every address, and pages of
+    `origins` may send requests.
     """
 
-    def __init__(
-        self, gate: Gate, keyring: Keyring, max_body_bytes: int, hosts: Sequence[str], origins: Sequence[str]
-    ) -> None:
-        self._gate = gate
-        self._keyring = keyring
-        self._max_body_bytes = max_body_bytes
-        self._hosts = {"localhost", "localhost.", *(host.lower() for host in hosts)}
-        self._origins = frozenset(origins)
+    gate: Gate
+    keyring: Keyring
+    max_body_bytes: int
+    hosts: Sequence[str]
+    origins: Sequence[str]
 
     def admit(self, head: Mapping[str, Any]) -> Ticket:
         """Return the ticket of a request, given its ASGI scope.
@@ -66,22 +65,20 @@ class Entrance:
             When there is no place for a search.
         """
         method, path, headers = head["method"], head["path"], head["headers"]
-        # h11 has refused two hosts, two lengths, no host in HTTP/1.1, and codings other than chunked.
+        # h11 has refused two hosts, two lengths, one that is no number, no host in HTTP/1.1, and codings but chunked.
         fields = {name: value.decode("latin-1").strip() for name, value in headers}
         _require_plain(path, fields)
-        if not self._keyring.guarded:  # a page of another site has no key
+        if not self.keyring.guarded:  # a page of another site has no key
             self._require_own_page(fields)
         grant, searches = Grant(), False
         if path.startswith(GUARDED):
-            grant = self._keyring.grant(headers, head.get("client"))
+            grant = self.keyring.grant(headers, head.get("client"))
             _require(grant, method, path)
             searches = method == "POST" or (path.endswith(":check") and method in ("GET", "HEAD"))
-        if method in ("POST", "PUT"):
-            length = fields.get(b"content-length", "0")
-            if length.isdecimal() and int(length) > self._max_body_bytes:
-                raise BodyTooLargeError(self._max_body_bytes)
+        if method in ("POST", "PUT") and int(fields.get(b"content-length", "0")) > self.max_body_bytes:
+            raise BodyTooLargeError(self.max_body_bytes)
         if searches:
-            self._gate.require_place(grant.holder)
+            self.gate.require_place(grant.holder)
         return Ticket(grant.holder, grant.maps)
 
     def _require_own_page(self, fields: Mapping[bytes, str]) -> None:
@@ -98,7 +95,7 @@ class Entrance:
         host, origin = fields.get(b"host", "").lower(), fields.get(b"origin", "").lower()
         if b"host" in fields and not self._is_known(host):
             raise ForeignHostError
-        if origin in self._origins:
+        if origin in self.origins:
             return
         # A browser leaves the usual port out of both; the scheme may be that of a proxy.
         is_foreign = b"origin" in fields and origin.partition("://")[2] != host
@@ -107,7 +104,11 @@ class Entrance:
 
     def _is_known(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
-        return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
+        if found is not None:
+            name = found["name"] or found["address"]
+            with suppress(ValueError):
+                return name in ("localhost", "localhost.", *self.hosts) or bool(ipaddress.ip_address(name))
+        return False
 
 
 def _require_plain(path: str, fields: Mapping[bytes, str]) -> None:
@@ -124,20 +125,9 @@ def _require_plain(path: str, fields: Mapping[bytes, str]) -> None:
 
 def _require(grant: Grant, method: str, path: str) -> None:
     """Raise where the caller lacks the permission for this request."""
-    role = ROLES.get(method)
-    if role is None and (grant.roles, grant.maps) != (EVERY_ROLE, ""):
-        raise MissingRoleError("the key lacks every role and all maps, which this method requires; send a key that has")
-    if role is not None and role not in grant.roles and path != LIMITS:
-        raise MissingRoleError(f"the key lacks the role `{role}`; send a key that has it")
+    needed = {ROLES[method]} if method in ROLES else EVERY_ROLE
+    if path != LIMITS and not needed <= grant.roles:
+        raise MissingRoleError(f"the key lacks the role `{min(needed - grant.roles)}`; send a key that has it")
     # An id ends where a prefix cannot go on, so that the rest of the path begins like the id.
     if path.startswith(MAPS) and not path.startswith(MAPS + grant.maps):
         raise UnknownMapError
-
-
-@lru_cache(maxsize=256)
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True

@@ -61,10 +61,11 @@ class _Run:
     answer: asyncio.Future[Any]
     begun: float
     worker: _Worker
-    timer: asyncio.TimerHandle | None = None
+    timer: asyncio.TimerHandle = field(init=False)
     long: bool = False
 
 
+@dataclass(eq=False)
 class Gate:
     """Runs functions in threads of its own; belongs to one event loop.
 
@@ -85,24 +86,20 @@ class Gate:
         until the deadline and no longer. The function then goes on and keeps its slot, for the next caller.
     """
 
-    def __init__(
-        self,
-        slots: int,
-        places: int | None = None,
-        name: str = "search",
-        nice: int = 0,
-        long_per_slot: int = LONG_PER_SLOT,
-        waits: bool = True,
-    ) -> None:
-        self.slots = slots
-        self._most = sys.maxsize if places is None else places
-        self._most_long = long_per_slot * slots
-        self._most_long_of_one = max(1, self._most_long // 2)
-        self._name, self._nice, self._waits = name, nice, waits
-        self._idle: list[_Worker] = []
-        self._closed = False
-        self._runs: set[_Run] = set()
-        self._shares: dict[Holder, _Share] = {}
+    slots: int
+    places: int | None = None
+    name: str = "search"
+    nice: int = 0
+    long_per_slot: int = LONG_PER_SLOT
+    waits: bool = True
+    _closed: bool = field(default=False, init=False)
+    _idle: list[_Worker] = field(default_factory=list, init=False)
+    _runs: set[_Run] = field(default_factory=set, init=False)
+    _shares: dict[Holder, _Share] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        self._most = sys.maxsize if self.places is None else self.places
+        self._most_long = self.long_per_slot * self.slots
 
     @property
     def running(self) -> int:
@@ -117,10 +114,6 @@ class Gate:
     @property
     def _places(self) -> int:
         return sum(share.places for share in self._shares.values())
-
-    @property
-    def _long(self) -> int:
-        return sum(share.long for share in self._shares.values())
 
     @property
     def _has_free_slot(self) -> bool:
@@ -189,7 +182,7 @@ class Gate:
             await _until(deadline, self._wait(share, ticket))
         ticket.had_slot = True
         # Not by a name: else a cycle, for an error holds this frame, and everything that the function worked with.
-        if self._waits:
+        if self.waits:
             return await self._start(function, deadline, ticket.holder)
         return await _until(deadline, self._start(function, deadline, ticket.holder))
 
@@ -204,7 +197,6 @@ class Gate:
         self._closed = True
         for worker in self._idle:
             worker.todo.put(None)
-        self._idle.clear()
 
     async def _wait(self, share: _Share, ticket: Ticket) -> None:
         one = ticket, asyncio.get_running_loop().create_future()
@@ -225,20 +217,18 @@ class Gate:
         try:
             if self._closed:
                 raise RuntimeError("this gate is closed")
-            worker = self._idle.pop() if self._idle else _Worker(self._name, self._nice)
+            worker = self._idle.pop() if self._idle else _Worker(self.name, self.nice)
         except BaseException:
             self._free(holder)
             raise
         run = _Run(holder, deadline, loop.create_future(), time.monotonic(), worker)
         self._runs.add(run)
-        if self._most_long:
-            run.timer = loop.call_later(LONG_SECONDS, self._lower, run)
+        run.timer = loop.call_later(LONG_SECONDS, self._lower, run)
         worker.todo.put((function, lambda *outcome: loop.call_soon_threadsafe(self._finish, run, *outcome)))
         return run.answer
 
     def _finish(self, run: _Run, result: object, error: BaseException | None) -> None:
-        if run.timer is not None:
-            run.timer.cancel()
+        run.timer.cancel()
         self._runs.remove(run)
         if run.long or self._closed:  # a priority that was lowered cannot be raised again without rights
             run.worker.todo.put(None)
@@ -253,7 +243,7 @@ class Gate:
     def _lower(self, run: _Run) -> None:
         """Have a long search go on behind short ones, and hand on its slot; later where too many do so."""
         share = self._shares[run.holder]
-        if self._long >= self._most_long or not self._may_start(share):
+        if sum(one.long for one in self._shares.values()) >= self._most_long or not self._may_start(share):
             run.timer = asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run)
             return
         run.long = True
@@ -264,11 +254,9 @@ class Gate:
 
     def _share(self, holder: Holder) -> _Share:
         """Return what a holder has. A new one starts where the least served is, without credit."""
-        found = self._shares.get(holder)
-        if found is None:
-            found = _Share(min((share.used for share in self._shares.values()), default=0.0))
-            self._shares[holder] = found
-        return found
+        if holder not in self._shares:
+            self._shares[holder] = _Share(min((share.used for share in self._shares.values()), default=0.0))
+        return self._shares[holder]
 
     def _forget(self, holder: Holder) -> None:
         share = self._shares[holder]
@@ -277,7 +265,7 @@ class Gate:
 
     def _may_start(self, share: _Share) -> bool:
         """Return whether a holder may start a search, or have one more long: not while it has its share of these."""
-        return not self._most_long or share.long < self._most_long_of_one
+        return not self._most_long or share.long < max(1, self._most_long // 2)
 
     def _free(self, holder: Holder, seconds: float = 0.0, *, long: bool = False) -> None:
         """Take a function that has ended off its holder's share, to which so many seconds more are charged."""
@@ -341,9 +329,8 @@ def _fail(waiter: asyncio.Future[Any], error: BaseException) -> None:
 
 async def _until(deadline: Deadline, wait: Awaitable[T]) -> T:
     """Wait until a deadline passes, and no longer."""
-    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
     try:
-        async with asyncio.timeout(left) as limit:
+        async with asyncio.timeout(None if deadline.at is None else deadline.at - time.monotonic()) as limit:
             return await wait
     except TimeoutError:
         if not limit.expired():

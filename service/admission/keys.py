@@ -26,7 +26,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, StringConstraints, ValidationError
+from pydantic import BaseModel, Field, SecretStr, StringConstraints, ValidationError
 
 from ..errors import MissingKeyError, UnknownKeyError
 
@@ -60,10 +60,8 @@ class KeyFileError(Exception):
     """The file cannot be used; the message gives the reason, and repeats nothing of it."""
 
 
-class Key(BaseModel):
+class Key(BaseModel, extra="forbid", frozen=True):
     """A key, by its digest."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(min_length=1, max_length=64)
     sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
@@ -71,9 +69,7 @@ class Key(BaseModel):
     maps: str = Field("", min_length=1, max_length=128, pattern="^[A-Za-z0-9._-]+$")
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class _File(BaseModel, extra="forbid", frozen=True):
     key: tuple[Key, ...] = ()
 
 
@@ -90,34 +86,10 @@ def read_keys(path: Path) -> dict[bytes, Grant]:
     KeyFileError
         When a file cannot be read, is no TOML, or not as described above; when it names a key twice.
     """
-    keys = [key for file in _files(path) for key in _read(file)]
-    digests = [bytes.fromhex(key.sha256) for key in keys]
-    if len(set(digests)) < len(keys):
-        raise KeyFileError(f"{path}: contains a key twice; remove one")
-    return {digest: Grant(digest, key.roles, key.maps) for digest, key in zip(digests, keys, strict=True)}
-
-
-def state_of(path: Path) -> object:
-    """Return values that differ between contents, found without reading them."""
+    keys, file = list[Key](), path
     try:
-        stats = [file.stat() for file in _files(path)]
-    except (KeyFileError, OSError):
-        return None
-    return [(stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for stat in stats]
-
-
-def _files(path: Path) -> list[Path]:
-    try:
-        if not path.is_dir():
-            return [path]
-        return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
-    except OSError as error:
-        raise KeyFileError(f"{path}: {error.strerror}") from None
-
-
-def _read(file: Path) -> tuple[Key, ...]:
-    try:
-        return parse_keys(file.read_text("utf-8-sig"))
+        for file in _files(path):
+            keys += parse_keys(file.read_text("utf-8-sig"))
     except OSError as error:
         raise KeyFileError(f"{file}: {error.strerror}") from None
     except ValidationError as error:
@@ -126,6 +98,23 @@ def _read(file: Path) -> tuple[Key, ...]:
         raise KeyFileError(f"{file}: {where}") from None
     except ValueError:
         raise KeyFileError(f"{file}: is not TOML in UTF-8") from None
+    digests = [bytes.fromhex(key.sha256) for key in keys]
+    if len(set(digests)) < len(keys):
+        raise KeyFileError(f"{path}: contains a key twice; remove one")
+    return {digest: Grant(digest, key.roles, key.maps) for digest, key in zip(digests, keys, strict=True)}
+
+
+def _contents_of(path: Path) -> list[bytes] | None:
+    try:
+        return [file.read_bytes() for file in _files(path)]
+    except OSError:
+        return None
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
 
 
 class Keyring:
@@ -139,7 +128,7 @@ class Keyring:
         digests = [hashlib.sha256(key.get_secret_value().encode()).digest() for key in keys]
         self._whole = {digest: Grant(digest) for digest in digests}
         self._file = file
-        self._seen = None if file is None else state_of(file)
+        self._seen = None if file is None else _contents_of(file)
         self.grants = self._whole if file is None else read_keys(file) | self._whole
         self.guarded = bool(keys) or file is not None
 
@@ -168,9 +157,9 @@ class Keyring:
 
     def refresh(self) -> None:
         """Read the file again where it has changed; what cannot be used leaves the keys as they were, and is logged."""
-        if self._file is None or (state := state_of(self._file)) == self._seen:
+        if self._file is None or (contents := _contents_of(self._file)) == self._seen:
             return
-        self._seen = state
+        self._seen = contents
         try:
             self.grants = read_keys(self._file) | self._whole
         except KeyFileError as error:
@@ -188,6 +177,4 @@ def address_of(client: Client) -> Holder:
         address = ipaddress.ip_address(client[0].partition("%")[0])
     except ValueError:
         return client[0].encode()
-    if address.version == 4:
-        return address.packed
-    return address.ipv4_mapped.packed if address.ipv4_mapped is not None else address.packed[:8]
+    return (getattr(address, "ipv4_mapped", None) or address).packed[:8]
