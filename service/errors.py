@@ -11,15 +11,16 @@ What is wrong with the content of a request is an error of `linefix.documents`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 ENDING = "the service is shutting down; send the request to another instance, or again after its restart"
 
 
 class ServiceError(Exception):
-    """A request is not served; the message gives the caller the reason."""
+    """A request is not served; the message gives the caller the reason, as do headers of the answer."""
 
     message = ""
+    headers: Mapping[str, str] = {}
 
     def __init__(self, message: str = "") -> None:
         super().__init__(message or self.message)
@@ -44,11 +45,12 @@ class NotFoundError(ServiceError):
 
 
 class MethodNotAllowedError(ServiceError):
-    """The path takes other methods, `allowed`."""
+    """The path takes other methods."""
 
     def __init__(self, allowed: Iterable[str]) -> None:
-        self.allowed = tuple(allowed)
-        super().__init__(f"this path does not support the method; expected {', '.join(self.allowed)}")
+        methods = ", ".join(allowed)
+        super().__init__(f"this path does not support the method; expected {methods}")
+        self.headers = {"Allow": methods}
 
 
 class MediaTypeError(ServiceError):
@@ -62,6 +64,7 @@ class EncodingError(ServiceError):
     """The body is packed in a way that is not taken."""
 
     message = "the content encoding is not supported; send the body as gzip, or without encoding"
+    headers: Mapping[str, str] = {"Accept-Encoding": "gzip"}
 
 
 class BodyTooSlowError(ServiceError):
@@ -85,6 +88,7 @@ class MissingKeyError(ServiceError):
     """No key, and the service has keys."""
 
     message = "the request has no key; send the header `Authorization: Bearer <key>`"
+    headers: Mapping[str, str] = {"WWW-Authenticate": 'Bearer realm="linefix"'}
 
 
 class UnknownKeyError(ServiceError):
@@ -189,12 +193,12 @@ class CorruptMapError(StoreError):
 
 
 class RevisionConflictError(StoreError):
-    """The map is not as the writer demands; `revision` is the present one, None where there is no map."""
+    """The map is not as the writer demands; its present revision is None where there is no map."""
 
     def __init__(self, revision: int | None) -> None:
         now = "no map is stored under this id" if revision is None else f"the map's present revision is {revision}"
         super().__init__(f"{now}; If-Match or If-None-Match expects another state. Read the map again, then write")
-        self.revision = revision
+        self.headers = {} if revision is None else {"ETag": f'"{revision}"'}
 
 
 class StoreFullError(StoreError):

@@ -112,18 +112,15 @@ class _FixedLimits(Answer):
     max_map_extent: float = Field(description="metres")
 
 
+_OTHERS = ("request_timeout_s", "searches", "queue")
 _NOT_OF_REQUESTS = ("max_stored_bytes", "max_import_bytes")
-LIMITS = (
-    *(name for name in Settings.model_fields if name.startswith("max_") and name not in _NOT_OF_REQUESTS),
-    *("request_timeout_s", "searches", "queue"),
-)
-"""The settings that are limits of requests."""
-_SET: dict[str, Any] = {
+LIMITS: dict[str, Any] = {
     name: (field.annotation, Field(description=field.description))
     for name, field in Settings.model_fields.items()
-    if name in LIMITS
+    if name in _OTHERS or (name.startswith("max_") and name not in _NOT_OF_REQUESTS)
 }
-Limits = create_model("Limits", __base__=_FixedLimits, __doc__=_FixedLimits.__doc__, **_SET)
+"""The settings that are limits of requests."""
+Limits = create_model("Limits", __base__=_FixedLimits, __doc__=_FixedLimits.__doc__, **LIMITS)
 
 
 class NoteAnswer(Answer):

@@ -11,6 +11,7 @@ pieces.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
@@ -72,7 +73,7 @@ class Exchange(Job):
     scope: Scope
     source: Receive
     sink: Send
-    arrived: float
+    arrived: float = field(default_factory=time.monotonic)
     ticket: Ticket = field(default_factory=Ticket)
     held: ExitStack = field(default_factory=ExitStack)
     status: int = 0

@@ -45,14 +45,8 @@ class RequestMiddleware:
         services = self._services
         # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
-        exchange = Exchange(
-            request_id=_id_of(scope["headers"]),
-            services=services,
-            scope=inner,
-            source=receive,
-            sink=send,
-            arrived=time.monotonic(),
-        )
+        request_id = _id_of(scope["headers"])
+        exchange = Exchange(request_id=request_id, services=services, scope=inner, source=receive, sink=send)
         inner[KEY] = exchange
         try:
             exchange.ticket = services.entrance.admit(inner)

@@ -20,6 +20,7 @@ from starlette.routing import Match
 from association import CancelledError
 from linefix.documents import errors as documents
 from linefix.documents.errors import Fault, InvalidRequestError, TooManyError
+from linefix.documents.inputs import faults_in
 from linefix.documents.limits import MAX_FAULTS
 from linefix.documents.reading import faults_of
 from registration import InputError
@@ -122,14 +123,10 @@ def problem_of(error: Exception) -> Problem | None:
     if kind is None:
         return None
     faults: Sequence[Fault] = ()
-    match error:
-        case InputError():
-            faults = [documents.fault_of(error)]
-        case InvalidRequestError():
-            faults = error.faults
-        case TooManyError(pointer=pointer) if pointer:
-            faults = [Fault(pointer, str(error))]
-    return Problem(kind, errors.ENDING if isinstance(error, CancelledError) else str(error), faults, _headers_of(error))
+    if isinstance(error, InvalidRequestError | InputError) or (isinstance(error, TooManyError) and error.pointer):
+        faults = faults_in(error)
+    detail = errors.ENDING if isinstance(error, CancelledError) else str(error)
+    return Problem(kind, detail, faults, error.headers if isinstance(error, errors.ServiceError) else {})
 
 
 def problem_or_defect(error: Exception, request_id: str) -> Problem:
@@ -153,17 +150,3 @@ async def raise_ours(request: Request, error: Exception) -> NoReturn:
 
 def _bounded(pointer: str) -> str:
     return NAMED_BY_CALLER if pointer.startswith(NAMED_BY_CALLER + "/") else pointer[:MAX_POINTER]
-
-
-def _headers_of(error: Exception) -> Mapping[str, str]:
-    """Return the headers that belong to an error."""
-    match error:
-        case errors.MissingKeyError():
-            return {"WWW-Authenticate": 'Bearer realm="linefix"'}
-        case errors.RevisionConflictError(revision=int(revision)):
-            return {"ETag": f'"{revision}"'}
-        case errors.MethodNotAllowedError(allowed=allowed):
-            return {"Allow": ", ".join(allowed)}
-        case errors.EncodingError():
-            return {"Accept-Encoding": "gzip"}
-    return {}

@@ -34,18 +34,11 @@ class Readiness:
         self._threads = Threads(1, "probe")
         self._looking: asyncio.Future[None] | None = None
 
-    @property
-    def takes_requests(self) -> bool:
-        """Return whether the service is neither warming up nor ending."""
-        return self.warm and not self.draining
-
     def require_warm(self) -> None:
         """Raise `NotReadyError` as long as nothing can be searched."""
-        if self.warm:
-            return
-        if self.compiled is None:
-            raise NotReadyError("the kernels are being loaded; send the request again later")
-        raise NotReadyError(f"the kernels are being compiled, {self.compiled:.0%} so far; send the request again later")
+        if not self.warm:
+            state = "loaded" if self.compiled is None else f"compiled, {self.compiled:.0%} so far"
+            raise NotReadyError(f"the kernels are being {state}; send the request again later")
 
     async def open_store(self) -> None:
         """Make sure that the store's tables exist; raises `StoreError` when they do not."""

@@ -73,7 +73,8 @@ class Services:
             Threads(count, name) for count, name in ((2, "parse"), (4, "store"), (1, "keys"))
         )
         watch = self.metrics.watch
-        watch("linefix_workers_ready", "Processes that take requests", lambda: self.readiness.takes_requests)
+        ready = self.readiness
+        watch("linefix_workers_ready", "Processes that take requests", lambda: ready.warm and not ready.draining)
         watch("linefix_searches_running", "Searches that run", lambda: self.gate.running)
         watch("linefix_searches_waiting", "Searches that wait", lambda: self.gate.waiting)
         watch("linefix_indexing_running", "Large maps that are indexed", lambda: self.indexing.running)

@@ -33,13 +33,9 @@ def _takes(form: type[MapForm | ScansForm]) -> dict[str, Any]:
         name: ({"enum": CHOICES[name]} if name in CHOICES else {"type": "string"}) | {"description": text}
         for name, text in descriptions_of(form).items()
     }
-    schema = {
-        "type": "object",
-        "required": ["file"],
-        "additionalProperties": False,
-        "properties": {"file": content, **fields},
-    }
-    return takes_content(FORM, {"schema": schema}, "A form with files. May be gzip (Content-Encoding).")
+    taken = {"required": ["file"], "additionalProperties": False, "properties": {"file": content, **fields}}
+    described = "A form with files. May be gzip (Content-Encoding)."
+    return takes_content(FORM, {"schema": {"type": "object", **taken}}, described)
 
 
 @router.post("/v1/maps:import", response_model=ImportAnswer, openapi_extra=_takes(MapForm))
@@ -67,11 +63,10 @@ async def import_scans(exchange: Searching) -> Response:
 
     Read some scans of a bag or another log, evenly spread; nothing is stored.
     """
-
-    async def work(read: ReadFiles) -> Response:
-        return await exchange.answer(partial(answer_scans, read, exchange), exchange.services.operations)
-
-    return await _import(exchange, work, scans=True)
+    gate = exchange.services.operations
+    return await _import(
+        exchange, lambda read: exchange.answer(partial(answer_scans, read, exchange), gate), scans=True
+    )
 
 
 async def _import(
