@@ -79,7 +79,7 @@ class Entrance:
             raise BodyTooLargeError(self.max_body_bytes)
         if searches:
             self.gate.require_place(grant.holder)
-        return Ticket(grant.holder, grant.maps)
+        return Ticket(grant.holder, grant.maps, searches)
 
     def _require_own_page(self, fields: Mapping[bytes, str]) -> None:
         """Refuse requests that the page of another site may have sent.

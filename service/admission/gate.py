@@ -33,10 +33,11 @@ LONG_PER_SLOT = 2  # long searches for each slot: each has a thread, and the mem
 
 @dataclass(eq=False, slots=True)
 class Ticket:
-    """One request's admission: its caller, the prefix of the ids of its maps, and whether it has a place and a slot."""
+    """One request's admission: caller, prefix of the ids of its maps, whether it searches, has a place, had a slot."""
 
     holder: Holder = None
     maps: str = ""
+    searches: bool = False
     has_place: bool = False
     had_slot: bool = False
 

@@ -70,7 +70,7 @@ async def receive(exchange: Exchange, take: Take, taken: str = JSON) -> bytearra
                 data += piece
     except TimeoutError:
         raise BodyTooSlowError(settings.request_timeout_s) from None
-    if exchange.scope["method"] == "POST":
+    if exchange.ticket.searches:
         services.gate.enter(exchange.ticket)
     exchange.watch = Stopwatch()
     exchange.limit(None)

@@ -56,7 +56,7 @@ class Exchange(Job):
     source, sink : callable
         `receive` and `send` of the server.
     arrived : float
-        When its head arrived, by the event loop's clock, seconds.
+        When its head arrived, by `time.monotonic`, which is the event loop's clock, seconds.
     ticket : Ticket
         Its admission.
     held : ExitStack
@@ -192,21 +192,13 @@ class Exchange(Job):
                 task.cancel()
 
 
-async def _any(request: Request) -> Exchange:
+async def _exchange_of(request: Request) -> Exchange:
     found: Exchange = request.scope[KEY]
     return found
-
-
-async def _searching(request: Request) -> Exchange:
-    exchange = await _any(request)
-    exchange.services.readiness.require_warm()  # before the body is read
-    return exchange
 
 
 MapIdPath = Annotated[
     str, Path(pattern="^[A-Za-z0-9._-]+$", min_length=1, max_length=128, examples=["hq-3"], description="the map's id")
 ]
-Admitted = Annotated[Exchange, Depends(_any)]
-"""A request that was let in."""
-Searching = Annotated[Exchange, Depends(_searching)]
-"""One that needs the kernels; `NotReadyError` when they are not there yet."""
+Admitted = Annotated[Exchange, Depends(_exchange_of)]
+"""A request that was let in; one that searches, after the kernels were loaded."""

@@ -50,6 +50,8 @@ class RequestMiddleware:
         inner[KEY] = exchange
         try:
             exchange.ticket = services.entrance.admit(inner)
+            if exchange.ticket.searches:
+                services.readiness.require_warm()
             serving = self._app(inner, exchange.receive, exchange.send)
             # What a client has sent to be stored is stored, and logged, though it has gone.
             await (serving if scope["method"] in WRITES else exchange.unless_hung_up(serving))

@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
-from pydantic.json_schema import models_json_schema
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from ..admission.entrance import GUARDED
 from .answers import Problem
@@ -33,12 +33,13 @@ PROBLEM: dict[int | str, dict[str, Any]] = {
     }
 }
 """The documentation of the errors of every route."""
-_READ: dict[str, type[BaseModel]] = {}  # models of the bodies that the routes read by themselves
+# Models that no route declares: those of the problems, and of the bodies, which routes read by themselves.
+_MODELS: list[tuple[type[BaseModel], JsonSchemaMode]] = [(Problem, "serialization")]
 
 
 def takes(model: type[BaseModel], answer: type[BaseModel], examples: Mapping[str, Any], **more: Any) -> dict[str, Any]:
     """Return the documentation of a route that reads its body by itself, as arguments of its decorator."""
-    _READ[model.__name__] = model
+    _MODELS.append((model, "validation"))
     content = {
         "schema": {"$ref": _REF.format(model=model.__name__)},
         "examples": {name: {"value": value} for name, value in examples.items()},
@@ -55,10 +56,9 @@ def takes_content(media_type: str, content: dict[str, Any], description: str) ->
 def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
     """Return the OpenAPI document of an application; `guarded`: its routes require keys."""
     document = get_openapi(title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes)
-    _, read = models_json_schema([(model, "validation") for model in _READ.values()], ref_template=_REF)
-    _, failed = models_json_schema([(Problem, "serialization")], ref_template=_REF)
+    _, schemas = models_json_schema(_MODELS, ref_template=_REF)
     components = document["components"]
-    components["schemas"] |= read["$defs"] | failed["$defs"]
+    components["schemas"] |= schemas["$defs"]
     components["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
     if guarded:
         for path, item in document["paths"].items():

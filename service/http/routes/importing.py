@@ -19,7 +19,7 @@ from ...importing.fields import CHOICES, MapForm, ScansForm
 from ...work.results import answer_import, answer_scans, index_import
 from ..answers import ImportAnswer, ScansAnswer
 from ..bodies import FORM, parse, receive
-from ..exchange import Exchange, Searching
+from ..exchange import Admitted, Exchange
 from ..openapi import PROBLEM, takes_content
 
 router = APIRouter(tags=["maps"], responses=PROBLEM)
@@ -39,7 +39,7 @@ def _takes(form: type[MapForm | ScansForm]) -> dict[str, Any]:
 
 
 @router.post("/v1/maps:import", response_model=ImportAnswer, openapi_extra=_takes(MapForm))
-async def import_map(exchange: Searching) -> Response:
+async def import_map(exchange: Admitted) -> Response:
     """Read the map of another tool.
 
     Convert files of another tool to a map, and report conversions and findings; nothing is stored.
@@ -58,7 +58,7 @@ async def import_map(exchange: Searching) -> Response:
 
 
 @router.post("/v1/scans:import", response_model=ScansAnswer, openapi_extra=_takes(ScansForm))
-async def import_scans(exchange: Searching) -> Response:
+async def import_scans(exchange: Admitted) -> Response:
     """Read scans of a log.
 
     Read some scans of a bag or another log, evenly spread; nothing is stored.

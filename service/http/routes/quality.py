@@ -19,7 +19,7 @@ from linefix.operations import Steps, analysis_steps, applied, check_steps, upda
 
 from ...maps.lookup import FoundMaps
 from ..bodies import read
-from ..exchange import Exchange, MapIdPath, Searching
+from ..exchange import Admitted, Exchange, MapIdPath
 from ..openapi import PROBLEM, takes
 from ..stages import index, look_up_map
 
@@ -29,7 +29,7 @@ Operation = Callable[[MapIndex, FoundMaps], Steps]
 
 
 @router.post("/v1/maps/{map_id}:analyze", **takes(AnalyzeRequest, AnalyzeAnswer, {"a robot": examples.ANALYZE}))
-async def analyze_map(exchange: Searching, map_id: MapIdPath) -> Response:
+async def analyze_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Analyze a stored map.
 
     Simulate scans on a grid of poses and report where localization succeeds.
@@ -38,7 +38,7 @@ async def analyze_map(exchange: Searching, map_id: MapIdPath) -> Response:
 
 
 @router.post("/v1/analyze", **takes(MapAnalyzeRequest, AnalyzeAnswer, {"a room": examples.ANALYZE_ROOM}))
-async def analyze(exchange: Searching) -> Response:
+async def analyze(exchange: Admitted) -> Response:
     """Analyze a map that comes with the request.
 
     Simulate scans on a grid of poses of a map in the request.
@@ -53,7 +53,7 @@ async def _analyze(exchange: Exchange, on: InlineMap | StoredMap, asked: Analyze
 
 @router.get("/v1/maps/{map_id}:check", response_model=CheckAnswer)
 async def check_map(
-    exchange: Searching,
+    exchange: Admitted,
     map_id: MapIdPath,
     deadline_ms: Annotated[
         float | None,
@@ -70,7 +70,7 @@ async def check_map(
 
 
 @router.post("/v1/maps/{map_id}:check", **takes(CheckRequest, CheckAnswer, {"two scans": examples.CHECK}))
-async def check_map_with_scans(exchange: Searching, map_id: MapIdPath) -> Response:
+async def check_map_with_scans(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Check a map with sample scans.
 
     Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved.
@@ -88,7 +88,7 @@ async def _check(exchange: Exchange, map_id: str, asked: CheckRequest) -> Respon
 
 
 @router.post("/v1/maps/{map_id}:update", **takes(UpdateRequest, UpdateAnswer, {"two visits": examples.UPDATE}))
-async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
+async def update_map(exchange: Admitted, map_id: MapIdPath) -> Response:
     """Propose changes of a stored map.
 
     Propose changes of a map that scans of several visits show; nothing is stored.
@@ -103,7 +103,7 @@ async def update_map(exchange: Searching, map_id: MapIdPath) -> Response:
 
 
 @router.post("/v1/maps:apply", **takes(ApplyRequest, ApplyAnswer, {"a rack is gone": examples.APPLY}))
-async def apply_changes(exchange: Searching) -> Response:
+async def apply_changes(exchange: Admitted) -> Response:
     """Apply the accepted changes of an update.
 
     Return a map with those changes of an update that are accepted; nothing is searched or stored.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from functools import partial
 
 from fastapi import APIRouter, Response
@@ -19,21 +20,19 @@ from linefix.operations import registered, vectorized
 from ...work.results import BatchResult, batch_done
 from ..answers import BatchAnswer
 from ..bodies import read, read_by
-from ..exchange import Searching
+from ..exchange import Admitted
 from ..openapi import PROBLEM, takes
 from ..problems import problem_or_defect
 from ..stages import look_up_maps
 
 router = APIRouter(tags=["scans"], responses=PROBLEM)
-_EXAMPLES = {
-    "a room": examples.ASSOCIATE,
-    "a stored map": examples.ASSOCIATE_STORED,
-    "several maps": examples.ASSOCIATE_SEVERAL,
-}
+_SEVERAL = {"a stored map": examples.ASSOCIATE_STORED, "several maps": examples.ASSOCIATE_SEVERAL}
+_EXAMPLES = {"a room": examples.ASSOCIATE, **_SEVERAL}
+_OF_ONE = re.compile(r"^/(scan|prior)(?=/|$)")  # a place in one scan of a batch, or its prior
 
 
 @router.post("/v1/associate", **takes(AssociateRequest, AssociateAnswer, _EXAMPLES))
-async def associate(exchange: Searching) -> Response:
+async def associate(exchange: Admitted) -> Response:
     """Find the pose without knowing correspondences.
 
     Estimate the pose of a scan in a map, or on one of several, with a verdict and its probability.
@@ -45,7 +44,7 @@ async def associate(exchange: Searching) -> Response:
 
 
 @router.post("/v1/associate:batch", **takes(BatchRequest, BatchAnswer, {"two scans": examples.BATCH}))
-async def associate_batch(exchange: Searching) -> Response:
+async def associate_batch(exchange: Admitted) -> Response:
     """Find several scans in one map.
 
     Estimate the poses of several scans in one map, or on several; an invalid scan yields one problem item.
@@ -84,21 +83,13 @@ async def associate_batch(exchange: Searching) -> Response:
 def _refused(index: int, error: Exception, request_id: str) -> BatchResult:
     """Return the item of a scan that has no answer."""
     problem = problem_or_defect(error, request_id)
-    moved = problem.as_json(request_id, partial(_in_batch, index))
+    moved = problem.as_json(request_id, partial(_OF_ONE.sub, rf"/\1s/{index}"))
     status = problem.kind.status
     return BatchResult(str(status), encode({"index": index, "status_code": status, "problem": moved}))
 
 
-def _in_batch(index: int, pointer: str) -> str:
-    """Turn a place in one scan or prior into its place in the batch."""
-    for one, many in (("/scan", f"/scans/{index}"), ("/prior", f"/priors/{index}")):
-        if pointer == one or pointer.startswith(one + "/"):
-            return many + pointer.removeprefix(one)
-    return pointer
-
-
 @router.post("/v1/register", **takes(RegisterRequest, RegisterAnswer, {"a corner": examples.REGISTER}))
-async def register(exchange: Searching) -> Response:
+async def register(exchange: Admitted) -> Response:
     """Find the pose from known correspondences.
 
     Lay scan segments on the map segments that they are known to belong to.
@@ -108,7 +99,7 @@ async def register(exchange: Searching) -> Response:
 
 
 @router.post("/v1/vectorize", **takes(VectorizeRequest, VectorizeAnswer, {"a corner": examples.VECTORIZE}))
-async def vectorize(exchange: Searching) -> Response:
+async def vectorize(exchange: Admitted) -> Response:
     """Find the segments in ranges or points.
 
     Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points.
