@@ -5,8 +5,9 @@ Each room imports only from those below it; import-linter holds them to that (`p
 ::
 
     serving                starts the service, and drains it before it ends
-    app                    puts the parts of one application together
+    app                    the application: its layers, its routes, its start and end
     http/                  routes, problems, bodies, the log of requests
+    services, readiness    the parts of one application, put together; whether it can serve
     work/                  one request's work in a thread: models to the libraries, results to JSON
     settings               command line and environment
     admission/, maps/      who is let in; stored maps and their indices

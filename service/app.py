@@ -26,9 +26,9 @@ from .http.middleware import RequestMiddleware
 from .http.openapi import describe
 from .http.problems import raise_ours
 from .http.routes import importing, maps, operations, pages, quality, scans
-from .http.services import Services
 from .importing.folders import remove_abandoned
 from .memory import return_free_pages
+from .services import Services
 from .settings import Settings
 from .telemetry.metrics import REFRESH_SECONDS
 from .version import VERSION

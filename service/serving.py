@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fastapi import FastAPI
 
-    from .http.services import Services
+    from .services import Services
     from .settings import Settings
 
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read

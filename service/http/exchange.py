@@ -23,8 +23,8 @@ from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from ..admission.gate import Gate, Ticket
+from ..services import Services
 from ..work.job import Job
-from .services import Services
 
 T = TypeVar("T")
 KEY = "linefix.exchange"

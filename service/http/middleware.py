@@ -14,9 +14,9 @@ import time
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import MissingKeyError, NotHttpError, ShareUsedError, UnknownKeyError
+from ..services import Services
 from .exchange import KEY, Exchange, HangUpError
 from .problems import problem_or_defect
-from .services import Services
 
 logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Response
+from fastapi.responses import PlainTextResponse
 
 from ...version import VERSION
 from ..answers import LIMITS, Limits, Live, Version
@@ -54,11 +55,7 @@ async def limits(exchange: Admitted) -> dict[str, float]:
     return {name: getattr(settings, name) for name in LIMITS} | fixed
 
 
-@router.get(
-    "/metrics",
-    response_class=Response,
-    responses={200: {"description": "Prometheus text", "content": {"text/plain": {"schema": {"type": "string"}}}}},
-)
+@router.get("/metrics", response_class=PlainTextResponse)
 async def metrics(exchange: Admitted) -> Response:
     """Return the counts for Prometheus.
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from ..admission.budget import ByteBudget
-from ..admission.entrance import Entrance
-from ..admission.gate import Gate
-from ..admission.keys import Keyring
-from ..importing.reader import Bounds
-from ..maps import IndexCache, MapStore
-from ..maps.lookup import MapLookup
-from ..parsing.child import Child
-from ..settings import Settings
-from ..telemetry.metrics import Metrics
-from ..thread_pool import Threads
-from ..work.results import Associator
+from .admission.budget import ByteBudget
+from .admission.entrance import Entrance
+from .admission.gate import Gate
+from .admission.keys import Keyring
+from .importing.reader import Bounds
+from .maps import IndexCache, MapStore
+from .maps.lookup import MapLookup
+from .parsing.child import Child
 from .readiness import Readiness
+from .settings import Settings
+from .telemetry.metrics import Metrics
+from .thread_pool import Threads
+from .work.results import Associator
 
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 
-from ..errors import ENDING, CorruptMapError, NotReadyError, StoreFullError
-from ..maps import MapStore
-from ..thread_pool import Threads
+from .errors import ENDING, CorruptMapError, NotReadyError, StoreFullError
+from .maps import MapStore
+from .thread_pool import Threads
 
 ANSWERS_WITHIN = 2.0  # s
 
