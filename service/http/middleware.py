@@ -22,7 +22,6 @@ logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would send again at once
 OTHER = "unmatched"
-WRITES = ("PUT", "DELETE")
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
@@ -54,7 +53,7 @@ class RequestMiddleware:
                 services.readiness.require_warm()
             serving = self._app(inner, exchange.receive, exchange.send)
             # What a client has sent to be stored is stored, and logged, though it has gone.
-            await (serving if scope["method"] in WRITES else exchange.unless_hung_up(serving))
+            await (exchange.unless_hung_up(serving) if exchange.ticket.searches else serving)
         except HangUpError:
             exchange.status = CLIENT_CLOSED_REQUEST
         except Exception as error:
