@@ -32,12 +32,11 @@ def put(map_id: MapId, file: MapFile, where: Where, output: Output) -> None:
 @grouped
 def list_maps(where: Where, output: Output) -> None:
     """List the stored maps, by id; with --json one a line."""
-    found, cursor = list[Json](), None
+    maps, cursor = list[Json](), ""
     with where.opened() as service:
-        while not found or cursor is not None:
-            page = service.ask("list_maps", cursor=cursor)
-            found, cursor = [*found, page], page["next"]
-    maps = [one for page in found for one in page["maps"]]
+        while cursor is not None:
+            page = service.ask("list_maps", cursor=cursor or None)
+            maps, cursor = [*maps, *page["maps"]], page["next"]
     if output.as_json:
         for one in maps:
             print_json(one)

@@ -33,6 +33,7 @@ JSON = "application/json"
 WATCH_AFTER = 0.02  # s until the connection is watched: most answers are ready earlier
 DROP_SECONDS = 3.0  # s that the rest of a body may take to come
 STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
+DROPPED = 4  # times the largest body: so much of the rest is dropped, from others
 PIECE = 32_768  # bytes of an answer; the server holds a few pieces
 LARGE = 65_536  # bytes of an answer; a smaller one is handed over in one piece, a larger one counts until it was read
 BODY = {b"content-length", b"transfer-encoding"}
@@ -127,7 +128,7 @@ class Exchange(Job):
         """Read the rest of the body and drop it, as far as it comes soon and is not too much."""
         if not self.unread:
             return
-        dropped, most = 0, STRANGERS_BYTES if self.is_strangers else self.services.settings.max_body_bytes
+        dropped, most = 0, STRANGERS_BYTES if self.is_strangers else DROPPED * self.services.settings.max_body_bytes
         with suppress(TimeoutError):
             async with asyncio.timeout(DROP_SECONDS):
                 while self.unread and dropped <= most:

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,7 @@ LARGE = random.Random(0).randbytes(3 << 20)  # does not get smaller
 
 def answered(response: httpx.Response) -> dict[str, Any]:
     assert response.status_code == 200, response.text
-    answer: dict[str, Any] = response.json()
-    return {name: value for name, value in answer.items() if name not in ("request_id", "timing_ms")}
+    return {name: value for name, value in response.json().items() if name not in ("request_id", "timing_ms")}
 
 
 WAYS: dict[str, Callable[[bytes], dict[str, Any]]] = {
@@ -82,6 +82,10 @@ def test_a_length_over_the_limit_is_refused_before_the_body_comes(service: Runni
         head = connection.recv(4096)
     assert head.startswith(b"HTTP/1.1 413 ")
     assert b"connection: close" in head.lower()
+    sender = HTTPConnection("127.0.0.1", service.port)
+    sender.request("POST", "/v1/associate", bytes(99_000_000))  # as many clients: all is sent before anything is read
+    assert sender.getresponse().status == 413
+    sender.close()
 
 
 def test_chunks_over_the_limit_are_refused_while_they_come(narrow: RunningService) -> None:
