@@ -95,6 +95,7 @@ HIDDEN = '<rect x="1" y="1" width="2" height="3"/>'
         "<rect x='1' y='1' width='2' height='3' fill='none' stroke='none'/>",
         "<g fill='none'><rect x='1' y='1' width='2' height='3' style='stroke:transparent'/></g>",
         "<g stroke-opacity='0'><line x1='1' y1='1' x2='5' y2='5'/></g>",
+        "<g stroke-opacity='0'><line stroke='red' x1='1' y1='1' x2='5' y2='5'/></g>",
         "<g stroke='none'><line x1='1' y1='1' x2='5' y2='5'/></g>",
         "<rect width='100%' height='100%' fill='white'/>",
         "<rect x='0' y='0' width='40' height='20' style='fill:#fff;stroke:none'/>",
@@ -122,6 +123,8 @@ def test_definitions_are_not_drawn(tmp_path: Path, kind: str) -> None:
         f"<switch><foreignObject requiredExtensions='x'/><g>{HIDDEN}</g><g>{HIDDEN}</g></switch>",
         "<rect x='1' y='1' width='2' height='3' fill='none' stroke='black'/>",
         "<rect x='1' y='1' width='2' height='3' fill='grey' stroke='none'/>",
+        "<g stroke-opacity='0' fill='none'><path d='M1 1H3V4H1Z' stroke-opacity='1' stroke='black'/></g>",
+        "<g stroke='black' stroke-opacity='0' fill='none'><path d='M1 1H3V4H1Z' stroke-opacity='1'/></g>",
         "<rect width='40' height='20' fill='white' stroke='black'/>",  # all of the picture
         "<rect width='40' height='20'/>",
     ],

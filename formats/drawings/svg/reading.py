@@ -46,7 +46,7 @@ def read_svg(path: Path, drawing: Drawing) -> None:
 
 def _read_shapes(root: Element, drawing: Drawing) -> None:
     for element, place in Visible(root, drawing).shapes():
-        if not drawing.takes(place.layers, {**element.attrib, "stroke-dasharray": place.dashes}):
+        if not drawing.takes(place.layers, {**element.attrib, **place.style}):
             continue
         kind = kind_of(element)
         for points, closed in SHAPES[kind](Measure(element, place.viewport)):

@@ -26,6 +26,7 @@ NOT_DRAWN = {
     "defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata", "title", "desc", "style", "script",
     "linearGradient", "radialGradient", "filter", "view", "cursor", "font", "animate", "animateTransform", "set",
 }  # fmt: skip
+INHERITED = {"visibility", "stroke", "stroke-opacity", "stroke-width", "stroke-dasharray", "fill", "fill-opacity"}
 GROUPS = {"g", "a"}
 CONDITIONS = {"systemLanguage", "requiredExtensions"}  # of a child of switch that is passed over
 FLOORS = ("data-level", "data-floor")
@@ -47,11 +48,8 @@ class Place:
     matrix : Matrix
         From the element's units to the root's.
     viewport : Viewport
-    stroke_width : float
-        The element's own units; nan where it is not known.
-    visible : bool
-    stroked, filled : bool or None
-        True if lines, and areas, are painted; None: not specified.
+    style : mapping of str to str
+        Properties that are inherited.
     frames : tuple of (2, 2)
         Least and greatest x and y of the picture and of the nested ones around the element, the root's units.
     copied : tuple of Element
@@ -62,13 +60,27 @@ class Place:
     groups: tuple[str, ...] = ()
     matrix: Matrix = field(default_factory=svgelements.Matrix)
     viewport: Viewport = field(default_factory=Viewport)
-    stroke_width: float = math.nan
-    dashes: str = ""
-    visible: bool = True
-    stroked: bool | None = None
-    filled: bool | None = None
+    style: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[NDArray[np.float64], ...] = ()
     copied: tuple[Element, ...] = ()
+
+    @property
+    def stroke_width(self) -> float:
+        """How wide lines are drawn, own units; nan where that is no plain number, such as a share of the picture."""
+        try:
+            width = float(self.style.get("stroke-width", "nan").lower().removesuffix("px"))
+        except ValueError:
+            return math.nan
+        return width if 0.0 <= width <= MAX_UNITS else math.nan
+
+    def paints(self, key: str) -> bool | None:
+        """Tell whether "stroke" or "fill" paints anything; None if not specified."""
+        if _is_zero(self.style.get(f"{key}-opacity")):
+            return False
+        if key not in self.style:
+            return None
+        colour = parse_color(self.style[key])
+        return self.style[key].lower() != "none" and getattr(colour, "alpha", 1.0) != 0.0
 
     @property
     def width(self) -> float:
@@ -170,27 +182,23 @@ class Visible:
                 1,
             )
         matrix = matrix_of(style, outer.viewport, self._drawing)
-        visibility = style.get("visibility", "").lower()
         return replace(
             outer,
             layers=(*outer.layers, *filter(None, names)),
             groups=(*outer.groups, *filter(None, [group])),
             matrix=outer.matrix if matrix is None else matrix * outer.matrix,
-            dashes=style.get("stroke-dasharray", outer.dashes),
-            stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
-            visible=visibility == "visible" if visibility else outer.visible,
-            stroked=_paints(style, "stroke", outer.stroked),
-            filled=_paints(style, "fill", outer.filled),
+            style={**outer.style, **{key: value for key, value in style.items() if key in INHERITED and value}},
         )
 
     def _painted(self, element: Element, kind: str, place: Place) -> bool:
         """Tell whether a shape can be seen; count those that cannot."""
         notes = self._drawing.notes
-        if not place.visible:
+        stroked, filled = place.paints("stroke"), place.paints("fill")
+        if place.style.get("visibility", "visible").lower() != "visible":
             notes.add_dropped("hidden", "elements that are not displayed", 1)
-        elif (place.stroked is False or place.stroke_width == 0.0) and (kind == "line" or place.filled is False):
+        elif (stroked is False or place.stroke_width == 0.0) and (kind == "line" or filled is False):
             notes.add_dropped("not_painted", "elements with neither stroke nor fill", 1)
-        elif kind == "rect" and not place.stroked and place.filled and self._covers_all(element, place):
+        elif kind == "rect" and not stroked and filled and self._covers_all(element, place):
             notes.add_dropped("background", "filled rectangles without a stroke that cover the whole picture", 1)
         else:
             return True
@@ -285,24 +293,3 @@ def _is_zero(value: str | None) -> bool:
         return value is not None and float(value.rstrip("%px")) == 0.0
     except ValueError:
         return False
-
-
-def _paints(style: Mapping[str, str], key: str, inherited: bool | None) -> bool | None:
-    """Tell whether a stroke or a fill paints anything; None if not specified."""
-    if _is_zero(style.get(f"{key}-opacity")):
-        return False
-    if key not in style:
-        return inherited
-    colour = parse_color(style[key])
-    return style[key].lower() != "none" and getattr(colour, "alpha", 1.0) != 0.0
-
-
-def _stroke_width(told: str | None, inherited: float) -> float:
-    """Return how wide lines are drawn; what is no plain number, such as a share of the picture, is not known."""
-    if told is None:
-        return inherited
-    try:
-        width = float(told.strip().lower().removesuffix("px"))
-    except ValueError:
-        return math.nan
-    return width if 0.0 <= width <= MAX_UNITS else math.nan
