@@ -186,7 +186,8 @@ def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
     """Return a finding if most scans fit better by one factor."""
     if scale is None or scale.is_one or scale.usable < usable:
         return
-    if scale.agreeing < min(2, count) or scale.agreeing <= tuning.MANY * scale.usable:
+    # Some scans of another building fit by chance at one scale, and are usable at none.
+    if scale.agreeing < min(2, count) or scale.agreeing <= tuning.MANY * (scale.usable or count):
         return
     of_scans, size = scale.of_scans, 1.0 / scale.factor if scale.of_scans else scale.factor
     factor, unit = unit_mistake(size, "scans" if of_scans else "map")

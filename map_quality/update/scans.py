@@ -246,16 +246,18 @@ def _doubt(own: Sequence[Localized], known: Segments, sigma: float) -> str | Non
             f"{sure} of {len(own)} scans are usable and precise, expected at least {least}. Check that the scans are "
             "from this building, and that the map shows the places where they were taken."
         )
-    matched = [Matched(one.scan, one.pose, pairs_of(known, one.scan, one.result)) for one in precise]
+    matched = [Matched(one.scan, one.result, pairs_of(known, one.scan, one.result)) for one in precise]
     errors = errors_of(matched, sigma)
-    if errors.scale_deviation > tuning.SURE_OF_SCALE:
+    if errors.drawn_deviation > tuning.SURE_OF_SCALE:
         return (
-            f"The scale of the scans is known to {100.0 * errors.scale_deviation:.1f} % only, expected "
+            f"The scale of the scans is known to {100.0 * errors.drawn_deviation:.1f} % only, expected "
             f"{100.0 * tuning.SURE_OF_SCALE:g} %: too few walls face one another. Send more scans of this visit."
         )
-    if abs(errors.scale) > tuning.OFF_SCALE:
+    # The errors of the map's walls, too, make lengths differ.
+    most = math.hypot(tuning.OFF_SCALE, tuning.DEVIATIONS * errors.scale_deviation)
+    if abs(errors.scale) > most:
         return (
             f"Lengths of the scans are off by {100.0 * errors.scale:.1f} % from those of the map, expected at most "
-            f"{100.0 * tuning.OFF_SCALE:g} %. Check the scale of the map and of the ranges."
+            f"{100.0 * most:.1g} %. Check the scale of the map and of the ranges."
         )
     return None

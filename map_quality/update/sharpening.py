@@ -23,7 +23,7 @@ import scipy
 from association import Deadline, MapIndex
 from registration import Segments
 
-from ..scale import pairs_of
+from ..scale import LINE_FLOOR, pairs_of, sparse
 from . import tuning
 from .result import Bools, Floats, Indices, Sharpened
 from .scans import Localized, blocks, go_on
@@ -116,7 +116,7 @@ def _pairs_of(known: Segments, wall_of: Indices, middles: Floats, found: Sequenc
         angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi  # a map without directions has either
         moved, turned_by = np.column_stack([normals, lever]), np.column_stack([zero, zero, one_])
         aside, tilted = np.column_stack([one_, along]), np.column_stack([zero, one_])
-        noise = pairs.variances + tuning.LINE_FLOOR**2
+        noise = pairs.variances + LINE_FLOOR**2
         angle_noise = pairs.variances / np.maximum(pairs.spreads, 1e-6) + tuning.ANGLE_FLOOR**2
         parts.append(_Pairs(scan, wall, moved, aside, offset, noise))
         parts.append(_Pairs(scan, wall, turned_by, tilted, angle, angle_noise))
@@ -131,8 +131,8 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
     go_on(deadline)
     weight, numbers = 1.0 / pairs.variance, np.unique(pairs.scan, return_inverse=True)[1]
     size = 3 * (int(numbers.max(initial=-1)) + 1)
-    of_wall = _sparse(pairs.of_wall, pairs.wall, prior.size)
-    of_pose = _sparse(pairs.of_pose, numbers, size)
+    of_wall = sparse(pairs.of_wall, pairs.wall, prior.size)
+    of_pose = sparse(pairs.of_pose, numbers, size)
     at_wall, at_pose = of_wall.T @ (weight * pairs.residual), of_pose.T @ (weight * pairs.residual)
     blocks_of = np.zeros((len(prior), 2, 2))
     np.add.at(blocks_of, pairs.wall, (weight[:, None] * pairs.of_wall)[:, :, None] * pairs.of_wall[:, None, :])
@@ -150,13 +150,6 @@ def _solve(pairs: _Pairs, prior: Floats, deadline: Deadline) -> tuple[Floats, Fl
         through, direct = (np.asarray(one).reshape(-1, 2, size) for one in (rows @ of_poses, rows.toarray()))
         covariance[part] = own[part] + np.einsum("kis,kjs->kij", through, direct)
     return np.asarray(shift).reshape(-1, 2), covariance
-
-
-def _sparse(rows: Floats, block: Indices, columns: int) -> scipy.sparse.csr_array:
-    """Return a sparse matrix whose rows have their values in one block of columns each."""
-    count, width = rows.shape
-    at = width * block[:, None] + np.arange(width)
-    return scipy.sparse.csr_array((rows.ravel(), at.ravel(), width * np.arange(count + 1)), shape=(count, columns))
 
 
 def _deviations(known: Segments, wall_of: Indices, middles: Floats, covariance: Floats) -> Floats:

@@ -68,7 +68,7 @@ SAME_LENGTH, SAME_FRACTION = 0.15, 0.05  # m, and fraction; by which a side of a
 
 LEAST_BLUR = 0.008  # m; of a map's declared sigma below which its walls stay as they are
 SHARPER = 0.7  # times the declared sigma; the deviation of a wall above which it stays as it is
-LINE_FLOOR, ANGLE_FLOOR = 0.001, 0.0005  # m, rad; errors of the lines of one scan that do not average out
+ANGLE_FLOOR = 0.0005  # rad; errors of the lines of one scan that do not average out
 MOST_POSES = 1000  # of scans that are estimated with the walls; memory and time
 MOST_TILT = 0.05  # rad; deviation of a wall's direction, however short it is
 FREE_POSE = (1.0, 1.0, 0.5)  # m, m, rad; deviations of a pose of which nothing is known

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex, mirrored
+from benchmarks.worlds.map_errors import walls_off
 from linefix import LaserScan, scan_of
 from map_quality import UpdateError, VisitScan
 from map_quality.scale import Matched, errors_of
@@ -40,6 +41,14 @@ def index() -> MapIndex:
 def test_scans_off_scale_change_nothing(factor: float) -> None:
     found = update(index(), days(TODAY, change=lambda ranges: ranges * factor))
     assert found.changes == ()
+
+
+@pytest.mark.parametrize(("factor", "refused"), [(1.0, 0), (1.02, 2)])
+def test_honest_visits_to_a_blurred_map_count(factor: float, refused: int) -> None:
+    """Its walls make lengths differ by 0.9 %, in all scans alike."""
+    blurred = MapIndex.build(walls_off(HALL, np.random.default_rng(2), 0.05).segments, 0.05)
+    scans = [visit(HALL, f"day {k // 2}", k, change=lambda ranges: ranges * factor) for k in range(4)]
+    assert len(update(blurred, [one for some in scans for one in some]).refused_visits) == refused
 
 
 def test_scans_of_a_mirrored_laser_change_nothing() -> None:
