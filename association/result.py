@@ -34,6 +34,7 @@ WarningCode = Literal[
     "nulls_for_no_return",
     "stuck_ranges",
     "scan_exceeds_map",
+    "unlikely_map_size",
     "faces_away",
     "prior_contradicted",
     "search_incomplete",

@@ -95,3 +95,4 @@ LEAST_STUCK = 10
 STUCK_SHARE = 0.5  # measured
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
 FARTHEST = 300.0  # m, geometry; across what lasers see indoors
+LARGEST_MAP = 3000.0  # m, as a map check has it; the diagonal of what robots drive about in

@@ -19,6 +19,7 @@ from .tuning import (
     EXCEEDING,
     FACING,
     FARTHEST,
+    LARGEST_MAP,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LEAST_STUCK,
@@ -31,17 +32,23 @@ NOT_IN_ORDER = (
     "Expected is one turn around the viewpoint in one direction or, without a viewpoint, neighbour after neighbour. "
     "Send the points of one scan in the order in which they were measured."
 )
+TOO_LARGE = (
+    "The map's diagonal is {:.0f} m, expected at most {:.0f} m: the map seems to be in millimetres. Divide its "
+    "coordinates by 1000; a drawing, import it again with its unit (`--units mm`)."
+)
 NO_SEGMENTS = "The scan has no segments, so nothing was searched. Check the ranges, and the least length of segments."
 
 
 def warnings_of(context: SearchContext, search: SearchReport, verdict: Verdict) -> tuple[AssociationWarning, ...]:
     """List the warnings about scan and search."""
+    room = context.index.diagonal
     found: dict[WarningCode, str | None] = {
         "no_segments": None if len(context.scan.measured) else NO_SEGMENTS,
         "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
         **{warning.code: warning.message for warning in context.scan.warnings},
         "stuck_ranges": _stuck_ranges(context.scan.beams),
         "scan_exceeds_map": _exceeding(context),
+        "unlikely_map_size": None if verdict.usable or room <= LARGEST_MAP else TOO_LARGE.format(room, LARGEST_MAP),
         "faces_away": _facing_away(context),
         "prior_contradicted": "A clearly better pose lies where the prior excludes it. Check the prior, or search "
         "without it."

@@ -104,7 +104,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = IDENTITY, sigma:
     >>> scan = linefix.assemble(views)
     """
     scan, warning = ranges_scan(seen.laser, sigma), motion_warning(seen)
-    scan = scan if warning is None else replace(scan, warnings=(warning,))
+    scan = scan if warning is None else replace(scan, warnings=(*scan.warnings, warning))
     place = base_from_then.compose(seen.mount or IDENTITY)
     shown = mirrored(scan) if seen.flipped else scan
     return View(shown, place, motion=_motion_root(seen, base_from_then))
@@ -180,4 +180,6 @@ def ranges_scan(scan: LaserScan | ArrayLike, sigma: float | None = None) -> Scan
         When it is no scan.
     """
     found = vectorize(scan, VectorizationOptions(sigma=sigma))
-    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered)
+    beyond = scan.beyond_limits if isinstance(scan, LaserScan) else None
+    warnings = () if beyond is None else (AssociationWarning("no_segments", f"No range is {beyond}."),)
+    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered, warnings=warnings)

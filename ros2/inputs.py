@@ -146,7 +146,7 @@ class Inputs:
             yield from ((f"no scan arrives on {names}", self._reason(one)) for one in topics.scans)
         elif silent(self._ranges):
             told = "no scan has a range between range_min and range_max"
-            yield told, f"{told} for {SILENT_SECONDS:g} s; check the laser"
+            yield told, f"{told} for {SILENT_SECONDS:g} s; check the laser, and that its ranges are in metres"
         if not self._mapped and now - began > patience:
             yield "", self._reason(topics.maps[0])
         elif not silent(self._scans) and silent(self._searched):

@@ -151,6 +151,21 @@ class LaserScan:
         np.putmask(cleaned, r < least, math.nan)
         return cleaned
 
+    @property
+    def beyond_limits(self) -> str | None:
+        """What is wrong where ranges are finite, and none is valid; None elsewhere.
+
+        A value that stands for no return repeats. Values that differ were measured.
+        """
+        found = self.ranges[np.isfinite(self.ranges)]
+        if not len(found) or np.isfinite(self.cleaned).any():
+            return None
+        unit = ": they seem to be in another unit, such as millimetres; expected metres"
+        return (
+            f"between range_min {self.range_min:g} m and range_max {self.range_max:g} m, but around "
+            f"{np.median(found):g} m{unit if 2 * len(np.unique(found)) > len(found) > 1 else ''}"
+        )
+
     def points(self) -> Floats:
         """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""
         r = self.cleaned

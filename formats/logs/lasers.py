@@ -59,9 +59,8 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
 
 def note_far(scan: LaserScan, notes: Notes) -> None:
     """Note a scan whose ranges are all too near or too far, as those in another unit are."""
-    if not np.isfinite(scan.cleaned).any() and np.isfinite(scan.ranges).any():
-        told = f"range_min {scan.range_min:g} m and range_max {scan.range_max:g} m"
-        notes.add_assumed("no_range_within", f"scans without any range between {told}", 1)
+    if (beyond := scan.beyond_limits) is not None:
+        notes.add_assumed("no_range_within", f"scans without any range {beyond}", 1)
 
 
 def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:

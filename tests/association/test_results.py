@@ -246,6 +246,10 @@ def test_a_scan_larger_than_the_map_has_a_warning(factor: float, warned: bool) -
         assert "its unit may be wrong" in answer.message
 
 
+def test_a_map_in_millimetres_is_named() -> None:
+    assert "unlikely_map_size" in codes(scan_of(seen(ROOM, INSIDE)[0]), index_of(1000.0 * ROOM))
+
+
 def test_a_segment_seen_through_a_window_does_not_make_a_scan_large() -> None:
     ends = seen(ROOM, INSIDE)[0]
     assert "scan_exceeds_map" not in codes(scan_of(np.vstack([ends, [[60.0, 0.0, 60.0, 1.5]]])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import linefix
 from formats import ImportedMap, ImportOptions, IncompleteFileError, Log, MalformedFileError, read_log, read_map
 from vectorization import LaserScan
 
@@ -159,12 +161,17 @@ def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, fields: dict[s
     assert assumed(log) == ({"range_min": 1} if fields.get("range_min") else {})
 
 
-@pytest.mark.parametrize("fields", [{"range_max": 1.0}, {"range_min": 3.0}])
-def test_limits_that_leave_no_range_are_named(tmp_path: Path, fields: dict[str, float]) -> None:
-    (_,), log = read_scans(tmp_path, USUAL.but(**fields))
+MILLIMETRES = {"ranges": np.linspace(1500.0, 3000.0, 91)}  # differ, and are no mark for beams without a return
+
+
+@pytest.mark.parametrize("fields", [{"range_max": 1.0}, {"range_min": 3.0}, MILLIMETRES])
+def test_limits_that_leave_no_range_are_named(tmp_path: Path, fields: dict[str, Any]) -> None:
+    (laser,), log = read_scans(tmp_path, USUAL.but(**fields))
     assert assumed(log) == {"no_range_within": 1}
-    assert "range_min" in notes(log)["no_range_within"].message
-    assert "range_max" in notes(log)["no_range_within"].message
+    (warning,) = linefix.scan_of(laser).warnings
+    for message in (notes(log)["no_range_within"].message, warning.message):
+        assert re.search("between range_min .* m and range_max .* m, but around", message)
+        assert ("such as millimetres; expected metres" in message) == (fields is MILLIMETRES)
 
 
 CLOCKWISE = USUAL.but(angle_min=math.pi / 2, angle_max=-math.pi / 2, angle_increment=-math.pi / 90)
@@ -251,12 +258,7 @@ def test_stamps_that_nobody_set_are_those_of_the_recorder(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("stamps", "told"),
-    [
-        ((5, 6, 7), {}),
-        ((5, 5, 5, 6), {}),
-        ((5, 4, 3, 9), {"stamp_back": 2}),
-        ((5, 5, 4), {"stamp_back": 1}),
-    ],
+    [((5, 6, 7), {}), ((5, 5, 5, 6), {}), ((5, 4, 3, 9), {"stamp_back": 2}), ((5, 5, 4), {"stamp_back": 1})],
 )
 def test_stamps_that_jump_back_are_noted(tmp_path: Path, stamps: Sequence[int], told: dict[str, int]) -> None:
     wanted = [second * SECOND for second in stamps]

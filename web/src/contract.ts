@@ -1296,7 +1296,7 @@ export interface components {
         };
         WarningAnswer: {
             /** @enum {string} */
-            code: "no_segments" | "points_not_in_order" | "motion_unknown" | "nulls_for_no_return" | "stuck_ranges" | "scan_exceeds_map" | "faces_away" | "prior_contradicted" | "search_incomplete" | "map_scale" | "common_offset" | "map_distorted" | "turned" | "last_view_only";
+            code: "no_segments" | "points_not_in_order" | "motion_unknown" | "nulls_for_no_return" | "stuck_ranges" | "scan_exceeds_map" | "unlikely_map_size" | "faces_away" | "prior_contradicted" | "search_incomplete" | "map_scale" | "common_offset" | "map_distorted" | "turned" | "last_view_only";
             message: string;
         };
         WithLandmarkAnswer: {

@@ -491,6 +491,7 @@ class WarningAnswer(TypedDict):
         "nulls_for_no_return",
         "stuck_ranges",
         "scan_exceeds_map",
+        "unlikely_map_size",
         "faces_away",
         "prior_contradicted",
         "search_incomplete",
