@@ -224,11 +224,16 @@ def read_scan(name: str) -> Json:
     message = read_json(name, data) if data.lstrip()[:1] in (b"{", b"[") else _yaml(data, name)
     if not isinstance(message, dict):
         raise RefusedError(f"{name}: found no scan; expected an object with one of {', '.join(FORMS)}, or a LaserScan")
-    # The envelope of rosbridge, or of Foxglove.
-    inner = message.get("msg", message.get("message"))
+    # The envelope of rosbridge, of Foxglove, or of `mcap cat --json`.
+    inner = next((message[key] for key in ("msg", "message", "data") if key in message), None)
     if isinstance(inner, str) and inner.lstrip().startswith("{"):
         inner = read_json(name, inner.encode())
     scan: Json = inner if isinstance(inner, dict) else message
+    if "ranges" in scan and "start_angle" in scan:
+        raise RefusedError(
+            f"{name}: is a LaserScan of Foxglove, which has no range_max; expected angle_min, angle_increment, ranges "
+            "and range_max, as of sensor_msgs/LaserScan"
+        )
     if "ranges" in scan and not any(form in scan for form in FORMS):
         scan = {"laser": scan}
     views = scan.get("views")

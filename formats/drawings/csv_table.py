@@ -25,6 +25,7 @@ SYNONYMS = {
 DELIMITERS = (";", "\t", "|", ",", " ")
 COMMENTS = ("#", "%", "//")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")  # as 7.000 in place of 7000
 COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 UNIT = re.compile(r"(.*?)[\s_]*[\[(]\s*([\w-]+)\s*[\])]")  # x1 [mm], and x1_mm:
 SUFFIX = re.compile(rf"(.*?)[\s_]({'|'.join(UNITS)})", re.IGNORECASE)
@@ -68,6 +69,7 @@ def read_csv(path: Path, drawing: Drawing) -> None:
         When a row has no four numbers, or it is not clear which columns are the coordinates.
     """
     table = _table(_lines(path))
+    _refuse_thousands([row[k] for row in table.rows for k in table.wanted if k < len(row)])
     drawing.metres = table.metres
     others = [k for k, _ in enumerate(table.names) if k not in table.wanted]
     commas, loose = 0, []
@@ -100,6 +102,17 @@ def read_csv(path: Path, drawing: Drawing) -> None:
         drawing.notes.add_assumed("columns", "columns are assumed to be x1, y1, x2, y2, because the file names none")
     if commas:
         drawing.notes.add_assumed("decimal_comma", "rows whose decimal mark is a comma", commas)
+
+
+def _refuse_thousands(cells: list[str]) -> None:
+    """Refuse 7.000 among whole numbers such as 950: one who writes zeros behind a decimal mark writes 950.000."""
+    grouped = next((cell for cell in cells if GROUPED.fullmatch(cell) and cell.endswith("0")), "")
+    whole = next((cell for cell in cells if cell.lstrip("+-").isdigit() and cell.strip("+-0")), "")
+    if grouped and whole and all(GROUPED.fullmatch(cell) or cell.lstrip("+-").isdigit() for cell in cells):
+        raise MalformedFileError(
+            f"has {grouped} next to {whole}, so that its mark seems to separate thousands; expected {grouped[:-4]}"
+            f"{grouped[-3:]}, or decimals in all numbers. Save the table without a mark for thousands"
+        )
 
 
 def _lines(path: Path) -> list[str]:

@@ -132,6 +132,7 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
         ("warned.yaml", "WARNING: topic [/scan] does not appear to be published yet\n" + bare),
         ("quoted.json", json.dumps(known | {"ranges": list(map(str, message["ranges"])), "range_max": "30.0"})),
         ("text.json", json.dumps({"op": "publish", "msg": json.dumps(known)})),
+        ("mcap.json", json.dumps({"topic": "/scan", "sequence": 0, "log_time": 1.5, "data": known})),
         ("panel.json", json.dumps({"topic": "/scan", "message": known})),
     ):  # fmt: skip
         (folder / name).write_text(content)
@@ -142,6 +143,8 @@ def test_scans_as_other_programs_print_them(linefix: Linefix, folder: Path) -> N
     assert answer["pose"]["x"] == pytest.approx(1.0, abs=0.05)
     (folder / "noarr.yaml").write_text(echoed(message, "<array type: float32>"))
     assert "without --noarr" in refused(linefix("locate", "room.json", "noarr.yaml"), 3)
+    (folder / "foxglove.json").write_text(json.dumps({"start_angle": -3.1, "end_angle": 3.1, "ranges": [1.0, 2.0]}))
+    assert "Foxglove, which has no range_max" in refused(linefix("locate", "room.json", "foxglove.json"), 3)
     (folder / "table.csv").write_text("%time,field.header.seq,field.ranges0\n1,2,3.0\n")
     assert "table.csv: is not YAML" in refused(linefix("locate", "room.json", "table.csv"), 3)
 

@@ -44,6 +44,7 @@ LINE = b'{"type": "LineString", "coordinates": %s}'
         ("a.json", '{"segments": [[0, 0, 1e10, 0]]}', MalformedFileError, "beyond 1e+09 m; check the unit"),
         ("a.json", '{"segments": [[0, 0, 1, 0]], "sigma": -1}', MalformedFileError, "sigma"),
         ("a.csv", "0,0,4\n", MalformedFileError, "expected rows"),
+        ("a.csv", "0;0;7.000;0\n7.000;0;7.000;950\n", MalformedFileError, "expected 7000, or decimals"),
         ("a.csv", "0,0,4,nan\n", MalformedFileError, "not a number up to 1e+13"),
         ("a.csv", "\xff", MalformedFileError, "has no lines|UTF-8|expected rows"),
         ("a.dwg", "", UnsupportedFormatError, "ends in one of"),
