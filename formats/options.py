@@ -12,18 +12,8 @@ from .errors import InvalidOptionError
 
 Drawn = Literal["faces", "centres"]
 
-US_FOOT = 1200 / 3937  # of the US survey, m
-UNITS = {
-    "mm": 1e-3,
-    "cm": 1e-2,
-    "dm": 0.1,
-    "m": 1.0,
-    "km": 1e3,
-    "in": 0.0254,
-    "ft": 0.3048,
-    "yd": 0.9144,
-    "us-ft": US_FOOT,
-}
+US_FT = 1200 / 3937  # of the US survey, m
+UNITS = {"mm": 1e-3, "cm": 0.01, "dm": 0.1, "m": 1, "km": 1e3, "in": 0.0254, "ft": 0.3048, "yd": 0.9144, "us-ft": US_FT}
 
 
 def _is_place(place: tuple[float, ...]) -> bool:

@@ -53,9 +53,7 @@ DEFAULT_LOG_OPTIONS = LogOptions()
 
 
 def read_map(
-    path: str | os.PathLike[str],
-    options: ImportOptions = DEFAULT_OPTIONS,
-    pictures: Mapping[str, Path] | None = None,
+    path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTIONS, pictures: Mapping[str, Path] | None = None
 ) -> ImportedMap:
     """Read a map of another tool's, or one of our own.
 

@@ -49,12 +49,7 @@ class Node:
         When a name of a topic is none.
     """
 
-    def __init__(
-        self,
-        options: NodeOptions,
-        maps: Maps | None = None,
-        log: Callable[[str], None] = _to_stderr,
-    ) -> None:
+    def __init__(self, options: NodeOptions, maps: Maps | None = None, log: Callable[[str], None] = _to_stderr) -> None:
         self._options, self._unused = options, ""  # why the last map is not used
         participant = connect(options.domain)
         self._robot = Robot(participant, options, log)

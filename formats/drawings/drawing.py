@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -186,10 +187,8 @@ class Drawing:
     def _checked(self, values: ArrayLike, *columns: int) -> Floats:
         try:
             array = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise MalformedFileError(
-                f"has a coordinate that is not a number up to {MAX_UNITS:g}: found text or a list"
-            ) from error
+        except (TypeError, ValueError, OverflowError):
+            array = np.array(math.nan)
         columns = columns or (2, 3)
         if array.size == 0:
             return np.zeros((0, columns[0]))

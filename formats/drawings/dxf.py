@@ -22,7 +22,7 @@ from ezdxf.lldxf.const import DXFError
 from ..errors import FormatError, MalformedFileError, TooLargeError
 from ..files import read_bounded
 from ..limits import MAX_COORDINATE, MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES, MAX_TEXT
-from ..options import US_FOOT
+from ..options import US_FT
 from ..report import Notes, first_of, shown
 from .drawing import Drawing
 from .dxf_blocks import Expansion, Placed, shown_parts
@@ -38,8 +38,8 @@ logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 # dm, dam, hm, and those of the US survey: foot, inch, yard, mile.
 METRES_OF = {
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 11: 1e-10,
-    12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 21: US_FOOT, 22: US_FOOT / 12, 23: 3 * US_FOOT,
-    24: 5280 * US_FOOT,
+    12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 21: US_FT, 22: US_FT / 12, 23: 3 * US_FT,
+    24: 5280 * US_FT,
 }  # fmt: skip
 
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")

@@ -19,14 +19,7 @@ from registration import RigidTransform
 
 from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError, naming
 from ..files import kind_of, load_yaml, name_of, read_bounded, require_content, text_of
-from ..limits import (
-    MAX_CELLS,
-    MAX_MAP_BYTES,
-    MAX_ORIGIN,
-    MAX_RESOLUTION,
-    MAX_YAML_BYTES,
-    MIN_RESOLUTION,
-)
+from ..limits import MAX_CELLS, MAX_MAP_BYTES, MAX_ORIGIN, MAX_RESOLUTION, MAX_YAML_BYTES, MIN_RESOLUTION
 from ..options import ImportOptions
 from ..report import Notes, first_of, shown
 from .cells import Grid

@@ -153,13 +153,8 @@ def opened(path: Path, notes: Notes) -> Iterator[Bag]:
                 notes.add_dropped("broken_files", f"files that cannot be read, such as {error}", 1)
                 continue
             stack.callback(files[-1].close)
-        bag = Bag(
-            name,
-            FORMATS.get(path.suffix.lower(), "rosbag2"),
-            tuple(sorted(files, key=lambda file: file.start)),
-            notes,
-            paths[0].parent,
-        )
+        ordered, form = sorted(files, key=lambda file: file.start), FORMATS.get(path.suffix.lower(), "rosbag2")
+        bag = Bag(name, form, tuple(ordered), notes, paths[0].parent)
         yield bag
         for code, said, count in (remark for file in files for remark in file.remarks):
             notes.add_dropped(code, said, count)

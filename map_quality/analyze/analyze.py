@@ -8,15 +8,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from association import (
-    AssociationOptions,
-    AssociationResult,
-    Deadline,
-    MapIndex,
-    Scan,
-    Status,
-    associate,
-)
+from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Scan, Status, associate
 from registration import RigidTransform, Segments
 
 from ..views import AnalysisError, Robot, Steps, is_elsewhere, is_same, look, similar_pose

@@ -33,13 +33,7 @@ from .scans import (
     search,
 )
 from .sharpening import sharpen
-from .verifying import (
-    Proposed,
-    is_better,
-    keeps_usable,
-    kept_walls,
-    usable_of,
-)
+from .verifying import Proposed, is_better, keeps_usable, kept_walls, usable_of
 
 FIRST_SEARCHES = 0.4  # of the time; the searches on the new map take as long again
 

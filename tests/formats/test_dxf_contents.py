@@ -238,10 +238,10 @@ def test_the_control_frame_of_a_smoothed_polyline_is_no_wall(tmp_path: Path) -> 
 
 
 PLAN = [(0, 0, 8, 0), (8, 0, 8, 5), (8, 5, 3.5, 5), (2.6, 5, 0, 5), (0, 5, 0, 0), (4, 0, 4, 2), (4, 2.9, 4, 5)]
-US_FOOT = 1200 / 3937
+US_FT = 1200 / 3937
 IN_METRES = {  # of $INSUNITS
-    1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 21: US_FOOT,
-    22: US_FOOT / 12, 23: 3 * US_FOOT, 24: 5280 * US_FOOT,
+    1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 21: US_FT,
+    22: US_FT / 12, 23: 3 * US_FT, 24: 5280 * US_FT,
 }  # fmt: skip
 
 
@@ -286,7 +286,7 @@ def test_another_unit_is_named_with_its_factor(tmp_path: Path, units: int, drawn
 def test_a_unit_that_no_building_has_is_none(tmp_path: Path, units: int) -> None:
     with pytest.raises(IncompleteFileError, match=f"INSUNITS is {units}, .*set the option units"):
         noted(tmp_path, units, 1.0)
-    found = noted(tmp_path, units, US_FOOT, ImportOptions(units="us-ft"))
+    found = noted(tmp_path, units, US_FT, ImportOptions(units="us-ft"))
     assert "unlikely_unit" not in found
     assert found["unit"] == "1 unit is 0.304801 m (us-ft), as the option states: the drawing is 8 m by 5 m"
 

@@ -154,19 +154,11 @@ def test_the_surface_of_thick_walls(
         (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is not a picture"),
         ("[" * 3_000, MalformedFileError, "is not YAML of a map: expected at most 64 nested lists, found 3000"),
         ("#" * 17_000, TooLargeError, "at most 16384 bytes"),
-        (
-            YAML.replace("{origin}", "0, 0, 90"),
-            MalformedFileError,
-            "found 90; if these are degrees, write 1.5708",
-        ),
+        (YAML.replace("{origin}", "0, 0, 90"), MalformedFileError, "found 90; if these are degrees, write 1.5708"),
         (YAML.replace("{origin}", "nan, 0, 0"), MalformedFileError, "expected origin to be"),
         (YAML.replace("negate: 0", "negate: 0\nnegate: 1"), MalformedFileError, 'line 5: found duplicate key "negate"'),
         (YAML.replace("negate: 0", "negate: [0"), MalformedFileError, "is not YAML: line 5"),
-        (
-            YAML.replace("0.65\nfree_thresh: 0.196", "0.196\nfree_thresh: 0.65"),
-            MalformedFileError,
-            "exchange them",
-        ),
+        (YAML.replace("0.65\nfree_thresh: 0.196", "0.196\nfree_thresh: 0.65"), MalformedFileError, "exchange them"),
     ],
 )
 def test_bad_descriptions_are_refused(tmp_path: Path, yaml: str, kind: type[FormatError], message: str) -> None:

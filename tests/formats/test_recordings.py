@@ -273,12 +273,7 @@ def test_a_folder_that_was_unpacked_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("a.mcap.zstd", "zstd -d"),
-        ("a.db3.zst", "zstd -d"),
-        ("a.bag.gz", "unpack"),
-    ],
+    ("name", "message"), [("a.mcap.zstd", "zstd -d"), ("a.db3.zst", "zstd -d"), ("a.bag.gz", "unpack")]
 )
 def test_a_file_to_which_something_has_to_be_done_first(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / name).write_bytes(gzip.compress(b"a") if name.endswith(".gz") else zstandard.compress(b"a"))

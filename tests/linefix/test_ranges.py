@@ -109,9 +109,7 @@ def test_two_scanners_are_one_scan() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "least"),
-    [((0.1, 0.1, 0.1), 3.0 - BOUND), ((0.1, 0.05, 0.1), 0.5)],
-    ids=["alike", "one of them faster"],
+    ("seconds", "least"), [((0.1, 0.1, 0.1), 3.0 - BOUND), ((0.1, 0.05, 0.1), 0.5)], ids=["alike", "one of them faster"]
 )
 def test_scanners_of_one_robot_share_its_unknown_motion(seconds: tuple[float, ...], least: float) -> None:
     """Squared errors in units of the covariance have the mean 3, or less where the covariance is an upper bound."""

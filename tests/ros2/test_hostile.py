@@ -208,9 +208,7 @@ def test_why_a_scan_is_not_used(domain: int, room: linefix.MapIndex, what: str) 
         robot = Robot(domain)
         robot.mounts.publish(mounts())
         told = robot.until(
-            robot.diagnostics,
-            lambda: robot.scans.publish(seen),
-            lambda one: expected in one.status[0].message,
+            robot.diagnostics, lambda: robot.scans.publish(seen), lambda one: expected in one.status[0].message
         )
         assert told.status[0].level == 2
         assert robot.poses.take() == []

@@ -61,11 +61,7 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
         robot = Robot(domain)
         driven = Publisher(robot.net, "/odom", messages.Odometry, SENSOR)
         robot.mounts.publish(mount())
-        robot.until(
-            robot.diagnostics,
-            lambda: driven.publish(broken),
-            lambda one: "twist" in one.status[0].message,
-        )
+        robot.until(robot.diagnostics, lambda: driven.publish(broken), lambda one: "twist" in one.status[0].message)
         driven.publish(odometry(10))
         robot.until(
             robot.diagnostics,
