@@ -107,6 +107,9 @@ def call(arguments: list[str]) -> int:
     except TyperException as error:
         context = getattr(error, "ctx", None)
         path = "linefix" if context is None else context.command_path
+        usage = (
+            "" if context is None else " ".join(["; expected", path, *context.command.collect_usage_pieces(context)])
+        )
         wrong = " ".join(error.format_message().split()).rstrip(".")
-        raise WrongUseError(f"{wrong}; {path} --help lists the options") from None
+        raise WrongUseError(f"{wrong}{usage}; {path} --help lists the options") from None
     return code if isinstance(code, int) else 0

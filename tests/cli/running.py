@@ -51,9 +51,9 @@ class Linefix:
                 patched.setenv(name, value)
             code = run(list(arguments))
         told = self._capsys.readouterr()
-        assert "Traceback" not in told.err
-        assert "defect" not in told.err
-        return Ended(code, told.out, told.err)
+        assert not any(word in told.err for word in ("Traceback", "defect"))
+        lines = [line for line in told.err.splitlines(keepends=True) if "the kernels" not in line]  # on an empty cache
+        return Ended(code, told.out, "".join(lines))
 
     def done(self, *arguments: str, **environment: str) -> Ended:
         """Run a command that ends well."""
@@ -64,7 +64,7 @@ class Linefix:
 
 def refused(ended: Ended, code: int) -> str:
     """Return the one line that a command ended with."""
-    (line,) = [line for line in ended.err.splitlines() if "compiling" not in line]
+    (line,) = ended.err.splitlines()
     assert (ended.code, ended.out) == (code, "")
     assert line.startswith("linefix: ")
     return line

@@ -20,7 +20,7 @@ ON_ROOM, ON_FLOOR, TO_FILE = "--maps room.json", "--map floor.json", "--out o.pa
 # A command, its exit code, and a part of its line.
 REFUSED: dict[str, tuple[int, str]] = {
     "lokate": (2, "lokate"),
-    "locate room.json": (2, "linefix locate --help"),
+    "locate room.json": (2, "expected linefix locate [OPTIONS] MAP... SCAN; linefix locate --help"),
     "locate nowhere.json scan.json": (2, "nowhere.json"),
     "locate hall scan.json": (3, "hall: no such file, and no map is stored"),
     "locate empty scan.json": (2, "no map file"),
