@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from linefix.documents.errors import BodyTooLargeError
@@ -27,7 +28,7 @@ LIMITS = GUARDED + "limits"
 MAPS = GUARDED + "maps/"
 ROLES = {"GET": Role.READ, "HEAD": Role.READ, "POST": Role.ASSOCIATE, "PUT": Role.WRITE, "DELETE": Role.WRITE}
 """The role that a method requires. A POST searches, converts or checks its content, and never stores it."""
-_HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")
+_HOST = re.compile(r"^(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::[0-9]*)?\Z")
 _TWO_LENGTHS = {b"transfer-encoding", b"content-length"}
 _PLAIN_HOST = re.compile(r"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 
@@ -43,7 +44,7 @@ class Entrance:
     gate: Gate
     keyring: Keyring
     max_body_bytes: int
-    hosts: Sequence[str]
+    hosts: tuple[str, ...]
     origins: Sequence[str]
 
     def admit(self, head: Mapping[str, Any]) -> Ticket:
@@ -93,7 +94,7 @@ class Entrance:
             When the browser's headers name another site's page as the sender.
         """
         host, origin = fields.get(b"host", "").lower(), fields.get(b"origin", "").lower()
-        if b"host" in fields and not self._is_known(host):
+        if b"host" in fields and not _is_known(host, self.hosts):
             raise ForeignHostError
         if origin in self.origins:
             return
@@ -102,13 +103,13 @@ class Entrance:
         if is_foreign or fields.get(b"sec-fetch-site", "").lower() == "cross-site":
             raise ForeignOriginError
 
-    def _is_known(self, host: str) -> bool:
-        found = _HOST.fullmatch(host)
-        if found is not None:
-            name = found["name"] or found["address"]
-            with suppress(ValueError):
-                return name in ("localhost", "localhost.", *self.hosts) or bool(ipaddress.ip_address(name))
-        return False
+
+@lru_cache(maxsize=256)
+def _is_known(host: str, hosts: tuple[str, ...]) -> bool:
+    name = _HOST.sub(r"\1\2", host)  # without port and brackets; another text stays as it is
+    with suppress(ValueError):
+        return name in ("localhost", "localhost.", *hosts) or bool(ipaddress.ip_address(name))
+    return False
 
 
 def _require_plain(path: str, fields: Mapping[bytes, str]) -> None:

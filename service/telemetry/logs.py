@@ -20,6 +20,7 @@ STDERR = 2
 WAITING_LINES = 4096  # that are buffered for a late reader
 GATHER_SECONDS = 0.01  # between two writes: to wake the thread for each line would cost a request a twentieth more
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
+_JSON = json.JSONEncoder(default=str, separators=(",", ":"))
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
 
@@ -38,7 +39,7 @@ class JsonFormatter(logging.Formatter):
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         # ASCII without controls: terminals obey some characters that JSON leaves as they are.
-        return json.dumps(line, default=str, separators=(",", ":")).replace("\x7f", "\\u007f")
+        return _JSON.encode(line).replace("\x7f", "\\u007f")
 
 
 class PatientHandler(logging.Handler):
