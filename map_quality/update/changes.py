@@ -163,23 +163,28 @@ def _moves(
     moves, left = [], list(added)
     for old in gone:
         go_on(deadline)
-        sides, middle = known.lengths[list(old.segments)], known.midpoints[list(old.segments)].mean(axis=0)
+        was, middle = known.take(np.array(old.segments)), known.midpoints[list(old.segments)].mean(axis=0)
         near = [
             (away, k)
             for k, new in enumerate(left)
             if (away := float(np.hypot(*(new.new.reshape(-1, 2).mean(axis=0) - middle)))) <= tuning.NEAR_MOVE
-            and _fits(np.hypot(*(new.new[:, 2:] - new.new[:, :2]).T), sides)
+            and _fits(Segments.derived(new.new), was)
         ]
         if near:
             moves.append(old.with_also(left.pop(min(near)[1]), "moved"))
     return moves, left
 
 
-def _fits(new: Floats, old: Floats) -> bool:
+def _fits(is_now: Segments, was: Segments) -> bool:
     """Return whether each new side but stubs has an old one of its own; the longest is as long, others may be hidden.
 
-    An obstacle before a side hides all of it, or a part: it never seems longer.
+    An obstacle before a side hides all of it, or a part: it never seems longer. A wall, which has no four sides, stays
+    parallel to itself.
     """
+    new, old = is_now.lengths, was.lengths
+    turn = abs(float(is_now.directions[new.argmax()] @ was.directions[old.argmax()]))
+    if len(was) < tuning.SIDES and turn < tuning.SAME_SIDE:
+        return False
     sides, free = (sorted(one[one >= min(tuning.LONGEST_STUB, one.max())].tolist()) for one in (new, old))
     for length in sides[::-1]:
         same = max(tuning.SAME_LENGTH, tuning.SAME_FRACTION * length)

@@ -61,6 +61,7 @@ LONGEST_LEAF = 1.5  # m; of a door, and its width where it is a double door
 JAMB = 0.25  # m; between a leaf and the end of a wall that it is fixed to, or shuts against
 DOOR_VISITS = 4  # that show a wall which may be a leaf; on fewer a door may happen to stand alike
 JOINED = 0.2  # m; ends of walls that are one thing
+SIDES = 4  # geometry; of a thing, which may turn when it is moved
 NEAR_MOVE = 3.0  # m; between the middles of a thing before and after it was moved
 SAME_LENGTH, SAME_FRACTION = 0.15, 0.05  # m, and fraction; by which a side of a moved thing may differ
 

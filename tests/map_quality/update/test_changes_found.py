@@ -109,6 +109,12 @@ def test_a_thing_or_wall_that_moved_or_is_gone_is_one_change_without_a_stub(
     assert off_walls(found.changes[0].new, segments(*after)).max(initial=0.0) < 0.05
 
 
+def test_a_wall_across_the_old_one_is_another_one() -> None:
+    today = segments(RACK, PILLAR, box(4.3, 1.6, 7.3, 1.75))
+    found = updated(segments(RACK, PILLAR, partition(5.7)), *visits(*[today] * 3))
+    assert sorted(one.code for one in found.changes) == ["added", "removed"]
+
+
 def test_a_wall_that_moved_on_a_map_whose_walls_are_off_is_one_change() -> None:
     """Its faces and its end do not meet on such a map."""
     old = walls_off(segments(RACK, PILLAR, partition(5.7)), np.random.default_rng(5), 0.04).segments
