@@ -147,7 +147,7 @@ class Track:
     Attributes
     ----------
     static : bool
-        True: the last value holds at every time.
+        True: a value holds until another one is received, and the first one before, too.
     refixed : bool
         True: static values differ.
     moves : bool
@@ -172,16 +172,18 @@ class Track:
     def add(
         self, stamp: int, matrix: Floats, *, static: bool = False, received: int | None = None, topic: str = ""
     ) -> None:
-        """Add a value; a static one replaces the static one before, and is left out where there are others."""
+        """Add a value; a static one holds from when it was received, and is left out where there are others."""
         if static and not self.static:
             return
-        if self.static:
-            if static and self._parts:
-                before = self._parts[-1].matrices[-1]
-                self.refixed = self.refixed or not np.allclose(before, matrix, rtol=0.0, atol=tuning.REFIXED)
+        if static and self._parts:
+            same = np.allclose(self._parts[-1].matrices[-1], matrix, rtol=0.0, atol=tuning.REFIXED)
+            if same and not self.most:
+                return
+            self.refixed |= not same
+        elif self.static:
             self._parts.clear()
         self.static = static
-        if not self._parts or stamp < self._parts[-1].stamps[-1] - tuning.PART_NS:
+        if static or not self._parts or stamp < self._parts[-1].stamps[-1] - tuning.PART_NS:
             self._dropped += len(self._parts) if self.most else 0
             self._parts[:] = [_Part()] if self.most else [*self._parts, _Part()]
         first = self._parts[0].matrices
@@ -203,7 +205,8 @@ class Track:
             Nanoseconds that the first and the last value hold.
         """
         if self.static:
-            return self.newest[1]
+            before = bisect.bisect_right(self._parts, received or math.inf, key=lambda part: part.received[0])
+            return self._parts[max(0, before - 1)].matrices[-1]
         part = self._parts[self._number(stamp, received)]
         if not self.moves:
             return part.matrices[-1] if part.stamps[0] - hold <= stamp <= part.stamps[-1] + hold else None
@@ -212,7 +215,7 @@ class Track:
     def known(self, stamp: int, received: int | None = None) -> Known | None:
         """Return the value at a time as odometry; None where that is not known."""
         if self.static:
-            return Known(self.newest[1])
+            return Known(self.at(stamp, received))
         number = self._number(stamp, received)
         if not self.moves:
             matrix = self.at(stamp, received)

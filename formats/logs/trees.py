@@ -214,7 +214,8 @@ def _note_doubts(tree: Transforms, notes: Notes) -> None:
     ways = [(parent, child) for child in tree.frames() for parent in tree.parents(child)]
     for parent, child in (way for way in ways if tree.track(*way).refixed):
         notes.add_assumed(
-            "fixed_again", f"{shown(child)} is fixed in {shown(parent)} at different places; the last one is used"
+            "fixed_again",
+            f"{shown(child)} is fixed in {shown(parent)} at different places; each scan uses the last one before it",
         )
 
 

@@ -269,6 +269,14 @@ def test_a_tilt_is_said_and_upside_down_is_none(bag: Robots, degrees: float, fli
     assert ("tilted" in notes(log)) is (degrees in (12.0, 172.0))
 
 
+def test_a_fixed_transform_that_changes_holds_from_when_it_was_received(bag: Robots) -> None:
+    for second, x in enumerate((0.2, 0.2, 0.5), start=1):
+        bag.transform("/tf_static", second * SECOND, "base_link", "laser", (x, 0.0, 0.0)).scan(second * SECOND + 1)
+    scans, log = read(bag)
+    assert [scan.mount.x for scan in scans if scan.mount] == [0.2, 0.2, 0.5]
+    assert "at different places" in notes(log)["fixed_again"].message
+
+
 @pytest.mark.parametrize(("robot", "known"), [("0 0 0", False), ("0 0 0.2", True), ("3 4 0", True)])
 def test_a_carmen_log_whose_robot_is_never_anywhere_has_no_odometry(tmp_path: Path, robot: str, known: bool) -> None:
     places = enumerate(("0 0 0", robot, "0 0 0"), start=1)
