@@ -17,6 +17,7 @@ ADD, DELETE = 0, 2
 GREEN, AMBER = ros.ColorRGBA(0.1, 0.7, 0.2, 1.0), ros.ColorRGBA(0.9, 0.6, 0.0, 1.0)
 GREY = ros.ColorRGBA(0.5, 0.5, 0.5, 0.6)
 LINE_WIDTH = 0.04  # m
+OF_INPUT = ("no_segments", "scan_exceeds_map", "unlikely_map_size")  # codes of warnings
 PLANAR = np.array([0, 1, 5])  # x, y and the turn about z among ROS's six
 
 
@@ -100,7 +101,8 @@ def values_of(answer: linefix.AssociationResult, milliseconds: float) -> dict[st
 
 
 def verdict_of(answer: linefix.AssociationResult) -> tuple[int, str]:
-    """Return the level and the message of a scan's verdict."""
+    """Return the level and the message of a scan's verdict; an input in another unit explains all reasons."""
     if answer.usable:
         return OK, "pose usable"
-    return WARN, answer.reasons[0].message if answer.reasons else answer.status.value
+    causes = [one.message for one in answer.warnings if one.code in OF_INPUT]
+    return WARN, [*causes, *(reason.message for reason in answer.reasons), answer.status.value][0]

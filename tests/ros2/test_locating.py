@@ -12,7 +12,7 @@ from ros2 import messages
 from ros2.frames import Frames, Mount
 from ros2.looking import look_of
 from ros2.odometry import OdometryHistory
-from ros2.reporting import values_of
+from ros2.reporting import values_of, verdict_of
 from tests.association.scenes import known
 
 from .robot import SCANNER, WALLS, laser_scan
@@ -65,3 +65,6 @@ def test_a_position_that_is_open_is_published_without_a_probability() -> None:
     located = located_in(corridor, scan, Mount(MOUNT))
     values = values_of(located, 1.0)
     assert (values["status"], values["usable"], values["probability"]) == ("degenerate", "false", "")
+    assert verdict_of(located)[1] == located.reasons[0].message
+    far = located_in(corridor, laser_scan((1000.0 * ranges).tolist(), 0.0, range_max=10.0), Mount(MOUNT))
+    assert "such as millimetres" in verdict_of(far)[1]
