@@ -205,8 +205,7 @@ class Track:
             Nanoseconds that the first and the last value hold.
         """
         if self.static:
-            before = bisect.bisect_right(self._parts, received or math.inf, key=lambda part: part.received[0])
-            return self._parts[max(0, before - 1)].matrices[-1]
+            return self._fixed(received)
         part = self._parts[self._number(stamp, received)]
         if not self.moves:
             return part.matrices[-1] if part.stamps[0] - hold <= stamp <= part.stamps[-1] + hold else None
@@ -215,7 +214,7 @@ class Track:
     def known(self, stamp: int, received: int | None = None) -> Known | None:
         """Return the value at a time as odometry; None where that is not known."""
         if self.static:
-            return Known(self.at(stamp, received))
+            return Known(self._fixed(received))
         number = self._number(stamp, received)
         if not self.moves:
             matrix = self.at(stamp, received)
@@ -267,6 +266,11 @@ class Track:
         for part in self._parts:
             part.settle()
         return self._parts
+
+    def _fixed(self, received: int | None) -> Floats:
+        """Return the static value that held when something was received; None: the last one."""
+        before = bisect.bisect_right(self._parts, received or math.inf, key=lambda part: part.received[0])
+        return self._parts[max(0, before - 1)].matrices[-1]
 
     def _number(self, stamp: int, received: int | None) -> int:
         """Return the part whose values were received as long after their stamps as what has this stamp."""
