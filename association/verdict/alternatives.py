@@ -27,6 +27,7 @@ from .tuning import (
     LOOSE_FACTOR,
     MOVED_BEFORE,
     OF_A_THING,
+    OF_SHARE,
     SEEN_BEFORE,
     UNCOUNTED,
 )
@@ -41,12 +42,15 @@ class Comparison:
     others : tuple of ConsensusSet
     gaps : float64
         By how much the evidence is greater than that of each other, nats.
+    by_things : float64
+        The same thing by thing alone, whatever share of the score the other lacks.
     counted : float64
         Weight of each, 0 to 1: 1 where the search cannot have missed one as good.
     """
 
     others: tuple[ConsensusSet, ...]
     gaps: Floats
+    by_things: Floats
     counted: Floats
 
     @property
@@ -69,22 +73,29 @@ def compare(
     errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
     what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
     explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most, less where more
-    of the scan is not on the map, and one thing alone never decides.
+    of the scan is not on the map, and one thing alone never decides. An alternative that lacks a large share s of the
+    score is no similar place, whatever was moved: it has ``OF_SHARE s^2`` less, as far as things speak against it.
     """
     others = tuple(others[:COMPARED])
     if not others:
-        return Comparison((), np.zeros(0), np.zeros(0))
+        return Comparison((), *np.zeros((3, 0)))
     sets = (best, *others)
-    posteriors = np.array([one.posterior for one in sets])
-    priors = np.array([one.posterior - one.score for one in sets])
-    ratios = posteriors[1:] / posteriors[0] if posteriors[0] > 0.0 else np.ones(len(others))
-    counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
-    gaps = _gaps(context, sets, wall_sigma) + priors[0] - priors[1:]
-    return Comparison(others, gaps, counted)
+    posteriors, scores = np.array([(one.posterior, one.score) for one in sets]).T
+    counted = np.clip((_ratios(posteriors) - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
+    by_share = OF_SHARE * (1.0 - np.clip(_ratios(scores), 0.0, 1.0)) ** 2
+    priors = posteriors[0] - scores[0] - (posteriors - scores)[1:]
+    by_things, most = _compare_things(context, sets, wall_sigma)
+    gaps = np.minimum(most, by_things + by_share)
+    return Comparison(others, gaps + priors, by_things + priors, counted)
 
 
-def _gaps(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> Floats:
-    """Return by how much the first explanation has more evidence than each other, nats."""
+def _ratios(values: Floats) -> Floats:
+    """Return the ratio of each other value to the first one, 1 where that is not positive."""
+    return values[1:] / values[0] if values[0] > 0.0 else np.ones(len(values) - 1)
+
+
+def _compare_things(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> tuple[Floats, Floats]:
+    """Return by how much the first explanation has more evidence than each other, and the most that it may have."""
     sigma = _loose_sigma(context, wall_sigma)
     loose = context if sigma is None else context.with_scan(
         context.scan, ScanLines.of(context.scan, sigma, context.options, context.lines.given)
@@ -113,7 +124,7 @@ def _gaps(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: floa
         rows = context.index.obstacles.walls[table["wall"]]
         lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
         values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
-    return np.asarray(compare_things(values, distances, beams.rows, _of_a_thing(context, sets[0])))
+    return compare_things(values, distances, beams.rows, _of_a_thing(context, sets[0]))
 
 
 def _of_a_thing(context: SearchContext, best: ConsensusSet) -> float:

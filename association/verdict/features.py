@@ -115,7 +115,7 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     unmatched = float(left @ np.interp(lines["length"], LIKE_WALLS, (0.0, 1.0)))
     offsets = best.matches["offset"] ** 2 / lines["plain_variance"]
     misfit = float(best.parts @ offsets) / max(1e-9, float(best.parts.sum()))
-    crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.gaps) / CROWD_TEMPERATURE)
+    crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.by_things) / CROWD_TEMPERATURE)
     walls = float(estimate.leverages.own.sum())
     places = max(1.0, (len(context.index.walls.rows) - walls) / max(1.0, walls))
     agreement, blocked, nearer = _of_beams(context, best)

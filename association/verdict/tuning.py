@@ -10,6 +10,7 @@ LOOSE_FACTOR = 4.0  # tables; times as much as they seem to be: of many similar 
 LOOSE_BEAMS = 3.0  # tables; standard deviations of the walls within which a beam reads one then
 # The most that each thing counts, for the answer or against it: it was moved. Alone, it leaves a probability of 0.94.
 OF_A_THING = 2.75  # nats
+OF_SHARE = 33.0  # nats, tables; for all of the score, which an alternative may lack, by the square of the share
 LEAST_THING = 0.3  # m; shorter scan lines are not counted as things.
 # Counted as seen, and as moved, before the first line. Measured: of strong differences to another pose, 2 % speak
 # against the truth where all lines are matched, 14 % with 1 to 3 unmatched lines, 25 % with 4 to 6, 36 % with more.
@@ -37,9 +38,9 @@ MOST_UNMATCHED = 16.0  # m, tables; more clutter says no more
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
-# Of the first explanation or a similar place, at even odds of being elsewhere; tables. Of held-out scans, half of those
-# from other kinds of buildings are below it, and 1 in 400 of the right answers, none of which is usable.
-NO_MATCH_PROBABILITY = 0.1
+# Of the first explanation or a similar place, at even odds of being elsewhere; tables. More than half of the held-out
+# scans from other kinds of buildings are below it, and 1 in 170 of the right answers, none of which is usable.
+NO_MATCH_PROBABILITY = 0.11
 CONTRADICTED = 0.5  # the greatest probability of an answer then
 FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 NO_ALTERNATIVE = 0.99  # tables; an answer that is so probable among its alternatives has none

@@ -91,9 +91,9 @@ class _Fits:
         clearly = max(1.0, tuning.BETTER_USABLE * len(self.samples))
         if usable > known + min(clearly, len(self.samples) - 1):
             return True
-        # Scores of scans of another building are better by chance: hardly any of these is usable, or clearly fewer.
+        # Scores of scans of another building are better by chance: hardly any of these is usable, one way or the other.
         better = sum(score_of(one) for _, one in both) > tuning.BETTER_SCORE * sum(score_of(one) for one, _ in both)
-        return better and usable >= max(min(2, len(self.samples)), known - clearly)
+        return better and max(usable, known) >= min(2, len(self.samples))
 
     def mistakes(self) -> list[Finding]:
         """Return what all scans were sent with and fit better without."""

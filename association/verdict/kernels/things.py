@@ -11,12 +11,15 @@ from registration.layout import Floats, Records
 
 from ...index.kernels.walls import root_of
 from ...scan.kernels.joining import ascending
-from ..tuning import LEAST_OF_BEAM, THING_WIDTH, THINGS_APART
+from ..tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 
 
 @kernel
-def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing: float) -> Floats:
-    """Return by how much the first explanation has more evidence than each other, each thing within its limit, nats.
+def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing: float) -> tuple[Floats, Floats]:
+    """Return by how much the first explanation has more evidence than each other, and the most that it may have, nats.
+
+    The first is the sum of all things, of which each counts `of_a_thing` at most, the second that of the things that
+    speak for the first explanation, of which each counts `OF_A_THING` at most.
 
     Places at which two explanations differ are one thing if they are no farther than `THINGS_APART` from one another.
 
@@ -31,7 +34,7 @@ def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing
     of_a_thing : float
         The most that a thing counts, nats.
     """
-    gaps = np.zeros(len(values) - 1)
+    gaps, most = np.zeros(len(values) - 1), np.zeros(len(values) - 1)
     m = len(beams)
     x, y, more = np.empty(m), np.empty(m), np.empty(m)
     for other in range(1, len(values)):
@@ -66,6 +69,7 @@ def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing
         for one in range(count):
             if thing[one] == one:
                 width = math.hypot(high[one, 0] - low[one, 0], high[one, 1] - low[one, 1])
-                limit = of_a_thing * max(1.0, width / THING_WIDTH)
-                gaps[other - 1] += min(limit, max(-limit, total[one]))
-    return gaps
+                wide = max(1.0, width / THING_WIDTH)
+                gaps[other - 1] += min(of_a_thing * wide, max(-of_a_thing * wide, total[one]))
+                most[other - 1] += min(OF_A_THING * wide, max(0.0, total[one]))
+    return gaps, most

@@ -23,7 +23,7 @@ from association.scan.scan_lines import ScanLines, variances_of
 from association.scan.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_LATERAL
 from association.tables import Model, Pieces
 from association.verdict.kernels.things import compare_things
-from association.verdict.tuning import LEAST_OF_BEAM, THING_WIDTH, THINGS_APART
+from association.verdict.tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 from registration import MeasuredSegments, Segments
 from registration.layout import LEAST_POINTS, POSE, Floats, Records, floats
 
@@ -220,13 +220,14 @@ def test_things_are_connected_places(seed: int) -> None:
         places = (away * np.stack([np.cos(angles), np.sin(angles)])[:, differs]).T
         near = np.hypot(*np.moveaxis(places[:, None] - places, 2, 0)) <= THINGS_APART
         count, thing = connected_components(near, directed=False) if len(places) else (0, np.zeros(0, int))
-        gap = 0.0
+        gap = most = 0.0
         for one in range(count):
-            width = math.hypot(*np.ptp(places[thing == one], axis=0))
-            limit = of_a_thing * max(1.0, width / THING_WIDTH)
-            gap += float(np.clip(more[differs][thing == one].sum(), -limit, limit))
-        expected.append(gap)
-    assert np.allclose(compare_things(values, distances, beams, of_a_thing), expected)
+            wide = max(1.0, math.hypot(*np.ptp(places[thing == one], axis=0)) / THING_WIDTH)
+            total = float(more[differs][thing == one].sum())
+            gap += float(np.clip(total, -of_a_thing * wide, of_a_thing * wide))
+            most += float(np.clip(total, 0.0, OF_A_THING * wide))
+        expected.append((gap, most))
+    assert np.allclose(compare_things(values, distances, beams, of_a_thing), np.transpose(expected))
 
 
 @given(seed=SEEDS)
