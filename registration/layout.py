@@ -72,7 +72,6 @@ ONE_STEP_SUMS = np.dtype(
 
 # The upper triangle of a symmetric matrix of x, y (m) and theta (rad): a covariance, or its inverse, an information.
 SYMMETRIC3 = np.dtype([("xx", "f8"), ("xy", "f8"), ("xt", "f8"), ("yy", "f8"), ("yt", "f8"), ("tt", "f8")])
-INFORMATION = SYMMETRIC3
 
 # p_map = R(theta) p_scan + (x, y).
 POSE = np.dtype(

@@ -113,7 +113,7 @@ def corrected(scan: Scan, found: Floats, spread: Floats) -> Scan:
         origins = _points_moved(beams.origins, views.of_beam, moves)
         beams = replace(beams, angles=beams.angles + turns[views.of_beam], origins=origins)
     views = replace(views, poses=poses, viewpoints=places, found=found, spread=spread)
-    return Scan(measured, views.viewpoint, beams, views, scan.ordered, scan.warnings)
+    return replace(scan, measured=measured, viewpoint=views.viewpoint, beams=beams, views=views)
 
 
 def moved(measured: MeasuredSegments, by: RigidTransform) -> MeasuredSegments:

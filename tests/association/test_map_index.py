@@ -115,8 +115,7 @@ def cell_of(shape: Records, at: Floats) -> int | None:
 
 
 def lengths(walls: Walls) -> Floats:
-    begins, ends = floats(walls.rows, "begin", "end")
-    return ends - begins
+    return np.asarray(np.subtract(*floats(walls.rows, "end", "begin")))
 
 
 def test_collinear_pieces_become_one_wall() -> None:
