@@ -52,7 +52,7 @@ class RequestMiddleware:
             if exchange.ticket.searches:
                 services.readiness.require_warm()
             serving = self._app(inner, exchange.receive, exchange.send)
-            # What a client has sent to be stored is stored, and logged, though it has gone.
+            # A request that stores something is served to its end, even if the client hangs up.
             await (exchange.unless_hung_up(serving) if exchange.ticket.searches else serving)
         except HangUpError:
             exchange.status = CLIENT_CLOSED_REQUEST

@@ -38,7 +38,7 @@ _MODELS: list[tuple[type[BaseModel], JsonSchemaMode]] = [(Problem, "serializatio
 
 
 def takes(model: type[BaseModel], answer: type[BaseModel], examples: Mapping[str, Any], **more: Any) -> dict[str, Any]:
-    """Return the documentation of a route that reads its body by itself, as arguments of its decorator."""
+    """Return the arguments of the decorator of a route that reads its body itself: its documentation."""
     _MODELS.append((model, "validation"))
     content = {
         "schema": {"$ref": _REF.format(model=model.__name__)},

@@ -66,7 +66,7 @@ class Place:
 
     @property
     def stroke_width(self) -> float:
-        """How wide lines are drawn, own units; nan where that is no plain number, such as a share of the picture."""
+        """The width of drawn lines, own units; NaN if it is not a plain number, such as a fraction of the picture."""
         try:
             width = float(self.style.get("stroke-width", "nan").lower().removesuffix("px"))
         except ValueError:
