@@ -28,12 +28,7 @@ from .result import (
 from .scan.scan import Scan, Views, mirrored, scaled, turned_round
 from .scan.views import MAX_VIEWS, View, assemble
 from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps
-from .verdict_explanation import (
-    AnswerExplanation,
-    Contribution,
-    VerdictExplanation,
-    explain_verdict,
-)
+from .verdict_explanation import AnswerExplanation, Contribution, VerdictExplanation, explain_verdict
 from .warnings import NOT_IN_ORDER
 
 __all__ = [

@@ -14,15 +14,7 @@ from registration.observability import most_parallel_up_to
 from .deadline import Deadline
 from .index.joint import JointIndex
 from .index.map_index import MapIndex
-from .layout import (
-    HARD_PRIOR,
-    NO_PRIOR,
-    PRIOR,
-    SOFT_PRIOR,
-    TERMS,
-    Integers,
-    record,
-)
+from .layout import HARD_PRIOR, NO_PRIOR, PRIOR, SOFT_PRIOR, TERMS, Integers, record
 from .options import AssociationOptions, HardPrior, MapsPrior, Prior, SoftPrior
 from .scan.alignment import aligned
 from .scan.beams import BeamSet, beams_of_ranges, rays_to_lines

@@ -51,7 +51,7 @@ SCAN_LINE = fields(
         _F,
         "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain later_gain "
         "plain_variance freedom",
-    ),
+    )
 )
 
 # A line of segments of a scan that continue or repeat one another: unit direction; midpoint; length from end to end,
@@ -107,12 +107,7 @@ WAY = fields((_F, "reach weight net covered first second"))
 # its midpoint between which the wall covers it; the same four sums; those of one direction so far, at their best, and
 # of none.
 COVER = np.dtype(
-    [
-        *fields((_F, "offset low high counted covered first second")).descr,
-        ("way", WAY),
-        ("best", WAY),
-        ("none", WAY),
-    ]
+    [*fields((_F, "offset low high counted covered first second")).descr, ("way", WAY), ("best", WAY), ("none", WAY)]
 )
 # A pair whose sums are held: the wall or -1; the weight; the shift of the line under the scan line from the wall; the
 # line.

@@ -16,14 +16,7 @@ from .context import SearchContext
 from .index.joint import JointIndex
 from .options import MapsPrior
 from .report import probabilities_of_others
-from .result import (
-    AssociationDiagnostics,
-    AssociationResult,
-    Correspondence,
-    MapVerdict,
-    Reason,
-    Status,
-)
+from .result import AssociationDiagnostics, AssociationResult, Correspondence, MapVerdict, Reason, Status
 
 FIRST_NAMES = 5  # of maps, in a message
 AS_LIKELY = 0.02  # of the probability of the answer, tables; a pose with less is no similar place

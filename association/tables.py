@@ -141,18 +141,6 @@ class MapTables(NamedTuple):
     raster: Raster
 
 
-class Measured(NamedTuple):
-    """Scan segments as they were measured: see `registration.MeasuredSegments`; the first two of `POINT`."""
-
-    directions: Records
-    midpoints: Records
-    lengths: Floats
-    centroids: Records
-    spreads: Floats
-    sigma: Floats
-    points: Floats
-
-
 class Question(NamedTuple):
     """The input of a search: the scan lines, (n,) of `SCAN_LINE`, and the terms, (1,) of `TERMS`."""
 

@@ -21,15 +21,7 @@ from ..tuning import WHOLE_GAP
 from .grids import directions_near, near_walls, stopping_beams, swept_chains
 from .map_points import NO_POINTS, MapPoints
 from .merging import blended, both_ways, chains_of, merge, tie
-from .tuning import (
-    BLENDED_SIGMAS,
-    BLENDED_STEP,
-    LEAST_DIFFERENCE,
-    MAX_EXTENT,
-    MAX_MAP_SIGMA,
-    ONE_LINE,
-    ONE_LINE_SHARE,
-)
+from .tuning import BLENDED_SIGMAS, BLENDED_STEP, LEAST_DIFFERENCE, MAX_EXTENT, MAX_MAP_SIGMA, ONE_LINE, ONE_LINE_SHARE
 
 Floats = NDArray[np.float64]
 

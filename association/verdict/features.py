@@ -12,15 +12,7 @@ import numpy as np
 from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.estimator import Estimate
-from ..consensus.tuning import (
-    AGREEING,
-    AGREEING_FRACTION,
-    MISSING_LENGTH,
-    MISSING_RANGE,
-    MISSING_SINE,
-    NEAR,
-    NEUTRAL,
-)
+from ..consensus.tuning import AGREEING, AGREEING_FRACTION, MISSING_LENGTH, MISSING_RANGE, MISSING_SINE, NEAR, NEUTRAL
 from ..context import SearchContext
 from ..result import ReasonCode
 from .alternatives import Comparison

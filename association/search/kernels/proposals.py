@@ -13,10 +13,7 @@ from ...consensus.kernels.geometry import angle_gate, prior_value, wrap
 from ...layout import HARD_PRIOR
 from ...tables import Question, Raster, Sweep
 from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS
-from ..tuning import (
-    WINDOW_MARGIN,
-    WINDOW_TURN,
-)
+from ..tuning import WINDOW_MARGIN, WINDOW_TURN
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
 GATE_MARGIN = 1.01  # over a gate: angles are tested by a cosine to the second order
