@@ -59,7 +59,7 @@ class Errors:
     ----------
     scale, scale_deviation : float
         Fraction by which the lengths of the scans are off from those of the map, above 0 where ranges are too long.
-    offset : float
+    offset, offset_deviation : float
         Metres by which all ranges are too long or, `of_walls`, all walls are nearer to the sensor than drawn.
     drawn_deviation : float
         Of the scale relative to the map as it is drawn; more scans make it smaller, whatever the walls are off by.
@@ -68,6 +68,7 @@ class Errors:
     scale: float
     scale_deviation: float
     offset: float
+    offset_deviation: float
     drawn_deviation: float
 
 
@@ -104,10 +105,10 @@ def errors_of(found: Sequence[Matched], sigma: float, *, of_walls: bool = False)
     solution = solved.solve(weighted.T @ offsets)
     square = float((weight * offsets) @ (offsets - unknown @ solution))
     inflation = max(1.0, square / max(1, len(on) - 3 * len(found)))
+    scale, offset = np.sqrt(np.diag(solved.solve(np.eye(len(prior), 2))) * inflation)
     fixed = np.r_[:2, 2 + len(walls) : len(prior)]
-    fits = solved, scipy.sparse.linalg.splu(normal[fixed][:, fixed])
-    scale, drawn = (math.sqrt(one.solve(np.eye(one.shape[0], 1))[0, 0] * inflation) for one in fits)
-    return Errors(float(solution[0]), scale, float(solution[1]), drawn)
+    drawn = scipy.sparse.linalg.splu(normal[fixed][:, fixed]).solve(np.eye(len(fixed), 1))[0, 0] * inflation
+    return Errors(float(solution[0]), float(scale), float(solution[1]), float(offset), math.sqrt(drawn))
 
 
 def _lines(one: Matched, of_walls: bool) -> tuple[Floats, Floats, Floats, Floats]:
