@@ -104,11 +104,11 @@ def unpack(packed: bytearray, max_bytes: int, take: Take) -> bytearray:
     BodyTooLargeError
         When it unpacks to more than is allowed.
     """
-    unpacked, stream = bytearray(), zlib.decompressobj(wbits=_GZIP)
-    rest: bytes | bytearray = packed
+    unpacked, stream, rest, end = bytearray(), zlib.decompressobj(wbits=_GZIP), b"", 0
     try:
-        while rest and not stream.eof:
-            piece = stream.decompress(rest, _PIECE)
+        while not stream.eof and (rest or end < len(packed)):
+            piece = stream.decompress(rest or packed[end : end + _PIECE], _PIECE)
+            end += 0 if rest else _PIECE
             _require_within(len(unpacked) + len(piece), max_bytes)
             take(len(piece))
             unpacked += piece
@@ -117,7 +117,7 @@ def unpack(packed: bytearray, max_bytes: int, take: Take) -> bytearray:
         raise NotJsonError("the body is not gzip, but its Content-Encoding is; send gzip, or omit the header") from None
     if not stream.eof:
         raise NotJsonError("the gzip body is cut short; send it completely")
-    if stream.unused_data:
+    if stream.unused_data or end < len(packed):
         raise NotJsonError("more bytes follow the gzip body; expected a single gzip member")
     return unpacked
 
