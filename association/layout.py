@@ -94,6 +94,9 @@ TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # Which poses are refined, nats: those that may reach a fraction of the best value, and a value; the freedom that any
 # set takes at least which reaches that. A flag: poses outside the window of a hard prior are dropped.
 RULE = fields((_F, "kept_fraction best_value least_value least_freedom"), (_I, "within"))
+# The stopping rule, nats: what a set without a base that was drawn gains at most, and what lines gain beyond those of
+# bases; the probability of having missed a set; what each use of a line adds to the merits of its bases.
+DRAWING_STATE = fields((_F, "bound beyond missed fade"))
 # A pose proposed from a base: the pose; cosine and sine of its heading; from the sensor to the point about which it may
 # turn, in the scan frame, rotated, and the variance of that rotation.
 HYPOTHESIS = np.dtype([*POSE.descr, *fields((_F, "cosine sine lever_x lever_y angle_variance")).descr])

@@ -12,7 +12,7 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import HELD, SCRATCH, WALL_SUMS, Integers, record
+from .layout import HELD, SCRATCH, WALL_SUMS, Flags, Integers, record
 
 
 class Walls(NamedTuple):
@@ -217,21 +217,32 @@ class Model(NamedTuple):
     information: Floats
 
 
-class Samples(NamedTuple):
-    """Sampled consensus sets of the stopping rule.
+class Drawing(NamedTuple):
+    """The bases of a scan that were not drawn yet, and sampled consensus sets of the stopping rule.
 
     Attributes
     ----------
-    orders : (samples, n) uint8, random orders of the lines
-    ranks : (n, samples) uint8, the place of each line in them
-    found : (samples,) uint8, the place at which an order has a base that was searched, n where it has none
-    sizes, gains : (samples,) how many lines each set has so far, and what they gain, nats
+    merits, telling : (m, m), costs : (m,)
+        As of `rank_bases`.
+    left : (m,) what each line may still gain in a set without a base that was drawn, nats
+    gains : (n,) of the lines, nats
+    state : (1,) of `DRAWING_STATE`
+    orders : (samples, m) uint8, random orders of the lines; no samples where bases are drawn at random
+    ranks : (m, samples) uint8, the place of each line in them
+    found : (samples,) uint8, the place at which an order has a base that was drawn, m where it has none
+    sizes, reached : (samples,) how many lines each set has so far, and what they gain, nats
     open_ones : (samples + 1,) the samples that are not decided, and last their number
     """
 
+    merits: Floats
+    telling: Flags
+    costs: Floats
+    left: Floats
+    gains: Floats
+    state: Records
     orders: Integers
     ranks: Integers
     found: Integers
     sizes: Integers
-    gains: Floats
+    reached: Floats
     open_ones: Integers

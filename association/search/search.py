@@ -20,9 +20,8 @@ from ..options import AssociationOptions
 from ..result import SearchReport
 from ..tables import ScoreRules
 from ..tuning import COMPLETE_ABOVE, DISTINCT_ANGLE, DISTINCT_DISTANCE
-from .kernels.bases import rank_bases
-from .kernels.proposals import reject, slide_line, sweep_base
-from .stopping import StoppingRule, random_order
+from .kernels.proposals import reject, slide_line, sweep_bases
+from .stopping import Bases
 from .tuning import (
     BASE_LINES,
     KEPT,
@@ -33,12 +32,10 @@ from .tuning import (
     PARALLEL_SINE,
     POSED,
     PRUNED,
-    REUSE,
     SLIDE_DISTINCT,
     SLIDE_LINES,
     SLIDE_SPACING,
     SLIDE_SPACING_FOR_BEAMS,
-    TELLING_LINES,
 )
 
 
@@ -181,19 +178,18 @@ class _Search:
         self.context, self.effort = context, effort
         scan = context.lines.rows
         self.scan, self.question, self.sweep = scan, context.question, context.index.tables.sweep
-        self.lines = min(len(scan), BASE_LINES if len(scan) <= BASE_LINES else TELLING_LINES)
         self.posed = np.empty(POSED, HYPOTHESIS)
         self.poses, self.scores = np.empty(POSED, ESTIMATE), np.zeros(POSED, SET_SCORE)
         self.matches = np.zeros((1, len(scan)), MATCH)
-        self.bases = self.hypotheses = self.verified = 0
+        self.hypotheses = self.verified = 0
         self.complete = True
 
     def run(self) -> Candidates:
         """Search bases, then parallel lines."""
         context, effort = self.context, self.effort
         best = _BestPoses(context, effort, DISTINCT_DISTANCE, effort.known)
-        rule = StoppingRule(self.scan, self.lines, drawn=context.options.sampling == "random")
-        exhausted = self._search_bases(best, rule)
+        bases = Bases(context)
+        self._search_bases(best, bases)
         spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
         if context.window is not None:
             spacing = min(spacing, context.window.radius)
@@ -207,16 +203,16 @@ class _Search:
         poses = np.empty(len(values) + len(others), ESTIMATE)
         poses[: len(values)], poses[len(values) :] = of_bases, of_slides
         order = np.argsort(-np.concatenate([values, others]), kind="stable")
-        return Candidates(poses[order], self._report(rule, exhausted=exhausted))
+        return Candidates(poses[order], self._report(bases))
 
-    def _report(self, rule: StoppingRule, *, exhausted: bool) -> SearchReport:
-        exhaustive = exhausted and len(self.scan) <= BASE_LINES
-        proven = rule.bound <= 0.0 or exhaustive
+    def _report(self, bases: Bases) -> SearchReport:
+        exhaustive = bases.count == bases.number and len(self.scan) <= BASE_LINES
+        proven = bases.bound <= 0.0 or exhaustive
         report = SearchReport(
             complete=True,
             exhaustive=exhaustive,
-            confidence=1.0 if proven else 1.0 - rule.missed,
-            bases=self.bases,
+            confidence=1.0 if proven else 1.0 - bases.missed,
+            bases=bases.count,
             hypotheses=self.hypotheses,
             verified=self.verified,
             seed=self.context.options.seed,
@@ -225,41 +221,16 @@ class _Search:
         )
         return report if self.complete else report.cut_short()
 
-    def _search_bases(self, best: _BestPoses, rule: StoppingRule) -> bool:
-        """Search bases, the best first, until the stopping rule ends it; return whether none was left."""
-        scan, effort, options, m = self.scan, self.effort, self.context.options, self.lines
-        merits, telling, costs = np.empty((m, m)), np.empty((m, m), np.bool_), np.empty(m)
-        index = self.context.index
-        number = rank_bases(scan, BASE_LINES, index.chains, index.area, merits, telling, costs)
-        fade = math.log(REUSE)
-        if options.sampling == "random":
-            merits, fade = random_order(merits, options.seed), 0.0
-        if not number:
-            rule.missed = 0.0
-        gains = np.ascontiguousarray(scan["gain"])
-        needed = known = -1.0
-        for _ in range(number):
-            i, j = divmod(int(merits.argmax()), m)
-            merits[i, j] = -math.inf
-            if fade:
-                for k in (i, j):
-                    merits[k] += fade
-                    merits[:, k] += fade
-            sliding, crossing = (i, j) if costs[i] <= costs[j] else (j, i)
-            if not self._propose(partial(sweep_base, self.question, sliding, crossing, self.sweep), gains, best):
-                return False
-            self.bases += 1
-            if best.best_value != known:
-                known = best.best_value
-                best.rule["least_freedom"] = rule.least_freedom(effort.kept_fraction * known)
-                needed = effort.complete_above * known
-                needed += rule.least_freedom(needed)
-            if telling[i, j]:
-                rule.searched(i, j, needed, effort.allowed)
-            done = rule.bound < needed or rule.missed <= effort.allowed
-            if known >= effort.enough or (effort.allowed >= 0.0 and done):
-                return False
-        return True
+    def _search_bases(self, best: _BestPoses, bases: Bases) -> None:
+        """Search bases, the best first, until the stopping rule ends it."""
+        effort, gains, chains = self.effort, np.ascontiguousarray(self.scan["gain"]), len(self.sweep.chains)
+        while best.best_value < effort.enough:
+            best.rule["least_freedom"] = bases.least_freedom(effort.kept_fraction * best.best_value)
+            needed = effort.complete_above * best.best_value
+            drawn = bases.draw(needed + bases.least_freedom(needed), effort.allowed)
+            propose = partial(sweep_bases, self.question, drawn, self.sweep)
+            if not len(drawn) or not self._propose(propose, len(drawn) * chains, gains, best):
+                return
 
     def _search_parallel(self, slides: _BestPoses, spacing: float) -> None:
         """Lay the longest of parallel lines on every chain, where these may gain more than the best pose does."""
@@ -279,15 +250,18 @@ class _Search:
         for i in chosen:
             # Poses that explain other lines, too, are found from bases.
             own = np.where(np.abs(sines[i]) < MIN_CROSSING_BASE, scan["gain"], 0.0)
-            if not self._propose(partial(slide_line, self.question, i, self.sweep, spacing), own, slides):
+            propose = partial(slide_line, self.question, i, self.sweep, spacing)
+            if not self._propose(propose, len(self.sweep.chains), own, slides):
                 return
 
-    def _propose(self, propose: Callable[[int, Records], tuple[int, int]], gains: Floats, best: _BestPoses) -> bool:
+    def _propose(
+        self, propose: Callable[[int, Records], tuple[int, int]], steps: int, gains: Floats, best: _BestPoses
+    ) -> bool:
         """Propose poses, reject most of them, score the rest; return False where the deadline passes."""
         context, place, raster = self.context, self.context.index.tables.place, self.context.index.tables.raster
         rules = ScoreRules(best.rule, True)
-        first, chains = 0, len(self.sweep.chains)
-        while first < chains:
+        first = 0
+        while first < steps:
             if context.deadline.passed:
                 self.complete = False
                 return False

@@ -9,11 +9,14 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Floats, Records
+from registration.layout import Floats
 
-from ..tables import Samples
-from .kernels.stopping import count_missed
-from .tuning import SAMPLE_SEED, SAMPLES, TELLING_LINES
+from ..context import SearchContext
+from ..layout import DRAWING_STATE, Integers, record
+from ..tables import Drawing
+from .kernels.bases import rank_bases
+from .kernels.stopping import draw_bases
+from .tuning import BASE_LINES, DRAWN, REUSE, SAMPLE_SEED, SAMPLES, TELLING_LINES
 
 
 @cache
@@ -33,56 +36,77 @@ def _orders(lines: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     return orders, np.ascontiguousarray(ranks.T)
 
 
-class StoppingRule:
-    """The bases that were searched, and what they say of the sets that were not found.
+class Bases:
+    """The bases of a scan, pairs of its lines: drawn the best first until no consensus set is likely to be missed.
 
-    A consensus set is missed only if none of its pairs was searched. Two arguments show that none was:
+    A consensus set is missed only if none of its pairs was drawn. Two arguments show that one of them was:
 
-    - *Bound*: each base that is searched takes the lesser gain of its lines from both; what is left over bounds the
-      gain of a set without any of the bases, since no line can be in two of them.
+    - *Bound*: each base that is drawn takes the lesser gain of its lines from both; what is left over bounds the gain
+      of a set without any of the bases, since no line can be in two of them.
     - *Samples*: the fraction of random sets with such gains that hold none of the bases.
     """
 
-    def __init__(self, scan: Records, lines: int, *, drawn: bool) -> None:
-        self._gains = np.ascontiguousarray(scan["gain"])
-        gains: list[float] = self._gains.tolist()
-        self._lines, self._drawn = lines, drawn
-        self._left, self.bound = gains[:lines], math.fsum(gains)
-        self._total = self.bound
-        self._best_gains = np.cumsum(np.sort(self._gains[:lines])[::-1])
-        self._beyond = math.fsum(gains[lines:])
-        order = np.argsort(-scan["freedom"], kind="stable")
+    def __init__(self, context: SearchContext) -> None:
+        scan, index, options = context.lines.rows, context.index, context.options
+        m = self._lines = min(len(scan), BASE_LINES if len(scan) <= BASE_LINES else TELLING_LINES)
+        gains, order = np.ascontiguousarray(scan["gain"]), np.argsort(-scan["freedom"], kind="stable")
+        self._total, self._best_gains = math.fsum(gains.tolist()), np.cumsum(np.sort(gains[:m])[::-1])
         self._freedoms: list[float] = [*scan["freedom"][order].tolist(), 0.0]
-        self._taken: list[float] = np.cumsum(self._gains[order]).tolist()
-        self._samples: Samples | None = None
-        if lines > 1 and not drawn:
-            orders, ranks = _orders(lines)
-            found, sizes = np.full(SAMPLES, lines, np.uint8), np.zeros(SAMPLES, np.uint8)
-            self._samples = Samples(orders, ranks, found, sizes, np.zeros(SAMPLES), np.arange(SAMPLES + 1))
-        self.missed = 1.0 if lines > 1 else 0.0
+        self._taken: list[float] = np.cumsum(gains[order]).tolist()
+        merits, telling, costs = np.full((m, m), -math.inf), np.zeros((m, m), np.bool_), np.zeros(m)
+        self.number = rank_bases(scan, BASE_LINES, index.chains, index.area, merits, telling, costs)
+        self._at_random = options.sampling == "random"
+        if self._at_random:
+            merits = random_order(merits, options.seed)
+        samples = 0 if self._at_random or m < 2 else SAMPLES
+        orders, ranks = _orders(m)
+        self._drawing = Drawing(
+            merits, telling, costs, gains[:m].copy(), gains,
+            record(
+                DRAWING_STATE,
+                bound=self._total,
+                beyond=math.fsum(gains[m:].tolist()),
+                missed=float(self.number > 0),
+                fade=0.0 if self._at_random else math.log(REUSE),
+            ),
+            orders, ranks, np.full(samples, m, np.uint8), np.zeros(samples, np.uint8), np.zeros(samples),
+            np.arange(samples + 1),
+        )  # fmt: skip
+        self._drawn, self.count = np.empty((DRAWN, 2), np.intp), 0
+
+    @property
+    def bound(self) -> float:
+        """The most that a set without any of the bases that were drawn gains, nats."""
+        return float(self._drawing.state["bound"][0])
+
+    @property
+    def missed(self) -> float:
+        """The probability of having missed a better set; by how much it exceeds what is allowed need not be known."""
+        return float(self._drawing.state["missed"][0])
 
     def least_freedom(self, needed: float) -> float:
         """Return the least freedom that a consensus set takes whose gains reach `needed`, nats."""
         return self._freedoms[bisect_right(self._taken, self._total - needed)]
 
-    def searched(self, one: int, other: int, needed: float, allowed: float) -> None:
-        """Note that a base was searched: estimate the probability of having missed a set that gains `needed`, nats.
+    def draw(self, needed: float, allowed: float) -> Integers:
+        """Return the next bases, (b, 2): the lines that slide and cross; none where the stopping rule ends it.
 
-        It need not be known by how much that probability exceeds what is `allowed`.
+        Parameters
+        ----------
+        needed : float
+            The gains, nats, that a set comes to at least which is not to be missed.
+        allowed : float
+            The probability of having missed one; -1: all bases are drawn.
         """
-        less = min(self._left[one], self._left[other])
-        self._left[one] -= less
-        self._left[other] -= less
-        self.bound -= less
-        short = needed - self._beyond
-        if self._samples is not None:
-            most = int(allowed * SAMPLES) if allowed >= 0.0 else SAMPLES
-            missed = count_missed(self._samples, one, other, self._gains, short, most)
-            self.missed = missed / SAMPLES
-            return
-        # A base that is drawn among all lines hits two inliers with that probability.
-        fewest = min(self._lines, max(2, int(np.searchsorted(self._best_gains, short)) + 1))
-        self.missed *= 1.0 - min(1.0, fewest * (fewest - 1) / max(1, self._lines * (self._lines - 1)))
+        hit = 0.0
+        if self._at_random:
+            # A base that is drawn among all lines hits two inliers with that probability.
+            short = needed - float(self._drawing.state["beyond"][0])
+            fewest = min(self._lines, max(2, int(np.searchsorted(self._best_gains, short)) + 1))
+            hit = min(1.0, fewest * (fewest - 1) / max(1, self._lines * (self._lines - 1)))
+        count = draw_bases(self._drawing, needed, hit, allowed, self._drawn)
+        self.count += count
+        return self._drawn[:count]
 
 
 def random_order(merits: Floats, seed: int) -> Floats:

@@ -9,6 +9,7 @@ MIN_CROSSING_BASE = 0.3  # sine of the least angle between the lines of a base, 
 TELLING = 0.25  # m, tables; how far a base may lay the other lines off, root mean square
 UNTELLING = 0.1  # tables; factor on the merit of a base that lays them farther off
 REUSE = 0.3  # tables; factor on the merit of a base for each earlier use of one of its lines
+DRAWN = 8  # bases at a time, measured; fewer calls, and a floor that rises later
 GAIN_POWER = 3.0  # of the lesser gain, tables: long lines are clutter less often
 # Cost of a base, of a chain that it may slide on, a metre of slide, and a hypothesis; nanoseconds, measured.
 COST_BASE = 2000.0

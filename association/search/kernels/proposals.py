@@ -10,7 +10,7 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...consensus.kernels.geometry import angle_gate, prior_value, wrap
-from ...layout import HARD_PRIOR
+from ...layout import HARD_PRIOR, Integers
 from ...tables import Question, Raster, Sweep
 from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS
 from ..tuning import WINDOW_MARGIN, WINDOW_TURN
@@ -42,24 +42,41 @@ def sectors_about(middle: float, spread: float) -> int:
 
 
 @kernel
-def sweep_base(
-    question: Question, sliding: int, crossing: int, sweep: Sweep, first: int, posed: Records
-) -> tuple[int, int]:
-    """Write the poses that lay a base on two wall chains, from chain `first` on; return the next chain, and how many.
+def sweep_bases(question: Question, bases: Integers, sweep: Sweep, first: int, posed: Records) -> tuple[int, int]:
+    """Write the poses that lay bases on two wall chains, from a step on; return the next step, and how many.
 
-    While line a slides along a chain, the midpoint of b passes the cells of a grid, which list the chains of each
-    direction: b lies on one where its midpoint crosses it. The array is left when it is half full. If one chain fills
-    it, -1 is returned in place of the number: the array has to be larger.
+    A step is one base on one chain: ``base * chains + chain``. The array is left when it is half full. If one step
+    fills it, -1 is returned in place of the number: the array has to be larger.
 
     Parameters
     ----------
     question : Question
-    sliding, crossing : int
-        The scan lines a and b.
+    bases : (b, 2)
+        The scan lines that slide and cross.
     sweep : Sweep
     first : int
     posed : (k,) of `HYPOTHESIS`
         Written.
+    """
+    number = len(sweep.chains)
+    count = 0
+    for k in range(first // number, len(bases)):
+        chain, count = sweep_base(
+            question, bases[k, 0], bases[k, 1], sweep, max(0, first - k * number), posed, count
+        )  # fmt: skip
+        if chain < number:
+            return k * number + chain, count
+    return len(bases) * number, count
+
+
+@kernel
+def sweep_base(
+    question: Question, sliding: int, crossing: int, sweep: Sweep, first: int, posed: Records, count: int
+) -> tuple[int, int]:
+    """Write the poses of one base behind the first `count`; return the next chain, and how many there are then.
+
+    While line a slides along a chain, the midpoint of b passes the cells of a grid, which list the chains of each
+    direction: b lies on one where its midpoint crosses it.
     """
     terms = question.terms[0]
     gates = terms.gates
@@ -90,7 +107,6 @@ def sweep_base(
     half_a = 0.5 * a.length - end_slack(a.length)
     half_b = 0.5 * b.length - end_slack(b.length)
     need = 2.0 * half_a
-    count = 0
     for w in range(first, len(chains)):
         if lengths[w] < need:
             continue
@@ -260,15 +276,16 @@ def reject(
     rows = shape.rows
     n = len(scan)
     spreads = np.empty(n, np.float64)
-    total = 0.0
-    for i in range(n):
-        total += gains[i]
-        variance = posed[0].angle_variance if count > 0 else 0.0  # the same for all hypotheses of a base
-        spreads[i] = GATE_MARGIN * angle_gate(scan[i], variance, gates) * PER_RADIAN
+    total = gains.sum()
+    variance = -1.0
     least = max(rule[0].kept_fraction * rule[0].best_value, rule[0].least_value) + rule[0].least_freedom
     kept = 0
     for k in range(count):
         one = posed[k]
+        if one.angle_variance != variance:  # the same for all hypotheses of a base
+            variance = one.angle_variance
+            for i in range(n):
+                spreads[i] = GATE_MARGIN * angle_gate(scan[i], variance, gates) * PER_RADIAN
         bonus = 0.0
         if prior.kind == HARD_PRIOR:
             if not is_about(prior, one):
