@@ -44,12 +44,12 @@ WALL = fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 # A line of the scan, one segment or several that continue or repeat one another, the most informative first: unit
 # direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
 # variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
-# the error common to a wall; its gain on a wall; the sum of that over all later lines; variance of the offset by the
+# the error common to a wall; its gain on a wall; variance of the offset by the
 # scan's sigmas alone (m^2); the freedom that it alone takes from a pose, nats.
 SCAN_LINE = fields(
     (
         _F,
-        "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain later_gain "
+        "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain "
         "plain_variance freedom",
     )
 )
@@ -70,8 +70,10 @@ SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid
 # the angle to the wall; fraction of the length on walls; lateral offset of that line from the wall's own (m); the gain
 # of the match, and its score, which is the gain less half of the chi-square that goes with it, nats.
 MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift gain score"))
-# A pose with its covariance, of additive x, y, theta.
-ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
+# A pose with its covariance, of additive x, y, theta; bit i is set where line i of the scan, below `MOST_NOTED`, is known
+# to lie on no wall there.
+ESTIMATE = np.dtype([*POSE.descr, *SYMMETRIC3.descr, ("unfit", _I)])
+MOST_NOTED = 62
 # A scored consensus set, nats: its score, and score and prior together; whether it lies in the window of a hard prior.
 SET_SCORE = fields((_F, "score value"), (_I, "inside"))
 # The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its

@@ -57,7 +57,7 @@ class ConsensusSet:
     @property
     def free(self) -> bool:
         """Return whether a direction of the position is open: its deviation exceeds 0.5 m."""
-        _, _, _, xx, xy, _, yy, _, _ = self.estimate[0].item()
+        xx, xy, yy = (float(self.estimate[name][0]) for name in ("xx", "xy", "yy"))
         return bool(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2)
 
     def fraction(self, lines: Records) -> float:

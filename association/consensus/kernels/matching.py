@@ -7,6 +7,7 @@ import math
 from compiled import kernel
 from registration.layout import Record, Records
 
+from ...layout import MOST_NOTED
 from ...tables import Place
 from ...tuning import DIRECTION_BINS
 from ..tuning import MOST_BRIDGED
@@ -24,7 +25,7 @@ def match_lines(
     """Match every scan line to the wall that it lies on best, and return what all gain, nats.
 
     The most informative lines come first; where what is left cannot reach the threshold, -1 is returned, and the other
-    lines are not matched.
+    lines are not matched. Nor are those that are known to lie on no wall.
     """
     walls = place.walls
     bin_starts = place.bin_starts
@@ -37,11 +38,17 @@ def match_lines(
     s = math.sin(pose.theta)
     per_cell = 1.0 / shape.cell
     gain = 0.0
+    left = SUM_SLACK
+    for i in range(len(scan)):
+        left += 0.0 if is_unfit(pose, i) else scan[i].gain
     for i in range(len(scan)):
         match = found[i]
         match.wall = -1
         match.overlap = 0.0
         match.gain = 0.0
+        if is_unfit(pose, i):
+            continue
+        left -= scan[i].gain
         px = c * scan[i].x - s * scan[i].y + pose.x
         py = s * scan[i].x + c * scan[i].y + pose.y
         fx = (px - shape.x0) * per_cell
@@ -88,6 +95,12 @@ def match_lines(
                             match.wall = w
                             write_match(match, scan[i], line, wall, cover, gates.least_overlap)
         gain += match.gain
-        if gain + scan[i].later_gain + SUM_SLACK < threshold:
+        if gain + left < threshold:
             return -1.0
     return gain
+
+
+@kernel
+def is_unfit(pose: Record, line: int) -> bool:
+    """Return whether a scan line is known to lie on no wall at a pose."""
+    return line < MOST_NOTED and (pose.unfit >> line) & 1 == 1

@@ -63,6 +63,7 @@ def score_poses(
         if match_lines(scan, gates, place, pose, found, floor, work.scratch[0]) < 0.0:
             continue
         refined += 1
+        pose.unfit = 0
         left = refine(question, place, pose, found, floor, work)
         if left >= SOLVED:
             out.score = score_set(question, place, pose, found, floor, left == CHANGED, work)

@@ -221,7 +221,6 @@ def describe_lines(lines: Records, variances: Records, model: Records) -> tuple[
             # Matches in wider gates occur by chance more often: such a match gains less.
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_offset / offset))
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_angle / angle))
-        one.later_gain = later
         # The models of the verdict were fitted to maps of unknown deviation: a declared one would let any misfit up to
         # it pass as expected. Beyond the deviations that they were fitted to it does.
         beyond = max(0.0, given.map - LOOSE_WALLS**2)
@@ -234,5 +233,4 @@ def describe_lines(lines: Records, variances: Records, model: Records) -> tuple[
         tt = weight * lever * lever + one.weight * line.spread
         tt = 1.0 + tt * walls.free_angle * walls.free_angle
         one.freedom = 0.5 * math.log(xx * max(1.0, tt - xt / xx * xt))
-        later += one.gain
     return out, seen

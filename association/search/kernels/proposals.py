@@ -10,7 +10,7 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...consensus.kernels.geometry import angle_gate, prior_value, wrap
-from ...layout import HARD_PRIOR, Integers
+from ...layout import HARD_PRIOR, MOST_NOTED, Integers
 from ...tables import Question, Raster, Sweep
 from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS
 from ..tuning import WINDOW_MARGIN, WINDOW_TURN
@@ -296,6 +296,7 @@ def reject(
         c = one.cosine
         s = one.sine
         turned = (one.theta + math.pi) * PER_RADIAN + 0.5
+        unfit = 0
         for i in range(n):
             if spare < 0.0:
                 break
@@ -309,6 +310,7 @@ def reject(
                 fits = (bits[int(fy) * columns + int(fx)] & wanted) != 0
             if not fits:
                 spare -= gains[i]
+                unfit |= (1 << i) if i < MOST_NOTED else 0
         if spare < 0.0:
             continue
         pose = poses[kept]
@@ -324,5 +326,6 @@ def reject(
         pose.xt = v * y
         pose.yt = -v * x
         pose.tt = v
+        pose.unfit = unfit
         kept += 1
     return kept

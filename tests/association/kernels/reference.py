@@ -191,6 +191,4 @@ def describe_lines(lines: Records, variances: Record, model: Record) -> tuple[li
         beyond = max(0.0, variances["map"] - LOOSE_WALLS**2)
         row["plain_variance"] = max(LEAST_VARIANCE, line["variance"] + beyond)
         row["freedom"] = freedom_alone(row, model)
-    for k, row in enumerate(rows):
-        row["later_gain"] = rows["gain"][k + 1 :].sum()
     return order, rows
