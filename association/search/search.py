@@ -272,9 +272,10 @@ class _Search:
                 continue
             first = following
             self.hypotheses += count
-            kept = reject(self.question, raster, gains, self.posed, count, best.rule, self.poses) if count else 0
+            possible = np.empty(count)
+            kept = reject(self.question, raster, gains, self.posed, count, best.rule, self.poses, possible) if count else 0
             if kept:
-                some = self.poses[:kept]
+                some = self.poses[np.argsort(-possible[:kept], kind="stable")]
                 refined, good = score_poses(self.question, place, some, rules, self.scores, self.matches, context.work)
                 self.verified += refined
                 best.offer(some[:good], self.scores["value"][:good])

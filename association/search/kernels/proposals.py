@@ -257,8 +257,9 @@ def slide_line(
 
 @kernel
 def reject(
-    question: Question, raster: Raster, gains: Floats, posed: Records, count: int, rule: Records, poses: Records
-) -> int:
+    question: Question, raster: Raster, gains: Floats, posed: Records, count: int, rule: Records, poses: Records,
+    possible: Floats,
+) -> int:  # fmt: skip
     """Write those of the first `count` hypotheses that may reach the floor, as (k,) of `ESTIMATE`; return how many.
 
     A scan line counts only where the raster has a wall of its direction near its midpoint. The lines of the greatest
@@ -327,5 +328,6 @@ def reject(
         pose.yt = -v * x
         pose.tt = v
         pose.unfit = unfit
+        possible[kept] = spare
         kept += 1
     return kept
