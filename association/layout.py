@@ -70,8 +70,8 @@ SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid
 # the angle to the wall; fraction of the length on walls; lateral offset of that line from the wall's own (m); the gain
 # of the match, and its score, which is the gain less half of the chi-square that goes with it, nats.
 MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift gain score"))
-# A pose with its covariance, of additive x, y, theta; bit i is set where line i of the scan, below `MOST_NOTED`, is known
-# to lie on no wall there.
+# A pose with its covariance, of additive x, y, theta. Bit i, below `MOST_NOTED`, is set where line i of the scan is
+# known to lie on no wall.
 ESTIMATE = np.dtype([*POSE.descr, *SYMMETRIC3.descr, ("unfit", _I)])
 MOST_NOTED = 62
 # A scored consensus set, nats: its score, and score and prior together; whether it lies in the window of a hard prior.

@@ -178,11 +178,14 @@ class _Search:
         self.context, self.effort = context, effort
         scan = context.lines.rows
         self.scan, self.question, self.sweep = scan, context.question, context.index.tables.sweep
-        self.posed = np.empty(POSED, HYPOTHESIS)
-        self.poses, self.scores = np.empty(POSED, ESTIMATE), np.zeros(POSED, SET_SCORE)
+        self._make_room(POSED)
         self.matches = np.zeros((1, len(scan)), MATCH)
         self.hypotheses = self.verified = 0
         self.complete = True
+
+    def _make_room(self, hypotheses: int) -> None:
+        self.posed, self.poses = np.empty(hypotheses, HYPOTHESIS), np.empty(hypotheses, ESTIMATE)
+        self.scores, self.possible = np.zeros(hypotheses, SET_SCORE), np.empty(hypotheses)
 
     def run(self) -> Candidates:
         """Search bases, then parallel lines."""
@@ -258,25 +261,24 @@ class _Search:
         self, propose: Callable[[int, Records], tuple[int, int]], steps: int, gains: Floats, best: _BestPoses
     ) -> bool:
         """Propose poses, reject most of them, score the rest; return False where the deadline passes."""
-        context, place, raster = self.context, self.context.index.tables.place, self.context.index.tables.raster
+        context, tables, first = self.context, self.context.index.tables, 0
         rules = ScoreRules(best.rule, True)
-        first = 0
         while first < steps:
             if context.deadline.passed:
                 self.complete = False
                 return False
             following, count = propose(first, self.posed)
             if count < 0:
-                self.posed = np.empty(2 * len(self.posed), HYPOTHESIS)
-                self.poses, self.scores = np.empty(len(self.posed), ESTIMATE), np.zeros(len(self.posed), SET_SCORE)
+                self._make_room(2 * len(self.posed))
                 continue
             first = following
             self.hypotheses += count
-            possible = np.empty(count)
-            kept = reject(self.question, raster, gains, self.posed, count, best.rule, self.poses, possible) if count else 0
+            kept = reject(self.question, tables.raster, gains, self.posed[:count], best.rule, self.poses, self.possible)
             if kept:
-                some = self.poses[np.argsort(-possible[:kept], kind="stable")]
-                refined, good = score_poses(self.question, place, some, rules, self.scores, self.matches, context.work)
+                some = self.poses[np.argsort(-self.possible[:kept], kind="stable")]
+                refined, good = score_poses(
+                    self.question, tables.place, some, rules, self.scores, self.matches, context.work
+                )
                 self.verified += refined
                 best.offer(some[:good], self.scores["value"][:good])
         return True

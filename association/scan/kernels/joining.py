@@ -201,8 +201,7 @@ def describe_lines(lines: Records, variances: Records, model: Records) -> tuple[
     given, walls = variances[0], model[0]
     n = len(lines)
     out, seen = np.zeros(n, SCAN_LINE), np.zeros(n, SIGHTING)
-    later = 0.0
-    for k in range(n - 1, -1, -1):
+    for k in range(n):
         line, one, sight = lines[k], out[k], seen[k]
         spread = max(line.spread, LEAST_SPREAD)
         one.dx, one.dy, one.x, one.y, one.length = line.dx, line.dy, line.x, line.y, line.length

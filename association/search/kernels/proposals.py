@@ -257,14 +257,13 @@ def slide_line(
 
 @kernel
 def reject(
-    question: Question, raster: Raster, gains: Floats, posed: Records, count: int, rule: Records, poses: Records,
-    possible: Floats,
-) -> int:  # fmt: skip
-    """Write those of the first `count` hypotheses that may reach the floor, as (k,) of `ESTIMATE`; return how many.
+    question: Question, raster: Raster, gains: Floats, posed: Records, rule: Records, poses: Records, possible: Floats
+) -> int:
+    """Write those of the hypotheses that may reach the floor, as (k,) of `ESTIMATE`; return how many.
 
     A scan line counts only where the raster has a wall of its direction near its midpoint. The lines of the greatest
     gain come first, so that most hypotheses are rejected by a few. `gains` (n,) are the gains of the lines; those of 0
-    are not looked up.
+    are not looked up. `possible` gets by how much the gains that are left exceed the floor, nats.
     """
     scan = question.scan
     terms = question.terms[0]
@@ -281,7 +280,7 @@ def reject(
     variance = -1.0
     least = max(rule[0].kept_fraction * rule[0].best_value, rule[0].least_value) + rule[0].least_freedom
     kept = 0
-    for k in range(count):
+    for k in range(len(posed)):
         one = posed[k]
         if one.angle_variance != variance:  # the same for all hypotheses of a base
             variance = one.angle_variance
