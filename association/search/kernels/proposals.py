@@ -78,26 +78,16 @@ def sweep_base(
     While line a slides along a chain, the midpoint of b passes the cells of a grid, which list the chains of each
     direction: b lies on one where its midpoint crosses it.
     """
-    terms = question.terms[0]
-    gates = terms.gates
-    prior = terms.prior
-    a = question.scan[sliding]
-    b = question.scan[crossing]
-    chains = sweep.chains
-    lengths = sweep.lengths
-    present = sweep.present
-    starts = sweep.sectors.starts
-    items = sweep.sectors.items
+    gates, prior = question.terms[0].gates, question.terms[0].prior
+    a, b = question.scan[sliding], question.scan[crossing]
+    chains, lengths, present = sweep.chains, sweep.lengths, sweep.present
+    starts, items = sweep.sectors.starts, sweep.sectors.items
     shape = sweep.sectors.shape[0]
-    cell = shape.cell
+    cell, columns, rows = shape.cell, shape.columns, shape.rows
     per_cell = 1.0 / cell
-    columns = shape.columns
-    rows = shape.rows
     windowed = prior.kind == HARD_PRIOR
-    va = a.angle_variance
-    vb = b.angle_variance
-    gx = b.x - a.x
-    gy = b.y - a.y
+    va, vb = a.angle_variance, b.angle_variance
+    gx, gy = b.x - a.x, b.y - a.y
     turn = b.angle - a.angle
     tolerance = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(va + vb)))
     least_cosine = 1.0 - 0.5 * tolerance * tolerance
@@ -113,28 +103,21 @@ def sweep_base(
         if 2 * count >= len(posed):
             return w, count
         wa = chains[w]
-        dx = wa.dx
-        dy = wa.dy
-        c = dx * a.dx + dy * a.dy
-        s = dy * a.dx - dx * a.dy
+        dx, dy = wa.dx, wa.dy
+        c, s = dx * a.dx + dy * a.dy, dy * a.dx - dx * a.dy
         if windowed and abs(wrap(wa.angle - a.angle - prior.theta)) > prior.angle + WINDOW_TURN + tolerance:
             continue
         # Midpoint and direction of b with the midpoint of a at abscissa 0 of the chain; the slide is that abscissa.
-        bdx = c * b.dx - s * b.dy
-        bdy = s * b.dx + c * b.dy
+        bdx, bdy = c * b.dx - s * b.dy, s * b.dx + c * b.dy
         x = c * gx - s * gy - dy * wa.offset
         y = s * gx + c * gy + dx * wa.offset
-        at = wa.begin + half_a - swing
-        high = wa.end - half_a + swing
+        at, high = wa.begin + half_a - swing, wa.end - half_a + swing
         wanted = sectors_about((wa.angle + turn + math.pi) * PER_RADIAN + 0.5, spread)
         fx = (x + at * dx - shape.x0) * per_cell
         fy = (y + at * dy - shape.y0) * per_cell
-        column = math.floor(fx)
-        row = math.floor(fy)
-        step_x = 1 if dx > 0.0 else -1
-        step_y = 1 if dy > 0.0 else -1
-        pace_x = cell / max(abs(dx), 1e-12)
-        pace_y = cell / max(abs(dy), 1e-12)
+        column, row = math.floor(fx), math.floor(fy)
+        step_x, step_y = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
+        pace_x, pace_y = cell / max(abs(dx), 1e-12), cell / max(abs(dy), 1e-12)
         next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
         next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
         while at <= high:
@@ -175,14 +158,11 @@ def lay_base(a: Record, b: Record, wa: Record, wb: Record, half_a: float, half_b
     gap = wrap(wb.angle - wa.angle - b.angle + a.angle)
     turn = gap * a.angle_variance / (a.angle_variance + b.angle_variance)
     theta = wa.angle - a.angle + turn
-    c = math.cos(theta)
-    s = math.sin(theta)
+    c, s = math.cos(theta), math.sin(theta)
     det = wa.dx * wb.dy - wa.dy * wb.dx
     # n . t = p - n . R m for both, with n = (-d_y, d_x).
-    ax = c * a.x - s * a.y
-    ay = s * a.x + c * a.y
-    bx = c * b.x - s * b.y
-    by = s * b.x + c * b.y
+    ax, ay = c * a.x - s * a.y, s * a.x + c * a.y
+    bx, by = c * b.x - s * b.y, s * b.x + c * b.y
     ra = wa.offset + wa.dy * ax - wa.dx * ay
     rb = wb.offset + wb.dy * bx - wb.dx * by
     tx = (ra * wb.dx - rb * wa.dx) / det
@@ -193,13 +173,8 @@ def lay_base(a: Record, b: Record, wa: Record, wb: Record, half_a: float, half_b
     along = wb.dx * (bx + tx) + wb.dy * (by + ty)
     if along - half_b < wb.begin or along + half_b > wb.end:
         return False
-    pose.theta = theta
-    pose.cosine = c
-    pose.sine = s
-    pose.x = tx
-    pose.y = ty
-    pose.lever_x = 0.5 * (ax + bx)
-    pose.lever_y = 0.5 * (ay + by)
+    pose.theta, pose.cosine, pose.sine, pose.x, pose.y = theta, c, s, tx, ty
+    pose.lever_x, pose.lever_y = 0.5 * (ax + bx), 0.5 * (ay + by)
     pose.angle_variance = a.angle_variance * b.angle_variance / (a.angle_variance + b.angle_variance)
     return True
 
@@ -214,8 +189,7 @@ def slide_line(
     """
     prior = question.terms[0].prior
     a = question.scan[sliding]
-    chains = sweep.chains
-    lengths = sweep.lengths
+    chains, lengths = sweep.chains, sweep.lengths
     half = 0.5 * a.length - end_slack(a.length)
     count = 0
     for w in range(first, len(chains)):
@@ -225,12 +199,9 @@ def slide_line(
             return w, count
         chain = chains[w]
         theta = chain.angle - a.angle
-        c = math.cos(theta)
-        s = math.sin(theta)
-        x = c * a.x - s * a.y
-        y = s * a.x + c * a.y
-        low = chain.begin + half
-        high = chain.end - half
+        c, s = math.cos(theta), math.sin(theta)
+        x, y = c * a.x - s * a.y, s * a.x + c * a.y
+        low, high = chain.begin + half, chain.end - half
         if prior.kind == HARD_PRIOR:
             middle = chain.dx * (prior.x + x) + chain.dy * (prior.y + y)
             low = max(low, middle - prior.radius)
@@ -243,13 +214,10 @@ def slide_line(
                 return w, -1
             at = low + (k + 0.5) / number * (high - low)
             pose = posed[count]
-            pose.theta = theta
-            pose.cosine = c
-            pose.sine = s
+            pose.theta, pose.cosine, pose.sine = theta, c, s
             pose.x = chain.dx * at - chain.dy * chain.offset - x
             pose.y = chain.dy * at + chain.dx * chain.offset - y
-            pose.lever_x = x
-            pose.lever_y = y
+            pose.lever_x, pose.lever_y = x, y
             pose.angle_variance = a.angle_variance
             count += 1
     return len(chains), count
@@ -265,15 +233,10 @@ def reject(
     gain come first, so that most hypotheses are rejected by a few. `gains` (n,) are the gains of the lines; those of 0
     are not looked up. `possible` gets by how much the gains that are left exceed the floor, nats.
     """
-    scan = question.scan
-    terms = question.terms[0]
-    gates = terms.gates
-    prior = terms.prior
-    bits = raster.bits
+    scan, bits = question.scan, raster.bits
+    gates, prior = question.terms[0].gates, question.terms[0].prior
     shape = raster.shape[0]
-    per_cell = 1.0 / shape.cell
-    columns = shape.columns
-    rows = shape.rows
+    per_cell, columns, rows = 1.0 / shape.cell, shape.columns, shape.rows
     n = len(scan)
     spreads = np.empty(n, np.float64)
     total = gains.sum()
@@ -293,8 +256,7 @@ def reject(
         else:
             bonus = prior_value(prior, one)
         spare = total - (least - bonus)  # what may be lost
-        c = one.cosine
-        s = one.sine
+        c, s = one.cosine, one.sine
         turned = (one.theta + math.pi) * PER_RADIAN + 0.5
         unfit = 0
         for i in range(n):
@@ -313,20 +275,10 @@ def reject(
                 unfit |= (1 << i) if i < MOST_NOTED else 0
         if spare < 0.0:
             continue
-        pose = poses[kept]
-        v = one.angle_variance
-        x = one.lever_x
-        y = one.lever_y
-        pose.theta = one.theta
-        pose.x = one.x
-        pose.y = one.y
-        pose.xx = v * y * y
-        pose.xy = -v * x * y
-        pose.yy = v * x * x
-        pose.xt = v * y
-        pose.yt = -v * x
-        pose.tt = v
-        pose.unfit = unfit
+        pose, v, x, y = poses[kept], one.angle_variance, one.lever_x, one.lever_y
+        pose.theta, pose.x, pose.y, pose.unfit = one.theta, one.x, one.y, unfit
+        pose.xx, pose.xy, pose.yy = v * y * y, -v * x * y, v * x * x
+        pose.xt, pose.yt, pose.tt = v * y, -v * x, v
         possible[kept] = spare
         kept += 1
     return kept
