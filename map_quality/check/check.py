@@ -42,10 +42,15 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     until = deadline or Deadline()
     size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
     findings: list[Finding] = []
-    is_likely = tuning.SMALLEST <= size.diagonal <= tuning.LARGEST
-    if not is_likely:
-        said = f"{size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m"
-        findings.append(Finding("unlikely_size", f"The map's diagonal is {said}. Check that it is in metres."))
+    is_likely, lengths = tuning.SMALLEST <= size.diagonal <= tuning.LARGEST, np.sort(index.walls.longest)
+    usual = float(lengths[np.searchsorted(np.cumsum(lengths), 0.5 * size.length)])
+    if not is_likely or usual > tuning.LONGEST_USUAL:
+        message = (
+            f"The map's diagonal is {size.diagonal:.3g} m, expected {tuning.SMALLEST:g} to {tuning.LARGEST:g} m, and "
+            f"half of the length of its walls is in walls of {usual:.3g} m and more, expected at most "
+            f"{tuning.LONGEST_USUAL:g} m. Check that it is in metres."
+        )
+        findings.append(Finding("unlikely_size", message))
     advice, near = Advice(drawn_sigma(index)), find_near_walls(index, until)
     if oriented and is_likely:  # in another unit walls are too far apart to see one another
         sides = look_from_walls(index, near.opposite, until)

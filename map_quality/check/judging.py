@@ -61,7 +61,7 @@ def conclude(
     advice, usable, would_be = fits.advice(directed, mistakes)
     if thicker is not None and directed:  # a bias, of which a standard deviation is no measure
         advice, would_be = replace(advice, sigma=None), fits.usable(replace(fits.present, oriented=True))
-    findings = [*mistakes, *_moved(fits.samples)]
+    findings = [*mistakes, *_moved(fits.samples), *_beyond_limits([scan for scan, _ in tried])]
     if directed is not oriented and not mistakes:
         message = f"The scans fit better if directions are ignored: {would_be} of {len(tried)} are usable instead of "
         findings.insert(0, Finding("undirected", f'{message}{usable}. Set "oriented": false.'))
@@ -194,6 +194,13 @@ def _scaled(scale: Scale | None, count: int, usable: int) -> Iterator[Finding]:
     remedy = f"divide the {'lengths of the scans' if of_scans else 'map'} by {factor:.4g}"
     remedy += "" if of_scans else ", or multiply the scans by this factor"
     yield Finding("scale", f"{scale.agreeing} of {count} scans fit better at another scale: {remedy}.{unit}")
+
+
+def _beyond_limits(scans: Sequence[Scan]) -> Iterator[Finding]:
+    """Return a finding if most scans have no segments, all for one reason: their ranges are beyond the limits."""
+    told = [one.message for scan in scans for one in scan.warnings if one.code == "no_segments"]
+    if len(told) > tuning.MANY * len(scans):
+        yield Finding("scale", f"{len(told)} of {len(scans)} scans have no segments, such as this one: {told[0]}")
 
 
 def _moved(samples: Sequence[Sample]) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ ladder, and some scans are searched in it. The factor with the highest sum of sc
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -29,17 +30,9 @@ from . import tuning
 from .samples import OPTIONS, Sample, score_of
 
 # Factor by which a map is too large if its lengths are of the first unit and are taken for the second.
+LENGTHS = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254, "feet": 0.3048, "metres": 1.0}
 TAKEN_FOR: Mapping[float, tuple[str, str]] = {
-    10.0: ("decimetres", "metres"),
-    100.0: ("centimetres", "metres"),
-    1000.0: ("millimetres", "metres"),
-    1.0 / 0.0254: ("inches", "metres"),
-    1.0 / 0.3048: ("feet", "metres"),
-    25.4: ("millimetres", "inches"),
-    304.8: ("millimetres", "feet"),
-    2.54: ("centimetres", "inches"),
-    30.48: ("centimetres", "feet"),
-    12.0: ("inches", "feet"),
+    length / small: (one, other) for (one, small), (other, length) in itertools.combinations(LENGTHS.items(), 2)
 }
 SAME_UNIT = 0.003  # of a factor; nearer to one of units it is that
 

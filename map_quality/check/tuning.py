@@ -50,6 +50,7 @@ SIGMA = 0.01  # m
 
 # --- Size -------------------------------------------------------------------------------------------------------------
 
+LONGEST_USUAL = 30.0  # m, tables; half of the length of 443 maps is in walls of 0.6 to 21.9 m and more
 SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive about in
 
 # --- Samples ----------------------------------------------------------------------------------------------------------

@@ -100,9 +100,7 @@ class VisitScan:
     @property
     def prior(self) -> SoftPrior | None:
         """The stated pose as a prior."""
-        if self.pose is None or self.covariance is None:
-            return None
-        return SoftPrior(self.pose, self.covariance)
+        return None if self.pose is None or self.covariance is None else SoftPrior(self.pose, self.covariance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

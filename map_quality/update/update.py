@@ -216,15 +216,7 @@ class _Update:
         )
         after, taken = proposed.found or first, [one for one, is_in in zip(changes, accepted, strict=True) if is_in]
         segments, sigma = apply_changes(self.known, self.index.sigma, taken, proposed.sharpened)
-        return MapUpdate(
-            segments,
-            sigma,
-            tuple(changes),
-            accepted,
-            usable_of(first, after, held=False),
-            usable_of(first, after, held=True),
-            proposed.sharpened,
-            tuple(refused),
-            proposed.kept,
-            len(first) == len(self.scans) and not self.deadline.passed,
-        )
+        usable, held = (usable_of(first, after, held=one) for one in (False, True))
+        complete = len(first) == len(self.scans) and not self.deadline.passed
+        given = (usable, held, proposed.sharpened, tuple(refused), proposed.kept, complete)
+        return MapUpdate(segments, sigma, tuple(changes), accepted, *given)

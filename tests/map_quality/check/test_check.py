@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, CancelledError, Deadline, MapIndex, Scan, associate, scaled
+from linefix import LaserScan, scan_of
 from map_quality import MapCheck, Sample, SampleReport, check_map, conclude, try_sample
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
@@ -147,7 +148,7 @@ def test_gaps_within_the_declared_error_of_a_map_are_none(sigma: float | None, g
     assert {one.code: one.segments for one in check_map(index).findings}.get("gaps", ())[:1] == gaps
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.0, False), (0.1, True), (1000.0, True)])
+@pytest.mark.parametrize(("factor", "told"), [(1.0, False), (0.1, True), (100.0, True), (1000.0, True)])
 def test_a_size_that_no_building_has(factor: float, told: bool) -> None:
     assert ("unlikely_size" in found(ROOM * factor)) is told
 
@@ -284,15 +285,26 @@ def test_a_map_that_is_not_to_scale_or_of_another_unit(factor: float, unit: str)
     assert said == pytest.approx(factor, rel=1e-3 if unit else 0.004)
 
 
-def test_scans_of_another_unit() -> None:
-    """Scans in millimetres; the map is in metres."""
-    index, scans = index_of(faces()), [scaled(scan, 1000.0) for _, scan in sampled()]
+def beyond_limits(factor: float) -> list[Scan]:
+    return [scan_of(LaserScan(-3.0, 0.1, factor * np.linspace(1.0, 3.0, 60), 0.05, 12.0))] * 2
+
+
+@pytest.mark.parametrize(
+    ("scans", "said"),
+    [
+        (
+            [scaled(scan, 1000.0) for _, scan in sampled()],
+            "divide the lengths of the scans by 1000. The scans seem to be in millimetres taken for metres.",
+        ),
+        *((beyond_limits(factor), "in another unit, such as millimetres; expected metres.") for factor in (1e3, 1e-3)),
+    ],
+)
+def test_scans_of_another_unit_than_the_map_or_their_limits(scans: list[Scan], said: str) -> None:
+    index = index_of(faces())
     samples = [try_sample(index, scan, Deadline(), oriented=True) for scan in scans]
     report = conclude(index, scans, samples, Deadline(), oriented=True)
     assert codes(report) == ["scale"]
-    assert report.findings[0].message.endswith(
-        "divide the lengths of the scans by 1000. The scans seem to be in millimetres taken for metres."
-    )
+    assert report.findings[0].message.endswith(said)
 
 
 @pytest.mark.xfail(strict=True, reason="one scan does not show a mistake")
