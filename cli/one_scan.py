@@ -27,12 +27,7 @@ class SearchOptions:
 
 @grouped
 def locate(
-    on: MapsArgument,
-    scan: ScanArgument,
-    search: SearchOptions,
-    usable: UsableOptions,
-    where: Where,
-    output: Output,
+    on: MapsArgument, scan: ScanArgument, search: SearchOptions, usable: UsableOptions, where: Where, output: Output
 ) -> None:
     """Find the pose of a scan on a map, or on one of several; the answer is that of /v1/associate."""
     answer = _asked(where, "associate", read_maps(on), scan, search, usable)

@@ -6,10 +6,13 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+import typer
 
 from .asking import Where
 from .errors import WrongUseError, needing
@@ -20,9 +23,11 @@ if TYPE_CHECKING:
     from ros2 import Maps, NodeOptions
 
 NODE = "linefix"  # the name of the node in parameter files
-ANY = "**"  # stands for each node
+ANY = ("**", "*")  # stand for each node or namespace
 LEAVING_SECONDS = 1.0  # that the end waits for DDS
-NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "log_level", "rosout_logs", "help")
+NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "ignored", "logs", "help")
+IGNORED = ("--log-level", "--log-config-file", "--enclave", "-e")
+LOGS = [f"--enable-{one}-logs/--disable-{one}-logs" for one in ("rosout", "stdout", "external-lib")]
 LEAST = "Minimum standard deviation"
 TOGETHER = "Search scans of several topics as one if they are so close in time; 0: never."
 STOP_TF = "Stop the transform of --publish-tf this long after the last scan with ranges; 0: never."
@@ -36,30 +41,35 @@ MAPS = (
     "Default: the topic of --map-topic."
 )
 
-Sections = dict[tuple[str, str], dict[str, Any]]
-
 
 class RosCommand(PlainCommand):
-    """A command whose defaults are parameters of a file and of ``-p``: options of the command line count before them.
+    """A command whose defaults are parameters of files and of ``-p``: options of the command line count before them.
 
-    The namespace, from itself or from remappings, chooses the parameters of the file.
+    Namespace and name of the node, which remappings may change, choose the parameters of files.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line."""
         given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
-        file, known = given.get("params_file"), {one.name for one in self.params} - {*NOT_IN_FILES}
-        spaces = [rule[6:] for rule in given.get("remap") or [] if rule.startswith("__ns:=")]
-        space = spaces[-1] if spaces else given.get("namespace")
-        values = {} if file is None else parameters_of(Path(file), space, known)
-        ruled = {name: one for rule in given.get("parameter") or [] for name, one in given_parameter(rule).items()}
-        for name in {**values, **ruled}:
+        known, remap = {one.name for one in self.params} - {*NOT_IN_FILES}, given.get("remap") or []
+        special = dict(rule.partition(":=")[::2] for rule in own_rules(remap, remap))
+        space, node = special.get("__ns", given.get("namespace")), special.get("__node", NODE)
+        files = [(one, parameters_of(Path(one), space, known, node)) for one in given.get("params_file") or []]
+        rules = [("-p", given_parameter(rule)) for rule in own_rules(given.get("parameter") or [], remap)]
+        found = {name: (value, source) for source, some in (*files, *rules) for name, value in some.items()}
+        for name, (_, source) in found.items():
             if name not in known:
                 expected = ", ".join(sorted("map" if one == "on" else one for one in known))
-                source = "-p" if name in ruled else file
                 raise WrongUseError(f"{source}: found the parameter {name}, expected one of {expected}")
-        ctx.default_map = {**(ctx.default_map or {}), **values, **ruled}
-        return super().parse_args(ctx, args)
+        ctx.default_map = {**(ctx.default_map or {}), **{name: value for name, (value, _) in found.items()}}
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            wrong = getattr(error.param, "name", None)
+            if wrong not in found:
+                raise
+            value, source = found[wrong]
+            raise WrongUseError(f"{source}: the parameter {wrong} is {value!r}: {error.message}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +103,11 @@ class RobotOptions:
 class RosArguments:
     """Parameters and remappings in the way of ROS 2, as options."""
 
-    params_file: Path | None = option(None, "A parameter file of ROS 2 (YAML).", "FILE")
+    params_file: list[Path] | None = option(None, "A parameter file of ROS 2 (YAML); repeatable.", "FILE")
     ros_args: bool = flag("Ignored; the options after it apply as usual.", "--ros-args")
     parameter: list[str] | None = option(None, "Set a parameter, as in ROS 2.", "NAME:=VALUE", "--param", "-p")
-    log_level: list[str] | None = option(None, "Ignored, as are rosout logs.", "LEVEL")
-    rosout_logs: bool = flag("Ignored.", "--enable-rosout-logs/--disable-rosout-logs", hidden=True)
+    ignored: list[str] | None = option(None, "Ignored, as are the switches of logs.", "TEXT", *IGNORED)
+    logs: bool = option(False, "Ignored.", None, *LOGS, hidden=True)
     remap: list[str] | None = option(None, "Remap the name of a topic.", "FROM:=TO", "--remap", "-r")
 
 
@@ -113,7 +123,7 @@ def ros2(robot: RobotOptions, usable: UsableOptions, ros: RosArguments) -> None:
     names, topics = given.pop("on"), tuple(given.pop("scan") or ("scan",))
     given["map_topic"] = None if names else robot.map_topic
     try:
-        remappings = dict(map(node_side.remapping_of, ros.remap or []))
+        remappings = dict(map(node_side.remapping_of, own_rules(ros.remap or [], ros.remap or [])))
         remappings.pop("__node", None)
         space = remappings.pop("__ns", robot.namespace)
         space = node_side.checked_namespace(node_side.namespace_of(topics) if space is None else space)
@@ -166,7 +176,18 @@ def _maps_at(names: Sequence[str]) -> Maps:
     return Maps(index, {name: document.get("frame_id", "map") for name, document in documents.items()})
 
 
-def parameters_of(file: Path, namespace: str | None = None, known: Container[str] = ()) -> dict[str, Any]:
+def own_rules(rules: Sequence[str], remap: Sequence[str]) -> Iterator[str]:
+    """Yield the rules ``[NODE:]name:=value`` for this node without its name, which remappings may change."""
+    names = {"", NODE, *ANY, *(rule.partition("__node:=")[2] for rule in remap)}
+    for rule in rules:
+        node = rule.partition(":=")[0].rpartition(":")[0]
+        if node.rpartition("/")[2] in names:
+            yield rule[len(node) :].removeprefix(":")
+
+
+def parameters_of(
+    file: Path, namespace: str | None = None, known: Container[str] = (), node: str = NODE
+) -> dict[str, Any]:
     """Return the parameters of a file for a robot, by the names of options.
 
     The sections ``/**`` and ``linefix`` apply to each robot, ``/robot1/linefix`` to that one and with precedence.
@@ -178,6 +199,8 @@ def parameters_of(file: Path, namespace: str | None = None, known: Container[str
         Of the robot, such as ``/robot1``. None: that of the file.
     known : container of str
         Names of options; others in sections of all nodes are left out.
+    node : str
+        Name of the node.
 
     Raises
     ------
@@ -185,29 +208,31 @@ def parameters_of(file: Path, namespace: str | None = None, known: Container[str
         When there is no such file, it is no file of parameters, it has none for this robot, or, without a namespace,
         those of several robots.
     """
-    sections = _sections_of(file)
+    every = _sections_of(_yaml(file.read_text(encoding="utf-8", errors="replace")))
+    sections = {(above, name): some for above, name, some in every if name in (node, *ANY)}
+    if not sections:
+        raise WrongUseError(f"{file}: found no parameters in YAML, expected {node}: ros__parameters: name: value")
     robots = sorted({above for above, _ in sections if above})
     chosen = "".join(robots[:1]) if namespace is None else namespace.strip("/")
-    keys = [(above, node) for above in dict.fromkeys(("", chosen)) for node in (ANY, NODE)]
+    keys = [(above, name) for above in dict.fromkeys(("", chosen)) for name in (*ANY, node)]
     if sections.keys().isdisjoint(keys) or (namespace is None and len(robots) > 1):
         expected = "expected one; add --namespace" if namespace is None else f"expected those of /{chosen}"
         raise WrongUseError(f"{file}: found parameters of {', '.join(f'/{one}' for one in robots)}, {expected}")
     values: dict[str, Any] = {}
-    for above, node in keys:
-        section = _with_maps(sections.get((above, node), {}), file)
+    for key in keys:
+        section = _with_lists(sections.get(key, {}), str(file))
         # Parameters of all nodes may be meant for others.
-        values.update({name: value for name, value in section.items() if node == NODE or name in known})
+        values.update({name: value for name, value in section.items() if key[1] == node or name in known})
     return values
 
 
 def given_parameter(rule: str) -> dict[str, Any]:
     """Return a parameter of the command line, ``name:=value``, by the name of its option; raises `WrongUseError`."""
     name, _, text = rule.partition(":=")
-    node, _, name = name.rpartition(":")
     value = _yaml(text)
-    if not name or value is None or node.strip("/").rpartition("/")[2] not in ("", NODE):
+    if not name or value is None:
         raise WrongUseError(f"-p: found {rule[:80]!r}, expected NAME:=VALUE, such as agree:=5")
-    return _with_maps({name: value}, Path("-p"))
+    return _with_lists({name: value}, "-p")
 
 
 def _yaml(text: str) -> Any:
@@ -215,33 +240,29 @@ def _yaml(text: str) -> Any:
     from formats.files import load_yaml
     from registration import InputError
 
-    try:
+    with suppress(InputError):
         return load_yaml(text)
-    except InputError:
-        return None
+    return None
 
 
-def _with_maps(section: dict[str, Any], file: Path) -> dict[str, Any]:
-    """Return a section with `map`, a text, or `maps`, a list, as the option that takes both; raises `WrongUseError`."""
+def _with_lists(section: dict[str, Any], source: str) -> dict[str, Any]:
+    """Return a section with `map` and `maps` as the option that takes both, and one scan as a list of one."""
     others = {name: value for name, value in section.items() if value is not None}
-    one, several = others.pop("map", None), others.pop("maps", None) or []
-    maps = [*([] if one is None else [one]), *(several if isinstance(several, list) else [several])]
+    lists = {name: others.pop(name, []) for name in ("map", "maps", "scan")}
+    one, several, scans = (value if isinstance(value, list) else [value] for value in lists.values())
+    maps = [*one, *several]
     if not all(isinstance(name, str) for name in maps):
-        raise WrongUseError(
-            f"{file}: found {str(maps)[:80]}, expected map: NAME, or maps: [NAME, ...] with names of maps"
-        )
-    return {**others, "on": maps} if maps else others
+        raise WrongUseError(f"{source}: found {str(maps)[:80]}, expected map: NAME, or maps: [NAME, ...]")
+    return {**others, **({"on": maps} if maps else {}), **({"scan": scans} if scans else {})}
 
 
-def _sections_of(file: Path) -> Sections:
-    """Return the sections of the node by namespace and name of the node."""
-    document = _yaml(file.read_text(encoding="utf-8", errors="replace"))
-    sections: Sections = {}
+def _sections_of(document: Any, above: str = "") -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield namespace, name of the node and parameters of each section; namespaces may be nested."""
     for name, inner in document.items() if isinstance(document, dict) else ():
-        above, _, node = str(name).strip("/").rpartition("/")
+        path = f"{above}/{name}".strip("/")
+        space, _, node = path.rpartition("/")
         parameters = inner.get("ros__parameters") if isinstance(inner, dict) else None
-        if node in (NODE, ANY) and isinstance(parameters, dict):
-            sections[above, node] = {str(key): value for key, value in parameters.items()}
-    if not sections:
-        raise WrongUseError(f"{file}: found no parameters in YAML, expected {NODE}: ros__parameters: name: value")
-    return sections
+        if isinstance(parameters, dict):
+            yield "" if space in ANY else space, node, {str(key): value for key, value in parameters.items()}
+        else:
+            yield from _sections_of(inner, path)

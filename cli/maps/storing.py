@@ -57,10 +57,6 @@ def remove(map_id: MapId, where: Where) -> None:
 
 
 @grouped
-def draw(
-    on: MapArgument,
-    out: Annotated[Path, required("File to write: png.", "FILE")],
-    where: Where,
-) -> None:
+def draw(on: MapArgument, out: Annotated[Path, required("File to write: png.", "FILE")], where: Where) -> None:
     """Draw a map: walls in grey, a blue tick on the free side of each."""
     draw_picture(where.whole_map(read_map_or_id(on)), out)
