@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+import sqlite3
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from sqlalchemy import URL, Connection, Row, Select, Table, bindparam, delete, func, insert, select, update
-from sqlalchemy.exc import IntegrityError
+from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from ..database_location import file_of
 from ..errors import (
@@ -41,6 +42,7 @@ T = TypeVar("T")
 EVERY_REVISION = range(1, 1 << 63)
 BEYOND = "\x7f"  # every letter that an id may have comes before it
 BYTES_OF_ID = 500  # that an id takes in addition to its map, about
+MOST_KNOWN = 4096  # records that are held until another is written
 SHARE = 0.5  # of all bytes, that maps whose ids begin alike may take: as of memory, no key has more than half
 logger = logging.getLogger("linefix")
 _BY_ID = select(maps).where(maps.c.map_id == bindparam("which"))
@@ -102,6 +104,9 @@ class MapStore:
         self._at_once = open_engine(url, at_once=True)
         self._most_bytes = most_bytes
         self._opened = False
+        self._watching: Any = None  # a connection of its own to the file
+        self._version: object = None
+        self._known: dict[str, MapRecord] = {}
 
     def open(self) -> None:
         """Make sure that the tables exist and are of this version; the other methods do it on their first use."""
@@ -115,6 +120,9 @@ class MapStore:
 
     def close(self) -> None:
         """Close all connections."""
+        if self._watching is not None:
+            self._watching.close()
+            self._watching = None
         self._at_once.dispose()
         self._engine.dispose()
 
@@ -184,12 +192,24 @@ class MapStore:
     def record_at_once(self, map_id: str) -> MapRecord | None:
         """Return the record of the present content if no wait is needed; None where `record` has to read it.
 
-        A file is read in microseconds; while another process writes to it, this method does not wait. A server may
-        take any time to answer.
+        A file is read in microseconds, and only if it was written to since the last look; while another process writes
+        to it, this method does not wait. A server may take any time to answer.
         """
         if self._file is None or not self._opened or not self._file.is_the_same:
             return None
-        return self._looked_up(map_id)
+        try:
+            if self._watching is None:
+                self._watching, self._version = self._at_once.raw_connection(), None
+            version = self._watching.cursor().execute("PRAGMA data_version").fetchall()
+        except (DBAPIError, sqlite3.Error):
+            return None
+        if version != self._version or len(self._known) >= MOST_KNOWN:
+            self._known.clear()
+            self._version = version
+        found = self._known.get(map_id) or self._looked_up(map_id)
+        if found is not None:
+            self._known[map_id] = found  # one that is newer than this version goes at the next look
+        return found
 
     def load(self, map_id: str) -> StoredMap:
         """Return a map, its checksum tested; a map that fails the test is quarantined."""
