@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import random
 import re
@@ -19,11 +20,12 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from cosmic_ray.commands import execute, init
-from cosmic_ray.config import ConfigDict
+from cosmic_ray.commands import init
+from cosmic_ray.mutating import mutate_and_test
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
 
+from .seen import RECORD, Record
 from .suites import SUITES, Suite, changed_lines, known_equivalents, suite_of
 
 ROOT = Path(__file__).parents[2]
@@ -33,8 +35,9 @@ LEFT_OUT = ("tuning.py", "layout.py", "examples.py")
 """Modules and folders of measured numbers or of names."""
 WITHOUT_EFFECT = re.compile(r"core/(RemoveDecorator|ReplaceBinaryOperator_BitOr_\w+|ExceptionReplacer)")
 """Operators whose mutants seldom differ at run time: `int | None` in annotations, decorators of kernels and caches."""
-TIMEOUT = 900.0  # s for the tests of one mutant; a mutated kernel is compiled first, 90 s of processor time
-PYTEST = "-x -q -p no:cacheprovider --tb=line -m"
+STARTING, COMPILING = 120.0, 900.0  # s for the tests of one mutant; after a mutated kernel all are compiled again
+PATIENCE = 3.0  # times as long as all tests of the suite took
+PYTEST = "-x -q -p no:cacheprovider -p benchmarks.mutants.seen --tb=line -m"
 SKIPPED = WorkResult(worker_outcome=WorkerOutcome.SKIPPED)
 
 
@@ -79,14 +82,41 @@ def prepare(session: Path, modules: Sequence[Path], count: int, seed: int) -> No
 
 
 def run(session: Path, suite: Suite) -> None:
-    """Run the tests of a suite for each mutant of a session that has no result; call it in the copy of the code."""
-    compiled = "" if suite.compiled else "env NUMBA_DISABLE_JIT=1 "
-    command = f"{compiled}{shlex.quote(sys.executable)} -m pytest {PYTEST} 'not long' {shlex.join(suite.tests)}"
-    if subprocess.run(shlex.split(command), stdout=subprocess.DEVNULL, check=False).returncode:
-        raise SystemExit(f"these tests fail without any mutant; run them in {Path.cwd()}: {command}")
-    config = ConfigDict({"test-command": command, "timeout": TIMEOUT, "distributor": {"name": "local"}})
+    """Run the tests of a suite for each mutant of a session that has no result; call it in the copy of the code.
+
+    The tests that call the mutated function run first, the fastest before. Others follow only where the suite starts
+    processes, whose calls are not recorded, or where no test calls the function.
+    """
+    record = _recorded(session.with_suffix(".json"), suite)
+    chosen = session.with_suffix(".tests").absolute()
     with use_db(str(session), WorkDB.Mode.open) as database:
-        execute(database, config)
+        for item in list(database.pending_work_items):
+            mutation = item.mutations[0]
+            first = record.order(str(mutation.module_path), mutation.start_pos[0])
+            rest = [] if first and not suite.processes else [test for test in record.tests if test not in first]
+            chosen.write_text("\n".join(first + rest))
+            compiles = "kernels" in mutation.module_path.parts
+            timeout = COMPILING + PATIENCE * record.seconds() if compiles else STARTING + PATIENCE * record.seconds()
+            written = mutation.module_path.stat()
+            result = mutate_and_test(item.mutations, _command(suite, f"@{chosen}"), timeout)
+            os.utime(mutation.module_path, ns=(written.st_atime_ns, written.st_mtime_ns))  # Numba's cache compares it
+            database.set_result(item.job_id, result)
+
+
+def _recorded(path: Path, suite: Suite) -> Record:
+    """Return which functions the tests of a suite call; they run where that is not on record."""
+    if not path.exists():
+        command = shlex.split(_command(suite, *suite.tests))
+        environment = os.environ | {RECORD: str(path.absolute())}
+        if subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False).returncode:
+            path.unlink(missing_ok=True)
+            raise SystemExit(f"these tests fail without any mutant; run them in {Path.cwd()}: {shlex.join(command)}")
+    return Record(json.loads(path.read_text()))
+
+
+def _command(suite: Suite, *tests: str) -> str:
+    compiled = "" if suite.compiled else "env NUMBA_DISABLE_JIT=1 "
+    return f"{compiled}{shlex.quote(sys.executable)} -m pytest {PYTEST} 'not long' {shlex.join(tests)}"
 
 
 def report(sessions: dict[str, list[Path]]) -> Iterator[str]:

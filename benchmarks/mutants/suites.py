@@ -17,11 +17,14 @@ class Suite:
     ----------
     tests : tuple of str
         Folders and files.
+    processes : bool
+        True where tests start processes that run the code.
     compiled : bool
         True where kernels are compiled; where few tests call them, plain Python is faster.
     """
 
     tests: tuple[str, ...]
+    processes: bool = False
     compiled: bool = True
 
 
@@ -43,29 +46,32 @@ SUITES = {
         (
             "tests/service/admission",
             *(f"tests/service/http/test_{name}.py" for name in ("busy", "roles", "pages_of_others")),
-        )
+        ),
+        processes=True,
     ),
-    "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
+    "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py"), processes=True),
     "service/parsing/": Suite(
-        ("tests/service/parsing", "tests/service/http/test_bodies.py", "tests/service/http/test_refusals.py")
+        ("tests/service/parsing", "tests/service/http/test_bodies.py", "tests/service/http/test_refusals.py"),
+        processes=True,
     ),
-    "service/telemetry/": Suite(("tests/service/telemetry",)),
-    "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py")),
+    "service/telemetry/": Suite(("tests/service/telemetry",), processes=True),
+    "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py"), processes=True),
     "cli/": Suite(("tests/cli",)),
-    "service/http/": Suite(("tests/service/http",)),
-    "linefix/documents/": Suite(("tests/linefix/documents", "tests/service/http")),
+    "service/http/": Suite(("tests/service/http",), processes=True),
+    "linefix/documents/": Suite(("tests/linefix/documents", "tests/service/http"), processes=True),
     "linefix/": Suite(("tests/linefix",)),
     "formats/": Suite(("tests/formats",)),
-    "batch/": Suite(("tests/batch",)),
-    "ros2/": Suite(("tests/ros2",)),
-    "service/work/": Suite(("tests/service/work", "tests/service/http")),
+    "batch/": Suite(("tests/batch",), processes=True),
+    "ros2/": Suite(("tests/ros2",), processes=True),
+    "service/work/": Suite(("tests/service/work", "tests/service/http"), processes=True),
     "service/": Suite(
         (
             "tests/service/test_settings.py",
             "tests/service/maps/test_database.py",
             "tests/service/process",
             "tests/service/http/test_operations.py",
-        )
+        ),
+        processes=True,
     ),
 }
 """By the beginning of a module's path; the first entry that fits is used."""
