@@ -58,12 +58,21 @@ SUITES = {
     "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py"), processes=True),
     "cli/": Suite(("tests/cli",)),
     "service/http/": Suite(("tests/service/http",), processes=True),
-    "linefix/documents/": Suite(("tests/linefix/documents", "tests/service/http"), processes=True),
-    "linefix/": Suite(("tests/linefix",)),
+    "linefix/documents/": Suite(
+        (
+            "tests/linefix/documents",
+            *(f"tests/service/http/test_{name}.py" for name in ("refusals", "answers", "scans", "openapi", "quality")),
+        ),
+        processes=True,
+    ),
+    "linefix/": Suite(("tests/linefix", "tests/cli")),
     "formats/": Suite(("tests/formats",)),
     "batch/": Suite(("tests/batch",), processes=True),
     "ros2/": Suite(("tests/ros2",), processes=True),
-    "service/work/": Suite(("tests/service/work", "tests/service/http"), processes=True),
+    "service/work/": Suite(
+        ("tests/service/work", *(f"tests/service/http/test_{name}.py" for name in ("busy", "waiting", "answers"))),
+        processes=True,
+    ),
     "service/": Suite(
         (
             "tests/service/test_settings.py",
