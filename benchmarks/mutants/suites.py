@@ -37,10 +37,8 @@ SUITES = {
     "vectorization/": Suite(("tests/vectorization",)),
     "association/index/kernels/": Suite(("tests/association/test_map_index.py",)),
     "association/scan/kernels/joining.py": Suite(("tests/association/kernels",)),
-    "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),
-    "map_quality/analyze/": Suite(("tests/map_quality/analyze",)),
     "map_quality/": Suite(("tests/map_quality",)),
     "service/admission/": Suite(
         (
