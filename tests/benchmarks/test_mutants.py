@@ -33,6 +33,10 @@ from package.module import larger
 def test_larger() -> None:
     assert larger(2.0, 1.0)
     assert not larger(1.0, 2.0)
+
+
+def test_nothing() -> None:
+    pass
 """
 
 
@@ -48,7 +52,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.long
 def test_a_run_reports_the_mutants_that_no_test_notices(project: Path) -> None:
-    """`x >= y` differs from `x > y` only for equal numbers, which the tests leave out."""
+    """`x >= y` differs from `x > y` only for equal numbers, which the tests leave out; one test does not call it."""
     session = project / "session.sqlite"
     prepare(session, modules_of(project, "package"), 0, 1)
     run(session, Suite(("test_module.py",)))
@@ -58,6 +62,7 @@ def test_a_run_reports_the_mutants_that_no_test_notices(project: Path) -> None:
     assert int(killed) == int(ran) - len(survivors)
     assert equal == "0"
     assert survivors == ["package/module.py:9  return x > y  ->  return x >= y"]
+    assert session.with_suffix(".tests").read_text() == "test_module.py::test_larger"
 
 
 @pytest.mark.long
