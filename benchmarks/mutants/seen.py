@@ -27,9 +27,12 @@ class Record:
     ----------
     tests : dict
         By the identifier of a test: its duration, s, and the functions as ``path:line``, in the order of the run.
+    failed : list of str
+        Tests that fail without any mutant, and are left out.
     """
 
     tests: dict[str, tuple[float, list[str]]]
+    failed: list[str]
 
     def order(self, module: str, line: int) -> list[str]:
         """Return the tests that call the function at a line, the fastest first; none where no test calls it."""
@@ -58,6 +61,7 @@ class _Recorder:
         self._now: set[CodeType] = set()
         self._fixtures: dict[str, set[CodeType]] = {}
         self._tests: dict[str, tuple[float, set[CodeType]]] = {}
+        self._failed: list[str] = []
 
     def trace(self, frame: FrameType, event: str, argument: object) -> None:
         self._now.add(frame.f_code)
@@ -90,6 +94,10 @@ class _Recorder:
         with self._into(self._fixtures.setdefault(fixturedef.argname, set())):
             return (yield)
 
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self._failed.append(report.nodeid)
+
     def pytest_sessionfinish(self) -> None:
         sys.settrace(None)
         here = f"{Path.cwd()}{os.sep}"
@@ -98,9 +106,11 @@ class _Recorder:
             for code in codes - names.keys():
                 names[code] = f"{code.co_filename.removeprefix(here)}:{code.co_firstlineno}"
         rows = {
-            test: (seconds, sorted({names[code] for code in codes})) for test, (seconds, codes) in self._tests.items()
+            test: (seconds, sorted({names[code] for code in codes}))
+            for test, (seconds, codes) in self._tests.items()
+            if test not in self._failed
         }
-        self._path.write_text(json.dumps(rows))
+        self._path.write_text(json.dumps({"tests": rows, "failed": self._failed}))
 
 
 def pytest_configure(config: pytest.Config) -> None:
