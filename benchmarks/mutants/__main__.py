@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import json
 import os
 import random
@@ -21,7 +22,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from cosmic_ray.commands import init
-from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.mutating import mutate_and_test, mutate_code
+from cosmic_ray.plugins import get_operator
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
 
@@ -58,13 +60,25 @@ def draw(items: Sequence[WorkItem], count: int, seed: int) -> set[str]:
     items : sequence of WorkItem
         All mutants of a package.
     count : int
-        Number of are drawn; 0 for all.
+        Number of mutants that are drawn; 0 for all.
     seed : int
     """
     able = [item for item in items if not WITHOUT_EFFECT.fullmatch(item.mutations[0].operator_name)]
     able.sort(key=_place_of)
-    drawn = random.Random(seed).sample(able, min(count, len(able))) if count else able
-    return {item.job_id for item in drawn}
+    random.Random(seed).shuffle(able)
+    compiling = (item.job_id for item in able if _compiles(item))
+    return set(itertools.islice(compiling, count or None))
+
+
+def _compiles(item: WorkItem) -> bool:
+    """Return whether a mutant is Python: `**options` as `+options` is not."""
+    mutation = item.mutations[0]
+    operator = get_operator(mutation.operator_name)(**mutation.operator_args)
+    try:
+        compile(mutate_code(mutation.module_path.read_text(), operator, mutation.occurrence), "", "exec")
+    except SyntaxError:
+        return False
+    return True
 
 
 def _place_of(item: WorkItem) -> tuple[str, tuple[int, int], str, int]:

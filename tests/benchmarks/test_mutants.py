@@ -75,6 +75,15 @@ def test_tests_that_fail_without_a_mutant_are_left_out(project: Path, capsys: py
     assert "test_module.py::test\n" in capsys.readouterr().out
 
 
+def test_what_is_no_python_is_not_drawn(project: Path) -> None:
+    rows = []
+    for value in ("{}", "{**values, **values}"):
+        (project / "package" / "module.py").write_text(f"def same(values):\n    return {value} is values\n")
+        prepare(project / value, modules_of(project, "package"), 0, 1)
+        rows += list(report({"package": [project / value]}))[1:]
+    assert rows[0] == rows[1]
+
+
 def test_changed_lines_are_read_from_a_diff() -> None:
     assert changed_lines("--- a\n+++ b\n@@ -1 +1 @@\n before\n-  x =  1\n+  x =  2\n") == ("x = 1", "x = 2")
 
