@@ -104,9 +104,10 @@ class _Recorder:
         names: dict[CodeType, str] = {}
         for _, codes in self._tests.values():
             for code in codes - names.keys():
-                names[code] = f"{code.co_filename.removeprefix(here)}:{code.co_firstlineno}"
+                if code.co_filename.startswith(here):
+                    names[code] = f"{code.co_filename.removeprefix(here)}:{code.co_firstlineno}"
         rows = {
-            test: (seconds, sorted({names[code] for code in codes}))
+            test: (seconds, sorted({names[code] for code in codes & names.keys()}))
             for test, (seconds, codes) in self._tests.items()
             if test not in self._failed
         }
