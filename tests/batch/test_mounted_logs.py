@@ -12,18 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from batch import associate_many
-from tests.cli.test_replay_bags import (
-    BEAMS,
-    MOUNT,
-    ROOM,
-    SECONDS,
-    STEP,
-    TWIST,
-    put_scan,
-    robots,
-    swept,
-    write_drive,
-)
+from tests.cli.test_replay_bags import BEAMS, MOUNT, ROOM, SECONDS, STEP, TWIST, put_scan, robots, swept, write_drive
 from tests.formats.bags import SECOND, Robots
 
 from .logs import rows

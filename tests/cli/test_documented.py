@@ -98,8 +98,7 @@ def options_of(command: Any) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "document",
-    ["reference/command-line.md", "reference/ros2.md", "reference/formats.md", "tutorials/map-and-log.md"],
+    "document", ["reference/command-line.md", "reference/ros2.md", "reference/formats.md", "tutorials/map-and-log.md"]
 )
 def test_every_option_that_is_named_is_there(document: str) -> None:
     text = (ROOT / "docs" / document).read_text()

@@ -41,8 +41,7 @@ def without_times(answer: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("repeats", "counts", "workers"),
-    [(10, ("4",), 1), pytest.param(1000, ("1", "2", "4"), 2, marks=pytest.mark.long)],
+    ("repeats", "counts", "workers"), [(10, ("4",), 1), pytest.param(1000, ("1", "2", "4"), 2, marks=pytest.mark.long)]
 )
 def test_the_same_answer_to_the_bit(
     service: RunningService,

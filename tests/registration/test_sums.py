@@ -15,13 +15,7 @@ from registration.layout import Floats
 from registration.options import Rotation
 
 from . import reference
-from .scenes import (
-    assert_close,
-    correspondences,
-    directed,
-    drawn,
-    noisy_pairs,
-)
+from .scenes import assert_close, correspondences, directed, drawn, noisy_pairs
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = settings(max_examples=20, deadline=None)

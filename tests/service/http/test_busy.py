@@ -18,15 +18,7 @@ from service.http.middleware import LATER
 from tests.running import RunningService, children_of, client_of, running, until
 from tests.service.importing.forms import TYPE, form
 from tests.service.parsing.bodies import large_map
-from tests.service.searches import (
-    POST,
-    post,
-    searched_briefly,
-    searched_for,
-    searching,
-    slow_to_index,
-    store_hard_map,
-)
+from tests.service.searches import POST, post, searched_briefly, searched_for, searching, slow_to_index, store_hard_map
 
 RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
 

@@ -41,7 +41,7 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
 def test_there_is_an_example_of_each_call(client: httpx.Client) -> None:
     calls = [path for path, item in client.get("/openapi.json").json()["paths"].items() if "post" in item]
     assert {path.replace("{map_id}", "hq-3") for path in calls} - {path for path, _ in EXAMPLES} == {
-        *("/v1/associate:batch", "/v1/analyze", "/v1/maps:import", "/v1/scans:import"),
+        *("/v1/associate:batch", "/v1/analyze", "/v1/maps:import", "/v1/scans:import")
     }
 
 

@@ -15,12 +15,7 @@ from sqlalchemy import inspect, text
 
 from service.app import create_app
 from service.database_location import database_url
-from service.errors import (
-    CorruptMapError,
-    ReadOnlyStoreError,
-    StoreAwayError,
-    StoreFullError,
-)
+from service.errors import CorruptMapError, ReadOnlyStoreError, StoreAwayError, StoreFullError
 from service.maps import MapStore
 from service.settings import Settings
 

@@ -14,13 +14,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
-from service.errors import (
-    BusyStoreError,
-    CorruptMapError,
-    ReadOnlyStoreError,
-    StoreFullError,
-    UnknownMapError,
-)
+from service.errors import BusyStoreError, CorruptMapError, ReadOnlyStoreError, StoreFullError, UnknownMapError
 from service.maps import MapOutline, MapRecord, MapStore, Preconditions
 from service.maps import database as connections
 from service.maps.store import ANY, logger
