@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from map_quality import ChangeCode, KeptCode
@@ -17,7 +17,7 @@ from .sensors import LaserScan
 from .strict import Answer, Coordinate, DeadlineMs, FreeJson, Index, Pose, Referenced, Row2, Row4, Share, Strict
 
 MOST_VISITS = 100
-MOST_NEW = 10_000  # segments of one change
+MOST_NEW = 10_000  # segments of all changes; each is an object, and takes a kilobyte
 _SegmentIndex = Annotated[int, Field(ge=0, le=10_000_000)]
 
 
@@ -361,7 +361,8 @@ class ApplyRequest(Referenced):
     map
         the old map, as the update had it
     changes
-        as the update returned them; `accepted` of each says whether it is in the new map
+        as the update returned them, with at most 10,000 new segments together; `accepted` of each says whether it is in
+        the new map
     sharpened
         as the update returned it
     """
@@ -369,6 +370,15 @@ class ApplyRequest(Referenced):
     map: MapDocument
     changes: Annotated[list[ProposedChange], Field(max_length=10_000)]
     sharpened: SharpenedWalls | None = None
+
+    @field_validator("changes")
+    @classmethod
+    def _few_new(cls, value: list[ProposedChange]) -> list[ProposedChange]:
+        if (count := sum(len(one.new) for one in value)) > MOST_NEW:
+            raise PydanticCustomError(
+                "new", f"expected at most {MOST_NEW} new segments of all changes, found {count}; accept fewer at once"
+            )
+        return value
 
 
 class ApplyAnswer(ReferencedAnswer):

@@ -123,6 +123,7 @@ class Exchange(Job):
                     await self.sink({"type": "http.response.body", "body": piece, "more_body": rest})
             except TimeoutError:
                 raise HangUpError from None  # the server ends the connection
+            await asyncio.sleep(0)  # the server waits for slow readers only: a fast one would hold up everything else
 
     async def _drop_rest(self) -> None:
         """Read the rest of the body and drop it, as far as it comes soon and is not too much."""

@@ -138,6 +138,7 @@ SEEN = examples.UPDATE["visits"][1]["scans"][0]
 BOX = {"code": "removed", "segments": [], "new": []}
 ONE, TWO = ({**BOX, "segments": [number]} for number in (1, 2))
 SHARP = {"segments": [1], "ends": [[0.0, 0.0, 1.0, 0.0]], "sigma": [0.01]}
+MANY = [{"segment": [1, 1, 2, 1], "sigma": 0.0}] * 5_001
 
 
 def visited(**more: Any) -> dict[str, Any]:
@@ -189,6 +190,7 @@ OTHERS: list[tuple[str, dict[str, Any], str, str]] = [
     (APPLY, {"changes": [{**ONE, "accepted": False}, TWO, TWO]}, "/changes/2", "named before"),
     (APPLY, {"changes": [{**BOX, "segments": [*range(4)]}]}, "/changes", "no segment that is left"),
     (APPLY, {"changes": [{**BOX, "new": [{"segment": [1, 1, 1, 1], "sigma": 0.0}]}]}, "/changes/0/new/0", "shorter"),
+    (APPLY, {"changes": [{**BOX, "new": MANY}] * 2}, "/changes", "expected at most 10000 new segments of all changes"),
     (APPLY, {"sharpened": {**SHARP, "segments": [99]}}, "/sharpened/segments", ""),
     (APPLY, {"sharpened": {**SHARP, "sigma": []}}, "/sharpened", ""),
 ]
