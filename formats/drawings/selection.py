@@ -45,7 +45,9 @@ TYPES = (
     "type", "kind", "class", "category", "element", "element_type", "entity_type", "object", "object_type",
     "objecttype", "fclass", "ifc_type", "ifctype", "ifcclass", "ifc_class",
 )  # fmt: skip
+DOORS = ("door", "tuer", "tür", "puerta", "porte", "porta")  # begins of words in names of blocks
 NOT_SEEN = {
+    "block": [f"{before}{door}*" for door in DOORS for before in ("", "*[/_$ -]")],
     **dict.fromkeys(("highway", "footway", "railway", "waterway", "landuse", "door", "entrance", "area:highway"), "*"),
     **dict.fromkeys(("power", "boundary", "route", "aeroway", "aerialway", "public_transport", "place"), "*"),
     **dict.fromkeys(TYPES, KINDS),

@@ -50,8 +50,8 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
             1,
         )
     low, high = _limits(float(message.range_min), float(message.range_max), notes)
-    if high == math.inf:
-        ranges = np.where(np.isinf(ranges), math.nan, ranges)
+    # Drivers report the greatest range itself where nothing came back, and AMCL takes it so.
+    ranges = np.where(ranges == high, math.nan if high == math.inf else math.inf, ranges)
     scan = LaserScan(first, step, ranges, low, high)
     note_far(scan, notes)
     return scan

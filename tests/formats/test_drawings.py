@@ -56,6 +56,8 @@ def test_blocks_are_taken_apart_where_they_stand(tmp_path: Path) -> None:
     outer.add_blockref("WALL", (0, 0))
     outer.add_blockref("WALL", (0, 1))
     document.modelspace().add_blockref("TWO", (10, 20), dxfattribs={"rotation": 90})
+    document.blocks.new("A-Door 90").add_line((0, 0), (1, 0))  # an open leaf
+    document.modelspace().add_blockref("A-Door 90", (0, 0))
     # Turned by a quarter: (x, y) becomes (10 - y, 20 + x).
     assert rows(read_map(saved(tmp_path, document))) == [[10, 20, 10, 22], [9, 20, 9, 22]]
 

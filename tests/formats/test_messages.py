@@ -130,6 +130,7 @@ def test_a_costmap_without_a_rim_is_a_map_with_a_note(recording: Recording) -> N
 FLT_MAX = float(np.finfo(np.float32).max)
 LEAST = 0.0, math.nan, -1.0, math.inf, -math.inf
 MIXED = (2.0,) * 89 + (math.inf, 0.0)  # two beams without a return, as one driver and another write them
+CLIPPED = {"ranges": (2.0,) * 89 + (10.0, 0.0), "range_max": 10.0}  # and a third
 
 
 def read_scans(tmp_path: Path, *lasers: Laser) -> tuple[list[LaserScan], Log]:
@@ -154,9 +155,9 @@ def test_a_greatest_range_that_says_nothing_leaves_readings_and_no_free_space(tm
     assert f"range_max is {np.float32(most):g} m" in notes(log)["range_max"].message
 
 
-@pytest.mark.parametrize("fields", [{}, {"range_max": 1000.0}, *({"range_min": least} for least in LEAST)])
-def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, fields: dict[str, float]) -> None:
-    (laser,), log = read_scans(tmp_path, USUAL.but(ranges=MIXED, **fields))
+@pytest.mark.parametrize("fields", [{}, CLIPPED, {"range_max": 1000.0}, *({"range_min": least} for least in LEAST)])
+def test_a_least_range_that_is_none_is_taken_as_0(tmp_path: Path, fields: dict[str, Any]) -> None:
+    (laser,), log = read_scans(tmp_path, USUAL.but(**{"ranges": MIXED, **fields}))
     np.testing.assert_array_equal(laser.cleaned, (2.0,) * 89 + (math.inf, math.nan))
     assert assumed(log) == ({"range_min": 1} if fields.get("range_min") else {})
 

@@ -232,8 +232,8 @@ def test_what_is_hidden_is_counted(tmp_path: Path) -> None:
 
 def test_invisible_entities_and_blocks(tmp_path: Path) -> None:
     """Dynamic blocks hide their other states so."""
-    doors: list[Part] = [("DOOR", "0"), ("DOOR", "0", INVISIBLE), (3, "0", INVISIBLE)]
-    found = read(tmp_path, plan({"DOOR": [(1, "0"), (2, "0", INVISIBLE)]}, doors), "*")
+    desks: list[Part] = [("DESK", "0"), ("DESK", "0", INVISIBLE), (3, "0", INVISIBLE)]
+    found = read(tmp_path, plan({"DESK": [(1, "0"), (2, "0", INVISIBLE)]}, desks), "*")
     assert lengths(found) == [1]
     assert notes(found)["invisible"].count == 3
 
