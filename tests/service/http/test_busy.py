@@ -122,9 +122,8 @@ def test_reading_files_takes_no_place_of_a_search(busy: RunningService) -> None:
     curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
     before = children_of(busy.process.pid)
     body = bytes(form({"a.svg": curves}))
-    importing = threading.Thread(
-        target=lambda: busy.client.post("/v1/maps:import", content=body, headers={"content-type": TYPE})
-    )
+    sent = {"content": body, "headers": {"content-type": TYPE}}
+    importing = threading.Thread(target=busy.client.post, args=("/v1/maps:import",), kwargs=sent)
     importing.start()
     with client_of(busy.url) as client:
         until(lambda: len(children_of(busy.process.pid) - before) > 0)

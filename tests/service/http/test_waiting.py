@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
-from itertools import count
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ import pytest
 
 from linefix.documents import examples
 from service.http.exchange import WATCH_AFTER, Exchange, HangUpError
+from service.services import Services
+from service.settings import Settings
 from tests.running import RunningService, asked_again, client_of, until
 from tests.service.conftest import empty_database
 from tests.service.lines import Line
@@ -115,3 +117,24 @@ def test_the_work_for_a_client_that_hung_up_ends(ends: tuple[str, ...]) -> None:
         await asyncio.sleep(0)  # and this task goes on
 
     asyncio.run(asyncio.wait_for(scenario(), 10.0))
+
+
+def test_others_run_between_the_pieces_of_a_large_answer(tmp_path: Path) -> None:
+    """A server waits for slow readers only: for a fast one, ten megabytes went in one turn of the event loop."""
+    turns = list[str]()
+
+    async def sink(message: Any = None) -> Any:
+        turns.append("a piece")
+
+    async def scenario() -> None:
+        head: dict[str, Any] = {"scope": {"headers": []}, "source": sink, "sink": sink}
+        exchange = Exchange(request_id="x", services=Services(Settings(data_dir=tmp_path)), **head)
+        sent = asyncio.create_task(exchange.send({"type": "http.response.body", "body": bytes(1_000_000)}))
+        while not sent.done():
+            turns.append("others")
+            await asyncio.sleep(0)
+        exchange.services.close()
+
+    asyncio.run(scenario())
+    assert turns.count("a piece") > 20
+    assert ("a piece", "a piece") not in pairwise(turns)

@@ -26,11 +26,8 @@ DASHBOARD = json.loads((Path(__file__).parents[3] / "deploy" / "grafana.json").r
 
 def asked_for() -> dict[str, str]:
     """Every expression of the dashboard, by the panel that it is in."""
-    return {
-        f"{panel['title']} {target['refId']}": target["expr"]
-        for panel in DASHBOARD["panels"]
-        for target in panel["targets"]
-    }
+    panels = DASHBOARD["panels"]
+    return {f"{panel['title']} {one['refId']}": one["expr"] for panel in panels for one in panel["targets"]}
 
 
 def exercise(client: httpx.Client) -> str:
@@ -64,17 +61,16 @@ def test_the_dashboard_shows_all_that_is_counted(client: httpx.Client) -> None:
 
 
 def test_the_log_names_request_map_and_verdict(service: RunningService) -> None:
-    running = service
-    running.client.delete("/v1/maps/hq-3")
+    service.client.delete("/v1/maps/hq-3")
     stored = {**examples.ASSOCIATE, "map": {"map_id": "hq-3"}}
-    stored_as = running.client.put("/v1/maps/hq-3", json=examples.MAP).json()["revision"]
-    running.client.post("/v1/associate", json=stored, headers={"x-request-id": "robot-7"})
-    running.client.post("/v1/associate", json=examples.ASSOCIATE, headers={"x-request-id": "inline"})
+    stored_as = service.client.put("/v1/maps/hq-3", json=examples.MAP).json()["revision"]
+    service.client.post("/v1/associate", json=stored, headers={"x-request-id": "robot-7"})
+    service.client.post("/v1/associate", json=examples.ASSOCIATE, headers={"x-request-id": "inline"})
     batch = {**examples.BATCH, "map": {"map_id": "hq-3"}, "scans": [{"segments": examples.SEEN}, {}], "priors": None}
-    running.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
-    running.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
-    until(lambda: '"request_id":"wrong"' in running.log())  # a line is written after its answer is sent
-    lines = [json.loads(line) for line in running.log().splitlines()]
+    service.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
+    service.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
+    until(lambda: '"request_id":"wrong"' in service.log())  # a line is written after its answer is sent
+    lines = [json.loads(line) for line in service.log().splitlines()]
     by_id = {line["request_id"]: line for line in lines if line["message"] == "request"}
     for line in by_id.values():
         assert {"time", "level", "method", "route", "status", "ms"} <= line.keys()
