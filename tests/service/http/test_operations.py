@@ -17,8 +17,7 @@ from tests.running import RunningService, until
 
 
 def test_probes_and_version(client: httpx.Client) -> None:
-    assert client.get("/livez").json() == {"status": "ok"}
-    assert client.get("/readyz").json() == {"status": "ok"}
+    assert client.get("/livez").json() == client.get("/readyz").json() == {"status": "ok"}
     assert client.get("/version").json()["name"] == "linefix"
     assert client.get("/v1/limits").json()["max_batch"] == 256
 
