@@ -34,7 +34,8 @@ BEGINNINGS = {
     b"RIFF": "is a WebP; save it as PNG",
     b"#ROSBAG V2.0": "is a bag of ROS 1; its name has to end in .bag",
     b"\x89MCAP": "is an MCAP file; its name has to end in .mcap",
-    b"SQLite format 3": "is a bag of ROS 2 in SQLite; its name has to end in .db3",
+    b"\0\0\x27\x0a": "is a Shapefile; save it as GeoJSON, in UTM",
+    b"SQLite format 3": "is a GeoPackage; save it as GeoJSON, in UTM; the name of a bag of ROS 2 has to end in .db3",
 }
 WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 

@@ -49,6 +49,11 @@ TEXTS = (".log", ".clf", ".carmen")
 LOG_SUFFIXES = (*BAG_SUFFIXES, *TEXTS)
 """Of files that `read_log` reads."""
 PICTURES = (".png", ".pgm", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".gif", ".webp")
+INSTEAD = {
+    **dict.fromkeys((".osm", ".kml"), "; save it as GeoJSON, in UTM, such as with QGIS"),
+    ".pbstream": "; write its grid with cartographer_pbstream_to_ros_map",
+    **dict.fromkeys((".posegraph", ".data"), "; save the map of slam_toolbox with map_saver_cli"),
+}
 DEFAULT_LOG_OPTIONS = LogOptions()
 
 
@@ -127,8 +132,8 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_LOG_OPT
 def _unsupported(file: Path, what: str, suffixes: tuple[str, ...]) -> UnsupportedFormatError:
     if file.suffix.lower() in PICTURES:
         return UnsupportedFormatError("is a picture, which has no scale of its own; give the YAML file of the map")
-    known = ", ".join(suffixes)
-    return UnsupportedFormatError(f"expected {what} that ends in one of {known}, found {ending_of(file)}")
+    known, instead = ", ".join(suffixes), INSTEAD.get(file.suffix.lower(), "")
+    return UnsupportedFormatError(f"expected {what} that ends in one of {known}, found {ending_of(file)}{instead}")
 
 
 def _require_use(options: ImportOptions, suffix: str) -> None:

@@ -29,6 +29,8 @@ def read_json(path: Path, drawing: Drawing) -> None:
     told = {"segments": root} if isinstance(root, list) else root
     if not isinstance(told, dict) or not isinstance(told.get("segments"), list):
         found = kind_of(told)
+        if isinstance(told, dict) and {"features", "coordinates", "geometry"} & told.keys():
+            raise MalformedFileError("is GeoJSON; its name has to end in .geojson")
         if isinstance(told, dict):
             found = f"{kind_of(told['segments'])}" if "segments" in told else f"an object with {first_of(list(told))}"
         raise MalformedFileError(f'expected {{"segments": [[x1, y1, x2, y2], ...]}}, found {found}')

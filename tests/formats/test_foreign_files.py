@@ -32,6 +32,7 @@ GRID = "image: map.{}\nresolution: 0.05\norigin: [0, 0, 0]\n"
         (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
         (b"<!DOCTYPE html>", "download the file again"),
         (b"# .PCD v.7", "point cloud"),
+        (b"\0\0\x27\x0a", "save it as GeoJSON"),
         (b"#ROSBAG V2.0\n", r"has to end in \.bag"),
         (b"\x89MCAP0\r\n", r"has to end in \.mcap"),
     ],
