@@ -198,9 +198,13 @@ class MapStore:
         if self._file is None or not self._opened or not self._file.is_the_same:
             return None
         try:
-            if self._watching is None:
-                self._watching, self._version = self._at_once.raw_connection(), None
-            version = self._watching.cursor().execute("PRAGMA data_version").fetchall()
+            watching = self._watching
+            if watching is None:
+                made = self._at_once.raw_connection()
+                made.detach()  # not the pool's any more: versions of two connections have nothing in common
+                self._watching = watching = made.dbapi_connection
+                self._known.clear()
+            version = watching.execute("PRAGMA data_version").fetchall()
         except (DBAPIError, sqlite3.Error):
             return None
         if version != self._version or len(self._known) >= MOST_KNOWN:
