@@ -35,9 +35,13 @@ class Record:
     failed: list[str]
 
     def order(self, module: str, line: int) -> list[str]:
-        """Return the tests that call the function at a line, the fastest first; none where no test calls it."""
+        """Return the tests that call the function at a line, the fastest first; none where no test calls it.
+
+        Of a line outside of functions, the tests that call some function of the module.
+        """
         place = function_at(Path(module), line)
-        called = [(seconds, test) for test, (seconds, functions) in self.tests.items() if place in functions]
+        wanted = place.__eq__ if place else lambda function: function.startswith(f"{module}:")
+        called = [(seconds, test) for test, (seconds, functions) in self.tests.items() if any(map(wanted, functions))]
         return [test for _, test in sorted(called)]
 
     def seconds(self) -> float:
