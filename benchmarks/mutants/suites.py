@@ -61,7 +61,7 @@ SUITES = {
             "tests/linefix/documents",
             *(f"tests/service/http/test_{name}.py" for name in ("refusals", "answers", "scans", "openapi", "quality")),
         ),
-        processes=True,
+        processes=False,
     ),
     "linefix/": Suite(("tests/linefix", "tests/cli")),
     "formats/": Suite(("tests/formats",)),

@@ -180,7 +180,7 @@ def moved(distance: float = 0.0, angle: float = 0.0) -> RigidTransform:
         ({"probability": None}, False),
         ({"pose": None}, False),
         *(({"pose": moved(**{by: part})}, agreed)
-          for by in ("distance", "angle") for part, agreed in ((0.95, True), (1.1, False))),
+          for by in ("distance", "angle") for part, agreed in ((0.95, True), (-0.95, True), (1.1, False), (-1.1, False))),
         ({"map_id": "another"}, False),
         ({"reasons": (Reason("prior_contradicted", ""),)}, False),
         ({"reasons": (Reason("map_mismatch", ""),)}, True),
