@@ -149,6 +149,7 @@ def visited(**more: Any) -> dict[str, Any]:
 OTHERS: list[tuple[str, dict[str, Any], str, str]] = [
     (REGISTER, {"correspondences": [[0, 0], [1, 4]]}, "/correspondences/1", ""),
     (REGISTER, {"scan": {"segments": ROOM[:3]}}, "/correspondences", ""),
+    (REGISTER, {"map": {"segments": ROOM[:3]}}, "/correspondences", "4 scan and 3 map segments"),
     (REGISTER, PAIRS, "/scan/sigma", ""),
     (ASSOCIATE, {"client_ref": json.loads("[" * 200 + "]" * 200)}, "/client_ref", ""),
     (ASSOCIATE, {"client_ref": "x" * 20_000}, "/client_ref", "expected at most 16384 bytes of JSON, found 20002"),
