@@ -59,9 +59,9 @@ SUITES = {
     "linefix/documents/": Suite(
         (
             "tests/linefix/documents",
-            *(f"tests/service/http/test_{name}.py" for name in ("refusals", "answers", "scans", "openapi", "quality")),
+            *(f"tests/service/http/test_{name}.py" for name in ("refusals", "answers", "scans", "contract", "quality")),
         ),
-        processes=False,
+        processes=True,
     ),
     "linefix/": Suite(("tests/linefix", "tests/cli")),
     "formats/": Suite(("tests/formats",)),
