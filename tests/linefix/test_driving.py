@@ -179,8 +179,8 @@ def moved(distance: float = 0.0, angle: float = 0.0) -> RigidTransform:
         ({"probability": AGREED_PROBABILITY - 1e-9}, False),
         ({"probability": None}, False),
         ({"pose": None}, False),
-        *(({"pose": moved(**{by: part})}, agreed)
-          for by in ("distance", "angle") for part, agreed in ((0.95, True), (-0.95, True), (1.1, False), (-1.1, False))),
+        *(({"pose": moved(**{by: part})}, abs(part) < 1.0)
+          for by in ("distance", "angle") for part in (-1.1, -0.95, 0.95, 1.1)),
         ({"map_id": "another"}, False),
         ({"reasons": (Reason("prior_contradicted", ""),)}, False),
         ({"reasons": (Reason("map_mismatch", ""),)}, True),
