@@ -90,6 +90,7 @@ def test_an_unlikely_unit_of_a_table_is_said(tmp_path: Path) -> None:
     found = notes(read_map(written(tmp_path, "a.csv", "0,0,4000,0\n0,0,0,3000\n")))
     assert "in mm it is 4 m" in found["unlikely_unit"].message
     assert "columns" in found
+    assert "as is usual in a table" in found["unit"].message
 
 
 def entities(*lines: str) -> bytes:

@@ -148,7 +148,8 @@ def _note_unit(endpoints: Floats, metres: float, drawing: Drawing) -> None:
     """
     corners = endpoints.reshape(-1, 2)
     width, height = corners.max(axis=0) - corners.min(axis=0)
-    who = "the option states" if drawing.options.metres is not None else "the file states"
+    stated = "is usual in a table" if drawing.format == "csv" and metres == 1.0 else "the file states"
+    who = stated if drawing.options.metres is None else "the option states"
     unit = _named(metres)
     drawing.notes.add_read("unit", f"1 unit is {unit}, as {who}: the drawing is {width:.4g} m by {height:.4g} m")
     lengths = np.sort(np.hypot(*(endpoints[:, 2:] - endpoints[:, :2]).T))
