@@ -18,7 +18,7 @@ from typing import Any
 
 STDERR = 2
 WAITING_LINES = 4096  # that are buffered for a late reader
-GATHER_SECONDS = 0.01  # between two writes: to wake the thread for each line would cost a request a twentieth more
+GATHER_SECONDS = 0.05  # between two writes: to wake the thread for each line would cost a request a twentieth more
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
 _JSON = json.JSONEncoder(default=str, separators=(",", ":"))
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
