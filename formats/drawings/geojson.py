@@ -91,6 +91,8 @@ def _properties(feature: dict[str, Any]) -> dict[str, Any]:
         properties if isinstance(properties, dict) else {}
     )
     named = lower_keys(told)
+    if named.get("feature_type") == "level":  # its outline is on itself
+        named["level_id"] = named.get("id")
     tags, packed = named.pop("tags", None), named.pop("other_tags", None)
     if isinstance(tags, dict):
         named = lower_keys(tags) | named

@@ -78,6 +78,11 @@ def test_a_section_is_no_plan(tmp_path: Path) -> None:
         read_map(drawn(tmp_path, ((0, 0, 0), (7, 0, 0)), ((7, 0, 0), (7, 0, 5)), ((0, 0, 5), (7, 0, 5))), FACES)
 
 
+def test_a_level_of_imdf_is_on_itself(tmp_path: Path) -> None:
+    level = line(1, ordinal=0) | {"feature_type": "level", "id": "L1"}
+    assert len(rows(read_map(geojson(tmp_path, level, line(2, level_id="L1")), METRES))) == 2
+
+
 OSM = [
     line(1, indoor="wall"), line(2, highway="footway"), line(3, door="hinged"), line(4, indoor="area"),
     line(5) | {"feature_type": "opening"}, line(6, door="no", material=1), line(7, category="IfcDoor", level=2),
