@@ -285,6 +285,9 @@ def test_a_map_that_is_not_to_scale_or_of_another_unit(factor: float, unit: str)
     assert said == pytest.approx(factor, rel=1e-3 if unit else 0.004)
 
 
+OF_SCANS = "divide the lengths of the scans by 1000. The scans seem to be in millimetres taken for metres."
+
+
 def beyond_limits(factor: float) -> list[Scan]:
     return [scan_of(LaserScan(-3.0, 0.1, factor * np.linspace(1.0, 3.0, 60), 0.05, 12.0))] * 2
 
@@ -292,10 +295,7 @@ def beyond_limits(factor: float) -> list[Scan]:
 @pytest.mark.parametrize(
     ("scans", "said"),
     [
-        (
-            [scaled(scan, 1000.0) for _, scan in sampled()],
-            "divide the lengths of the scans by 1000. The scans seem to be in millimetres taken for metres.",
-        ),
+        ([scaled(scan, 1000.0) for _, scan in sampled()], OF_SCANS),
         *((beyond_limits(factor), "in another unit, such as millimetres; expected metres.") for factor in (1e3, 1e-3)),
     ],
 )
