@@ -19,7 +19,9 @@ from .result import SearchReport
 from .scan.scan import corrected_scan
 from .scan.views import corrected
 from .search.search import Effort, search
-from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, SHOWN_TURN, SUGGESTED
+import os
+TURNC=float(os.environ.get("TURNC","0"))
+from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, OFF_SCALE, SHOWN_TURN, SUGGESTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +93,8 @@ def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
     """Search a scan and estimate the best pose; return the explanations, and the context of the scan that was searched.
 
     A scan that suggests a scale other than the map's, or a rotation during the sweep, is corrected for it and searched
-    again, as long as it explains more.
+    again, as long as it explains more. A scale has to explain more by the odds against it: most maps are to scale, and
+    a few lines are laid better at some other one.
 
     Raises
     ------
@@ -107,7 +110,8 @@ def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
             break
         again = context.with_scan(corrected_scan(context.scan, factor, turn))
         better = _explain(again, factor * found.scale, turn + found.turn)
-        if better.answer is None or better.answer.best.posterior <= found.answer.best.posterior:
+        charge = OFF_SCALE if found.scale == 1.0 != factor else TURNC
+        if better.answer is None or better.answer.best.posterior - charge <= found.answer.best.posterior:
             break
         context, found = again, better
     return context, found
@@ -134,7 +138,7 @@ def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
     complete = context.can_look and not context.deadline.passed
     report = candidates.report if complete else candidates.report.cut_short()
     return Explanations(
-        ranked, None if best is None else answer_of(context, best, scaled=scale != 1.0), report, scale, turn
+        ranked, None if best is None else answer_of(context, best, scaled=scale != 1.0 or turn != 0.0), report, scale, turn
     )
 
 

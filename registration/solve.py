@@ -58,7 +58,13 @@ def register(
     InvalidArgumentError
         When `pairs`, a sigma or a weight is wrong; with the argument and the index at fault.
     """
-    given = Correspondences.of(map_segments, scan, pairs)
+    return register_pairs(Correspondences.of(map_segments, scan, pairs), map_sigma, options, at)
+
+
+def register_pairs(
+    given: Correspondences, map_sigma: float, options: RegistrationOptions, at: RigidTransform | None = None
+) -> RegistrationResult:
+    """Register pairs that were gathered before, see `register`."""
     weights = weigh(given, map_sigma, options)
     if not len(given):
         return _no_answer(options)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform, register
+from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform
 from registration.layout import POSE, Floats
+from registration.solve import register_pairs
 from registration.weights import MIN_WEIGHT
 
 from ..context import SearchContext
@@ -80,20 +81,22 @@ def register_accepted(
     """
     index, options, measured = context.index, context.options, context.scan.measured
     sigma = wall_sigma if index.sigma is None else index.sigma
-    weights = _weights(context, best, accepted, sigma)
+    pairs = Correspondences.of(index.segments, measured, accepted.pairs)
+    weights = _weights(context, best, accepted, pairs.variances, sigma)
     if weights is None and index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
         sigma = wall_sigma  # nothing at all is known to be off, and pairs need a weight
     fit = RegistrationOptions(estimator=options.estimator, rotation=options.rotation, weights=weights)
     at = None if options.estimator == "one_step" else at
-    return register(index.segments, measured, accepted.pairs, sigma, fit, at)
+    return register_pairs(pairs, sigma, fit, at)
 
 
-def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:
+def _weights(
+    context: SearchContext, best: ConsensusSet, accepted: Accepted, variances: Floats, wall_sigma: float
+) -> Floats | None:
     """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have."""
     measured, rows = context.scan.measured, context.lines.row_of[accepted.pairs[:, 0]]
     walls, weights = best.matches["wall"][rows], np.empty(len(rows))
     ties, ends = context.index.ties[walls], measured.segments.endpoints[accepted.pairs[:, 0]]
-    variances = Correspondences.of(context.index.segments, measured, accepted.pairs).variances
     shared = weigh_pairs(rows, walls, ties, ends, variances, wall_sigma**2, weights)
     return np.where(weights >= MIN_WEIGHT, weights, 0.0) if shared else None
 

@@ -198,7 +198,7 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
         Of one place.
     factor : float
     turn : float
-        Radians from the first beam to the last; the heading is that in the middle of the sweep.
+        Radians from the first beam to the last; the heading is that at the first one.
     """
     sensor = np.array(scan.viewpoint or (0.0, 0.0))
     if factor != 1.0:
@@ -212,7 +212,7 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
         """Turn points by when they were seen."""
         away = points - centre
         bearings = way * (np.arctan2(away[:, 1], away[:, 0]) - first) % math.tau
-        angles = turn * (bearings / sweep - 0.5)
+        angles = turn * (bearings / sweep)
         c, s = np.cos(angles), np.sin(angles)
         back = np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], axis=1)
         return np.asarray(back + centre)
@@ -221,5 +221,5 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
     # A line through the sensor's sweep is seen bent: its middle and its ends are turned by the time of each.
     begins, finishes = turned(seen.segments.endpoints[:, :2]), turned(seen.segments.endpoints[:, 2:])
     measured = replace(seen, segments=Segments.derived(np.hstack([begins, finishes])), centroids=turned(seen.centroids))
-    angles = scan.beams.angles + turn * (np.abs(scan.beams.angles - first) / sweep - 0.5)
+    angles = scan.beams.angles + turn * (np.abs(scan.beams.angles - first) / sweep)
     return replace(scan, measured=measured, beams=replace(scan.beams, angles=angles))

@@ -247,8 +247,7 @@ def solve_pose(sums: Record, angles: Record, parallel: float, model: Record, pos
     fixes. If the reliability of the set, Eq. (28) by the information of its angles, is what noise makes of parallel
     walls (`parallel`: their chi-square), the pose stays where it was along these walls.
     """
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
     at_x = c * model.sensor_x - s * model.sensor_y + pose.x
     at_y = s * model.sensor_x + c * model.sensor_y + pose.y
     hold_sensor(sums, model.sensor_x, model.sensor_y, at_x, at_y, SPRING)

@@ -96,8 +96,7 @@ def refine(question: Question, place: Place, pose: Record, found: Records, floor
     scan = question.scan
     terms = question.terms[0]
     scratch = work.scratch[0]
-    plain = scratch.plain
-    angles = scratch.angles
+    plain, angles = scratch.plain, scratch.angles
     for i in range(len(scan)):
         work.held[i].wall = -1
     scratch.plain = scratch.nothing
@@ -134,8 +133,7 @@ def change_set(
     scan: Records, walls: Records, found: Records, held: Records, wall_sums: Records, scratch: Record
 ) -> bool:
     """Change the pairs that are held to those that match, in constant time each; return whether any changed."""
-    plain = scratch.plain
-    angles = scratch.angles
+    plain, angles = scratch.plain, scratch.angles
     changed = False
     for i in range(len(scan)):
         w = found[i].wall
@@ -178,10 +176,8 @@ def drop_pairs(
     scan: Records, walls: Records, pose: Record, found: Records, held: Records, wall_sums: Records, scratch: Record
 ) -> float:
     """Score each match by what the set would lose without it, drop those without; return what the others gain, nats."""
-    plain = scratch.plain
-    angles = scratch.angles
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
+    plain, angles = scratch.plain, scratch.angles
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
     gain = 0.0
     for i in range(len(scan)):
         match = found[i]

@@ -82,8 +82,7 @@ def eliminate(wall_sums: Records, ties: Floats, listed: Integers, count: int, va
 @kernel
 def infer(wall_sums: Records, ties: Floats, listed: Integers, count: int, variance: float, pose: Record) -> None:
     """Write for each listed wall the evidence of its error by other walls, at a pose."""
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
     weight = 1.0 / variance
     total = 0.0
     for k in range(count):
