@@ -19,9 +19,16 @@ from .result import SearchReport
 from .scan.scan import corrected_scan
 from .scan.views import corrected
 from .search.search import Effort, search
-import os
-TURNC=float(os.environ.get("TURNC","0"))
-from .tuning import LEAST_FACTOR, LEAST_TURN, MOST_FACTOR, MOST_SEARCHES, OFF_SCALE, SHOWN_TURN, SUGGESTED
+from .tuning import (
+    DOUBTING_DEVIATIONS,
+    LEAST_FACTOR,
+    LEAST_TURN,
+    MOST_FACTOR,
+    MOST_SEARCHES,
+    OFF_SCALE,
+    SHOWN_TURN,
+    SUGGESTED,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +86,10 @@ class Explanations:
     def shown_turn(self) -> float:
         """By how much the sensor turned during the scan, as the walls show it, radians; 0 where they do not."""
         found = None if self.answer is None else self.answer.estimate
-        turn = self.turn + (found.turn[0] if found is not None and found.with_columns else 0.0)
-        return turn if abs(turn) > SHOWN_TURN else 0.0
+        if found is None or not found.with_columns:
+            return 0.0
+        turn = self.turn + found.turn[0]
+        return turn if abs(turn) > max(SHOWN_TURN, DOUBTING_DEVIATIONS * found.turn[1]) else 0.0
 
     @property
     def others(self) -> Iterator[ConsensusSet]:
@@ -110,7 +119,7 @@ def explain_scan(context: SearchContext) -> tuple[SearchContext, Explanations]:
             break
         again = context.with_scan(corrected_scan(context.scan, factor, turn))
         better = _explain(again, factor * found.scale, turn + found.turn)
-        charge = OFF_SCALE if found.scale == 1.0 != factor else TURNC
+        charge = OFF_SCALE if found.scale == 1.0 != factor else 0.0
         if better.answer is None or better.answer.best.posterior - charge <= found.answer.best.posterior:
             break
         context, found = again, better
@@ -128,7 +137,7 @@ def _scale_of(found: Estimate) -> float:
 def _turn_of(found: Estimate) -> float:
     """Return the angle by which the sensor turned during the scan, radians, 0 where it is small, or not suggested."""
     turn, deviation = found.turn
-    return turn if abs(turn) > max(LEAST_TURN, SUGGESTED * deviation) else 0.0
+    return turn if abs(turn) > max(LEAST_TURN, DOUBTING_DEVIATIONS * deviation) else 0.0
 
 
 def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
@@ -138,16 +147,20 @@ def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
     complete = context.can_look and not context.deadline.passed
     report = candidates.report if complete else candidates.report.cut_short()
     return Explanations(
-        ranked, None if best is None else answer_of(context, best, scaled=scale != 1.0 or turn != 0.0), report, scale, turn
+        ranked,
+        None if best is None else answer_of(context, best, scaled=scale != 1.0, turned=turn != 0.0),
+        report,
+        scale,
+        turn,
     )
 
 
-def answer_of(context: SearchContext, best: ConsensusSet, *, scaled: bool) -> Answer | None:
+def answer_of(context: SearchContext, best: ConsensusSet, *, scaled: bool, turned: bool) -> Answer | None:
     """Estimate the pose of the best explanation; None without pairs.
 
     If nothing but the pose was solved for, it is that at which the pairs register.
     """
-    found = estimate(context, best, scaled=scaled)
+    found = estimate(context, best, scaled=scaled, turned=turned)
     if found is None:
         return None
     accepted = accept(context, best, found.pose)

@@ -133,7 +133,7 @@ def _turned(explanations: Explanations, found: Estimate) -> str | None:
         return None
     return (
         f"The sensor turned by {math.degrees(turn):.1f} degrees (+-{math.degrees(found.turn[1]):.1f}) during the scan, "
-        "as the walls show it. The pose is corrected for this, and is that in the middle of the scan. Send `twist` and "
+        "as the walls show it. The pose is corrected for this, and is that at the first beam. Send `twist` and "
         "`time_increment`, or check `angle_increment`."
     )
 

@@ -104,7 +104,8 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = IDENTITY, sigma:
     >>> scan = linefix.assemble(views)
     """
     scan, warning = ranges_scan(seen.laser, sigma), motion_warning(seen)
-    scan = scan if warning is None else replace(scan, warnings=(*scan.warnings, warning))
+    if warning is not None:
+        scan = replace(scan, warnings=(*scan.warnings, warning), sweep_s=_seconds_moving(seen))
     place = base_from_then.compose(seen.mount or IDENTITY)
     shown = mirrored(scan) if seen.flipped else scan
     return View(shown, place, motion=_motion_root(seen, base_from_then))
@@ -151,7 +152,8 @@ def motion_warning(seen: MountedScan) -> AssociationWarning | None:
     return AssociationWarning(
         "motion_unknown",
         f"{told}. The motion of the sensor during this time is unknown, so the scan may be distorted. The covariance "
-        f"allows for {SPEED:g} m/s and {TURN:g} rad/s. Send the motion: over HTTP as `twist`, 0 for a sensor at rest; "
+        f"allows for {SPEED:g} m/s, and for the rotation that the walls allow. Send the motion: over HTTP as "
+        "`twist`, 0 for a sensor at rest; "
         "in a log and in ROS 2 as odometry.",
     )
 
@@ -182,4 +184,5 @@ def ranges_scan(scan: LaserScan | ArrayLike, sigma: float | None = None) -> Scan
     found = vectorize(scan, VectorizationOptions(sigma=sigma))
     beyond = scan.beyond_limits if isinstance(scan, LaserScan) else None
     warnings = () if beyond is None else (AssociationWarning("no_segments", f"No range is {beyond}."),)
-    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered, warnings=warnings)
+    told = 0.0 if isinstance(scan, LaserScan) and scan.motion is not None else None
+    return Scan(found.measured, found.viewpoint, found.beams, None, found.ordered, warnings, told)

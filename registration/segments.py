@@ -267,10 +267,8 @@ class Beams:
     origins: Floats | None = None
 
     def mirrored(self) -> Beams:
-        """Return them with left and right exchanged, in reverse order."""
-        origins = None if self.origins is None else np.ascontiguousarray(self.origins[::-1] * ACROSS)
-        angles, ranges = np.ascontiguousarray(-self.angles[::-1]), np.ascontiguousarray(self.ranges[::-1])
-        return Beams(angles, ranges, self.range_max, origins)
+        """Return them with left and right exchanged, in the same order, which is that of time."""
+        return Beams(-self.angles, self.ranges, self.range_max, None if self.origins is None else self.origins * ACROSS)
 
     def scaled(self, factor: float) -> Beams:
         """Return them with all lengths multiplied."""

@@ -24,6 +24,7 @@ from registration.layout import Floats
 
 from ..context import SearchContext
 from ..tables import Model
+from ..tuning import DOUBTING_DEVIATIONS, LEAST_TURN
 from .consensus_set import ConsensusSet
 from .kernels.estimation import COLUMNS, OFFSET, STRAIN, TURN, leave_out_walls, solve_model, weakest
 from .observations import Indices, Observations, observations_of
@@ -38,13 +39,14 @@ from .tuning import (
     SPRING,
     STRAIN_DEVIATION,
     TURN_DEVIATION,
+    USUAL_SWEEP,
     USUAL_WALL_ERROR,
 )
 
 STRAINS = slice(STRAIN, STRAIN + 3)
 
 
-def _prior(known: float | None) -> Floats:
+def _prior(known: float | None, turn: float) -> Floats:
     """Return the information on the columns before anything is seen, (5, 5), by the known variance of walls.
 
     The scale may differ more than the shape: that of the laser's ranges counts, too. A map of which the walls are known
@@ -52,7 +54,7 @@ def _prior(known: float | None) -> Floats:
     """
     strain = STRAIN_DEVIATION * (1.0 if known is None else min(1.0, math.sqrt(known) / USUAL_WALL_ERROR))
     # Across half as much: so it is the same along any axes.
-    out = np.diag(np.array([OFFSET_DEVIATION, strain, strain, strain / math.sqrt(2.0), TURN_DEVIATION]) ** -2.0)
+    out = np.diag(np.array([OFFSET_DEVIATION, strain, strain, strain / math.sqrt(2.0), turn]) ** -2.0)
     scale, shape = 0.25 * SCALE_DEVIATION**-2.0, 0.5 * strain**-2.0
     out[1:3, 1:3] = [[scale + shape, scale - shape], [scale - shape, scale + shape]]
     return out
@@ -130,13 +132,16 @@ class Estimate:
         return self.weakest > MAX_DEVIATION
 
 
-def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool = False) -> Estimate | None:
+def estimate(
+    context: SearchContext, best: ConsensusSet, *, scaled: bool = False, turned: bool = False
+) -> Estimate | None:
     """Estimate the pose of a consensus set; None where it has no pairs.
 
     1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is
        known.
-    2. If the columns together do not differ from 0, and the scan was not put to scale, solve without them: always on,
-       they widen the deviations on exact maps by a third.
+    2. If the columns together do not differ from 0, the scan was not corrected, and its sensor may not have moved,
+       solve without them: always on, they widen the deviations on exact maps by a third. Without the rotation, where
+       that is in doubt.
     3. Leave out each wall in turn.
     """
     seen = observations_of(context, best.matches)
@@ -145,17 +150,20 @@ def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool = False
     declared = context.index.sigma
     known = None if declared is None else max(declared**2, LEAST_KNOWN_VARIANCE)
     columns = _columns(context, seen)
-    full = _Solution(seen, known, best.pose, columns)
+    turn = TURN_DEVIATION * (context.scan.sweep_s or USUAL_SWEEP)
+    full = _Solution(seen, known, best.pose, columns, turn)
     if not len(columns):
         return full.estimate(full, shown=False)
-    if scaled or full.differs > SHOWN_CHI_SQUARE[len(columns)]:
-        return full.estimate(full, shown=True)
-    return _Solution(seen, known, best.pose, columns[:0]).estimate(full, shown=False)
+    turned = turned or seen.views is not None or full.turns
+    shown = scaled or turned or full.differs > SHOWN_CHI_SQUARE[len(columns)]
+    kept = columns[columns != TURN] if shown and not turned else columns[: shown * len(columns)]
+    alone = full if len(kept) == len(columns) else _Solution(seen, known, best.pose, kept, turn)
+    return alone.estimate(full, shown=shown)
 
 
 def _columns(context: SearchContext, seen: Observations) -> Indices:
     """Return the columns beyond the pose that a scan may show."""
-    if seen.views is not None or context.options.estimator != "joint":
+    if (seen.views is not None and not seen.timed) or context.options.estimator != "joint":
         return np.zeros(0, np.intp)
     first = OFFSET if context.scan.viewpoint is not None else STRAIN  # no rays, no offset along them
     return np.arange(first, COLUMNS if seen.timed else TURN)
@@ -164,7 +172,9 @@ def _columns(context: SearchContext, seen: Observations) -> Indices:
 class _Solution:
     """The solution of the model for some columns beyond the pose."""
 
-    def __init__(self, seen: Observations, known: float | None, start: RigidTransform, columns: Indices) -> None:
+    def __init__(
+        self, seen: Observations, known: float | None, start: RigidTransform, columns: Indices, turn: float
+    ) -> None:
         self.seen, self.known, views = seen, known, seen.views
         root = np.zeros((3, 0)) if views is None else views.root
         began = np.zeros(0) if views is None else views.found
@@ -174,7 +184,7 @@ class _Solution:
         information = np.eye(k)
         information[:3, :3] *= SPRING  # it holds the pose, weakly
         own = slice(3, 3 + len(columns))
-        information[own, own] = _prior(known)[columns[:, None] - 3, columns - 3]
+        information[own, own] = _prior(known, turn)[columns[:, None] - 3, columns - 3]
         self.model = Model(seen.lines, seen.ties, seen.own, seen.sensor, places, root, began, active, information)
         at = start.apply(seen.sensor)
         self.x = np.concatenate([at, [start.theta], np.zeros(COLUMNS - 3), began])
@@ -187,6 +197,11 @@ class _Solution:
         out = np.zeros(len(self.x))
         out[self.active] = np.sqrt(np.maximum(0.0, np.diag(self.covariance)))
         return out
+
+    @property
+    def turns(self) -> bool:
+        """Return whether the sensor turned beyond doubt."""
+        return bool(abs(self.x[TURN]) > max(LEAST_TURN, DOUBTING_DEVIATIONS * self.deviations[TURN]))
 
     def estimate(self, full: _Solution, *, shown: bool) -> Estimate:
         """Return it in the frame of the scan's origin, with the columns of the full one."""

@@ -88,7 +88,8 @@ def observations_of(context: SearchContext, matches: Records) -> Observations | 
 def _set_times(context: SearchContext, lines: Records) -> None:
     """Set when lines were seen, by their bearings from the first beam on, and how that changes along them."""
     scan = context.scan
-    if scan.beams is None or scan.views is not None or not scan.ordered or len(scan.beams.angles) < 2:
+    several = scan.views is not None and len(scan.views) > 1
+    if scan.beams is None or several or not scan.ordered or len(scan.beams.angles) < 2:
         return
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
     sweep = last - first

@@ -97,5 +97,6 @@ ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says
 OFFSET_DEVIATION = 0.05  # m, tables; of the walls along the rays: a bias of ranges, or the walls of a grid
 STRAIN_DEVIATION = 0.004  # tables; of the map around the sensor, along x, y and across
 SCALE_DEVIATION = 0.02  # tables; of its scale, which is the mean along x and y
-TURN_DEVIATION = 0.1  # rad, tables; of the sensor during a scan: 1 rad/s for a tenth of a second
+TURN_DEVIATION = 1.0  # rad/s, tables; of the sensor during a scan, and
+USUAL_SWEEP = 0.1  # s; how long that takes where it is not known
 SHOWN_CHI_SQUARE = {3: 11.3, 4: 13.3, 5: 15.1}  # geometry: quantiles of 99 %, by the number of columns

@@ -81,11 +81,10 @@ class Views:
         return np.asarray(1.0 / near.sum(axis=1))
 
     def mirrored(self) -> Views:
-        """Return them with left and right exchanged; beams are in reverse order then."""
+        """Return them with left and right exchanged."""
         poses = tuple(RigidTransform(p.x, -p.y, -p.theta) for p in self.poses)
         root = self.root * np.tile(_MIRRORED_ERROR, len(self))[:, None]
-        of_beam = np.ascontiguousarray(self.of_beam[::-1])
-        return replace(self, poses=poses, viewpoints=self.viewpoints * MIRROR, of_beam=of_beam, root=root)
+        return replace(self, poses=poses, viewpoints=self.viewpoints * MIRROR, root=root)
 
     def scaled(self, factor: float) -> Views:
         """Return them with all lengths multiplied."""

@@ -92,6 +92,7 @@ def assemble(views: Sequence[View]) -> Scan:
         beams=beams,
         views=together,
         ordered=all(view.scan.ordered for view in views),
+        sweep_s=views[0].scan.sweep_s,
         warnings=tuple({one.code: one for view in reversed(views) for one in view.scan.warnings}.values()),
     )
 
@@ -228,4 +229,5 @@ def _motion_root(views: Sequence[View]) -> Floats:
         return np.zeros((3 * len(views), 0))
     nothing = np.zeros((3, 3))
     parts = [nothing if view.motion is None else view.motion * (longest / view.motion[2, 2]) for view in views]
-    return np.concatenate(parts)
+    # Of one view the walls show the rotation.
+    return np.concatenate(parts) if len(views) > 1 else parts[0][:, :2]

@@ -199,7 +199,7 @@ def ranges(
     read[read > reach] = math.inf
     motion = Motion(PERIOD / beams, 0.0, 0.0, turning.rate) if turning.stated else None
     found = vectorize(LaserScan(-math.pi, step, read, 0.05, reach, motion))
-    return Scan(found.measured, found.viewpoint, found.beams)
+    return Scan(found.measured, found.viewpoint, found.beams, sweep_s=0.0 if turning.stated else PERIOD)
 
 
 def without_beams(scan: Scan) -> Scan:

@@ -27,13 +27,9 @@ def match_lines(
     The most informative lines come first; where what is left cannot reach the threshold, -1 is returned, and the other
     lines are not matched. Nor are those that are known to lie on no wall.
     """
-    walls = place.walls
-    bin_starts = place.bin_starts
-    starts = place.grid.starts
-    items = place.grid.items
-    shape = place.grid.shape[0]
-    line = scratch.line
-    cover = scratch.cover
+    walls, bin_starts = place.walls, place.bin_starts
+    starts, items, shape = place.grid.starts, place.grid.items, place.grid.shape[0]
+    line, cover = scratch.line, scratch.cover
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     per_cell = 1.0 / shape.cell
@@ -49,10 +45,8 @@ def match_lines(
         if is_unfit(pose, i):
             continue
         left -= scan[i].gain
-        px = c * scan[i].x - s * scan[i].y + pose.x
-        py = s * scan[i].x + c * scan[i].y + pose.y
-        fx = (px - shape.x0) * per_cell
-        fy = (py - shape.y0) * per_cell
+        fx = (c * scan[i].x - s * scan[i].y + pose.x - shape.x0) * per_cell
+        fy = (s * scan[i].x + c * scan[i].y + pose.y - shape.y0) * per_cell
         if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
             cell = int(fy) * shape.columns + int(fx)
             if starts[cell] < starts[cell + 1]:
@@ -61,8 +55,7 @@ def match_lines(
                 spread = GATE_MARGIN * line.angle_gate * BINS_PER_RADIAN
                 lowest = math.floor(turned - spread) % DIRECTION_BINS
                 highest = math.floor(turned + spread) % DIRECTION_BINS
-                low_wall = bin_starts[lowest]
-                high_wall = bin_starts[highest + 1]
+                low_wall, high_wall = bin_starts[lowest], bin_starts[highest + 1]
                 least_misfit = 1e300
                 to_follow = MOST_BRIDGED
                 for item in range(starts[cell], starts[cell + 1]):

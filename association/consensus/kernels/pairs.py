@@ -27,10 +27,8 @@ from .geometry import angle_gate, wrap
 @kernel
 def put_line(seen: Record, pose: Record, c: float, s: float, gates: Record, line: Record) -> None:
     """Write a scan line at a pose of cosine `c` and sine `s`, with its gates, to `line`, a record of `POSED_LINE`."""
-    x = c * seen.x - s * seen.y
-    y = s * seen.x + c * seen.y
-    dx = c * seen.dx - s * seen.dy
-    dy = s * seen.dx + c * seen.dy
+    x, y = c * seen.x - s * seen.y, s * seen.x + c * seen.y
+    dx, dy = c * seen.dx - s * seen.dy, s * seen.dx + c * seen.dy
     lever = dx * x + dy * y
     variance = (
         dy * dy * pose.xx
@@ -40,10 +38,7 @@ def put_line(seen: Record, pose: Record, c: float, s: float, gates: Record, line
         + lever * lever * pose.tt
     )
     deviation = math.sqrt(seen.offset_variance + max(variance, 0.0))
-    line.x = x + pose.x
-    line.y = y + pose.y
-    line.dx = dx
-    line.dy = dy
+    line.x, line.y, line.dx, line.dy = x + pose.x, y + pose.y, dx, dy
     line.half = 0.5 * seen.length
     line.gate = min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
     line.angle_gate = angle_gate(seen, pose.tt, gates)
@@ -97,8 +92,7 @@ def follow(wall: Record, base: Record, line: Record, way: float, cover: Record) 
     stop = min(end, line.half)
     if stop > start:
         middle = way * 0.5 * (start + stop)
-        x = line.x + middle * line.dx
-        y = line.y + middle * line.dy
+        x, y = line.x + middle * line.dx, line.y + middle * line.dy
         off = wall.dx * y - wall.dy * x - wall.offset
         beside = base.dx * y - base.dy * x - base.offset - off
         part = sums.weight * (stop - start)

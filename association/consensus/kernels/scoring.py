@@ -44,10 +44,8 @@ def score_poses(
         Written; of (1, n) the last one stays.
     work : ScoreWork
     """
-    prior = question.terms[0].prior
-    gates = question.terms[0].gates
-    scan = question.scan
-    rule = rules.rule[0]
+    scan, rule = question.scan, rules.rule[0]
+    prior, gates = question.terms[0].prior, question.terms[0].gates
     soft = prior.kind != NO_PRIOR and prior.kind != HARD_PRIOR
     refined = 0
     kept = 0

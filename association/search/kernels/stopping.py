@@ -29,11 +29,8 @@ def draw_bases(drawing: Drawing, needed: float, hit: float, allowed: float, base
     bases : (b, 2)
         Written: the lines that slide and cross.
     """
-    merits = drawing.merits
-    telling = drawing.telling
-    costs = drawing.costs
-    left = drawing.left
-    state = drawing.state[0]
+    merits, telling, costs = drawing.merits, drawing.telling, drawing.costs
+    left, state = drawing.left, drawing.state[0]
     lines = len(costs)
     count = 0
     while True:
@@ -68,9 +65,7 @@ def draw_bases(drawing: Drawing, needed: float, hit: float, allowed: float, base
 @kernel
 def strike(drawing: Drawing, one: int, other: int) -> None:
     """Note for each sample at which of its lines it holds a base that was drawn."""
-    first = drawing.ranks[one]
-    second = drawing.ranks[other]
-    found = drawing.found
+    first, second, found = drawing.ranks[one], drawing.ranks[other], drawing.found
     for s in range(len(found)):  # without a branch, so that many are compared at once
         later = first[s] if first[s] > second[s] else second[s]
         found[s] = later if later < found[s] else found[s]
@@ -83,14 +78,9 @@ def count_missed(drawing: Drawing, needed: float, allowed: float) -> int:
     A sample is an order of the lines: its set are the first of them whose gains reach `needed`, nats. A set that holds
     a base is decided for good, for a larger one holds it, too. Samples that are decided are not looked at again.
     """
-    orders = drawing.orders
-    gains = drawing.gains
-    found = drawing.found
-    sizes = drawing.sizes
-    reached = drawing.reached
-    open_ones = drawing.open_ones
-    n = orders.shape[1]
-    count = len(found)
+    orders, gains, found = drawing.orders, drawing.gains, drawing.found
+    sizes, reached, open_ones = drawing.sizes, drawing.reached, drawing.open_ones
+    n, count = orders.shape[1], len(found)
     most = allowed * count if allowed >= 0.0 else count
     end = open_ones[count]
     at = 0
