@@ -73,15 +73,19 @@ def test_odometry_that_mostly_contradicts_the_scans_shows_nothing() -> None:
     assert [one.precise for one in carried(scans)] == [True] * 5 + [False] * 5
 
 
-def test_a_usable_scan_that_two_others_contradict_is_no_evidence() -> None:
+@pytest.mark.parametrize(
+    ("jump", "agrees"),
+    [((0.2, 0.2, 0.1), True), ((2.4, 0.0, 0.0), False), ((0.0, 2.4, 0.0), False), ((0.0, 0.0, 1.6), False)],
+)
+def test_a_usable_scan_that_two_others_contradict_is_no_evidence(jump: tuple[float, ...], agrees: bool) -> None:
+    """By more than three standard deviations of odometry, 0.1 m and 0.1 m for each metre, 0.05 rad and more."""
     scans = days(IN_HALL)[:5]
-    assert [one.precise for one in carried(list(scans))] == [True] * 5
-    wrong = scans[2].odometry
-    assert wrong is not None
-    scans[2] = replace(scans[2], odometry=replace(wrong, x=wrong.x + 5.0))
+    there = scans[2].odometry
+    assert there is not None
+    scans[2] = replace(scans[2], odometry=RigidTransform(there.x + jump[0], there.y + jump[1], there.theta + jump[2]))
     found = carried(scans)
     assert [one.usable for one in found] == [True] * 5
-    assert [one.precise for one in found] == [True, True, False, True, True]
+    assert [one.precise for one in found] == [True, True, agrees, True, True]
 
 
 def test_a_lone_usable_scan_carries_no_pose() -> None:
