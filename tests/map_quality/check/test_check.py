@@ -86,6 +86,17 @@ def test_one_the_wrong_way_round() -> None:
     assert checked(walls).advice.oriented is None
 
 
+@pytest.mark.parametrize("quarters", range(4))
+def test_one_the_wrong_way_round_next_to_walls_longer_than_rays_are_followed(quarters: int) -> None:
+    """The opposite face of the pillar is doubtful, too: between both there is free space or none."""
+    corners = np.array([[0, 0], [100, 0], [100, 20], [0, 20], [4, 4], [6, 4], [6, 12], [4, 12]], dtype=float)
+    for _ in range(quarters):
+        corners = corners[:, ::-1] * [-1.0, 1.0]
+    walls = np.hstack([corners, corners[[1, 2, 3, 0, 7, 4, 5, 6]]])
+    walls[4] = walls[4, [2, 3, 0, 1]]
+    assert found(walls)["mixed_directions"] == (4, 6)
+
+
 @pytest.mark.xfail(strict=True, reason="looks_alike is found as well")
 def test_lines_without_direction() -> None:
     result = checked(centre_lines())
