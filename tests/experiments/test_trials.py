@@ -20,7 +20,7 @@ from experiments.accuracy import (
     slopes,
 )
 from experiments.constant_time import drawn_pairs
-from experiments.icp import align, nearest
+from experiments.icp import align
 from experiments.mean_angles import CASES, examples, mitsuta, spread
 from experiments.measuring import Setup, take
 from experiments.precision import translation as rounded_translation
@@ -235,19 +235,6 @@ def test_ambiguity_as_printed_holds_at_the_optimum_and_at_zero_only():
             assert ambiguity(pairs, at, as_printed=True) == pytest.approx(right, abs=1e-9)
         else:
             assert ambiguity(pairs, at, as_printed=True) < -0.1
-
-
-def test_the_nearest_segment_is_the_nearest():
-    map = world("Pillars").segments
-    points = np.random.default_rng(5).uniform(0.0, 4.0, (8, 2))
-    indices, distances = nearest(points, map)
-    for point, index, distance in zip(points, indices, distances, strict=True):
-        each = []
-        for row in map.endpoints:
-            steps = np.linspace(0.0, 1.0, 5_001)[:, None]
-            each.append(np.linalg.norm(row[:2] + steps * (row[2:] - row[:2]) - point, axis=1).min())
-        assert distance == pytest.approx(min(each), abs=1e-3)
-        assert each[index] == pytest.approx(min(each), abs=1e-3)
 
 
 def test_icp_comes_home_from_near_and_not_from_anywhere():

@@ -215,10 +215,7 @@ GOOD = {"nx": 1.0, "p": 2.0, "spread": 0.1, "weight": 1e5, "count": 10.0, "chi2"
     ],
 )  # fmt: skip
 def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field: str, value: Any, accepted: bool) -> None:
-    scanner = scanner_of(least=(10, 1.0))
-    assert lines.rejoin(np.zeros(0, POINT), line_with(**{**GOOD, field: value}), scanner, line_with()) == accepted
-
-
-def test_points_without_rays_may_lie_on_a_line_through_their_middle() -> None:
-    scanner = scanner_of(0.0, least=(10, 1.0))
-    assert lines.rejoin(np.zeros(0, POINT), line_with(**{**GOOD, "p": 0.0}), scanner, line_with()) == 1
+    """Points without rays may lie on a line through their middle."""
+    for increment, anyway in ((0.01, False), (0.0, field == "p")):
+        scanner, line = scanner_of(increment, least=(10, 1.0)), line_with(**{**GOOD, field: value})
+        assert lines.rejoin(np.zeros(0, POINT), line, scanner, line_with()) == (accepted or anyway)

@@ -67,9 +67,7 @@ def test_all_the_wrong_way_round() -> None:
 
 def test_a_hall_too_wide_to_look_across() -> None:
     """Each wall has both faces; what a ray has not met by the time that it is left may well be there."""
-    inside = np.array(
-        [[0.0, 0.0, 300.0, 0.0], [300.0, 0.0, 300.0, 300.0], [300.0, 300.0, 0.0, 300.0], [0.0, 300.0, 0.0, 0.0]]
-    )
+    inside = 300.0 * np.array([[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 0, 1], [0, 1, 0, 0]])
     outside = reversed_ends(1.004 * (inside - 150.0) + 150.0)
     for walls in (np.vstack([inside, outside]), 100.0 * faces()):
         assert "reversed" not in found(walls)

@@ -12,6 +12,7 @@ from map_quality import MapUpdate, VisitScan
 from map_quality.update.odometry import Carrying
 from map_quality.update.scans import Localized, search
 from registration import RigidTransform, Segments
+from tests.association.scenes import known
 
 from .hall import told, update
 from .rooms import FIRST, IN_HALL, SECOND, drive, places_in, rooms, with_odometry
@@ -62,9 +63,8 @@ def test_with_odometry_in_another_unit_scans_alone_are_evidence(factor: float) -
     """A pillar in the hall is gone, too."""
     scans = []
     for one in days(IN_AND_OUT, rooms(cupboards=[FIRST], pillar=False)):
-        assert one.odometry is not None
-        x, y = factor * one.odometry.x, factor * one.odometry.y
-        scans.append(replace(one, odometry=RigidTransform(x, y, one.odometry.theta)))
+        there = known(one.odometry)
+        scans.append(replace(one, odometry=RigidTransform(factor * there.x, factor * there.y, there.theta)))
     assert told(updated(scans)) == [("removed", (12, 13, 14, 15))]
 
 
@@ -80,8 +80,7 @@ def test_odometry_that_mostly_contradicts_the_scans_shows_nothing() -> None:
 def test_a_usable_scan_that_two_others_contradict_is_no_evidence(jump: tuple[float, ...], agrees: bool) -> None:
     """By more than three standard deviations of odometry, 0.1 m and 0.1 m for each metre, 0.05 rad and more."""
     scans = days(IN_HALL)[:5]
-    there = scans[2].odometry
-    assert there is not None
+    there = known(scans[2].odometry)
     scans[2] = replace(scans[2], odometry=RigidTransform(there.x + jump[0], there.y + jump[1], there.theta + jump[2]))
     found = carried(scans)
     assert [one.usable for one in found] == [True] * 5

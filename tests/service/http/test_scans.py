@@ -38,6 +38,7 @@ def deviations(answer: dict[str, Any]) -> list[float]:
 
 TIMED = {"laser": laser(time_increment=STEP)}
 BRIDGED = {"laser": laser(2)}
+BEYOND = laser(2) | {"ranges": [31.0, *BRIDGED["laser"]["ranges"][1:]]}
 # A scan, and its warnings.
 SCANS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "one sensor": (TIMED, [MOTION]),
@@ -52,10 +53,7 @@ SCANS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "many nulls": (BRIDGED, [NULLS]),
     "many nulls of a view": ({"views": [{**BRIDGED, "pose": ORIGIN}]}, [NULLS]),
     "few nulls": ({"laser": laser(4)}, []),
-    "nulls, and a beam without a return": (
-        {"laser": {**BRIDGED["laser"], "ranges": [31.0, *BRIDGED["laser"]["ranges"][1:]]}},
-        [],
-    ),
+    "nulls, and a beam without a return": ({"laser": BEYOND}, []),
 }
 
 
