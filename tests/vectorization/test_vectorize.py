@@ -266,3 +266,12 @@ def test_points_far_from_the_origin_lose_nothing() -> None:
         near = vectorize(seen.points, viewpoint=viewpoint and (0.0, 0.0)).measured
         moved = vectorize(seen.points + far, viewpoint=viewpoint).measured
         np.testing.assert_allclose(moved.segments.endpoints - np.tile(far, 2), near.segments.endpoints, atol=1e-6)
+
+
+def test_a_corner_of_seven_beams_has_two_walls() -> None:
+    """So few points are split at the one farthest from their chord only."""
+    angles = math.pi / 4 + 0.03 * np.arange(-3, 4)
+    ranges = 2.0 / np.maximum(np.cos(angles), np.sin(angles))
+    options = VectorizationOptions(sigma=0.005, min_points=3, min_length=0.05)
+    found = vectorize(LaserScan(angles[0], 0.03, ranges, 0.1, 30.0), options).measured.segments
+    assert found.endpoints == pytest.approx(np.array([[2.0, 1.67, 2.0, 2.0], [2.0, 2.0, 1.67, 2.0]]), abs=0.01)
