@@ -30,10 +30,7 @@ class Suite:
 
 SUITES = {
     "compiled/": Suite(("tests/compiled",)),
-    "registration/kernels/": Suite(
-        ("tests/registration/test_sums.py", "tests/registration/test_degenerate.py"), compiled=False
-    ),
-    "registration/": Suite(("tests/registration",)),
+    "registration/": Suite(("tests/registration", "tests/association/test_estimation.py")),
     "vectorization/": Suite(("tests/vectorization",)),
     "association/index/kernels/": Suite(("tests/association/test_map_index.py",)),
     "association/scan/kernels/joining.py": Suite(("tests/association/kernels",)),
