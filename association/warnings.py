@@ -69,7 +69,7 @@ def warnings_of_map(
             "map_scale": None if explanations.scale == 1.0 else _off_scale(explanations.scale, found),
             "common_offset": _offset(found, context.index.sigma or 0.0),
             "map_distorted": _distorted(found),
-            "turned": _turned(explanations, found),
+            "turned": _turned(context, explanations, found),
         }
     )
 
@@ -126,14 +126,15 @@ def _distorted(found: Estimate) -> str | None:
     )
 
 
-def _turned(explanations: Explanations, found: Estimate) -> str | None:
+def _turned(context: SearchContext, explanations: Explanations, found: Estimate) -> str | None:
     """Describe a rotation of the sensor during the scan."""
     turn = explanations.shown_turn
     if not turn:
         return None
+    at = "in the middle of the scan" if context.scan.sweep_s is None else "at the first beam"
     return (
         f"The sensor turned by {math.degrees(turn):.1f} degrees (+-{math.degrees(found.turn[1]):.1f}) during the scan, "
-        "as the walls show it. The pose is corrected for this, and is that at the first beam. Send `twist` and "
+        f"as the walls show it. The pose is corrected for this, and is that {at}. Send `twist` and "
         "`time_increment`, or check `angle_increment`."
     )
 

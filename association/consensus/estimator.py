@@ -132,9 +132,7 @@ class Estimate:
         return self.weakest > MAX_DEVIATION
 
 
-def estimate(
-    context: SearchContext, best: ConsensusSet, *, scaled: bool = False, turned: bool = False
-) -> Estimate | None:
+def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool, turned: bool) -> Estimate | None:
     """Estimate the pose of a consensus set; None where it has no pairs.
 
     1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is

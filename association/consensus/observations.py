@@ -98,5 +98,5 @@ def _set_times(context: SearchContext, lines: Records) -> None:
     x, y, dx, dy = floats(lines, "centroid_x", "centroid_y", "dx", "dy")
     x, y = x - context.sensor[0], y - context.sensor[1]
     bearings = math.copysign(1.0, sweep) * (np.arctan2(y, x) - first) % math.tau
-    lines["time"] = bearings / abs(sweep)
+    lines["time"] = bearings / abs(sweep) - scan.moment
     lines["pace"] = (x * dy - y * dx) / np.maximum(1e-6, x * x + y * y) / sweep

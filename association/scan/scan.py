@@ -117,7 +117,7 @@ class Scan:
         Defects of how it was taken; each answer has them.
     sweep_s : float or None
         Seconds from the first beam to the last, during which the sensor may have turned; 0 if its motion is known and
-        corrected, or none; None if the duration is not known.
+        corrected, or none; None if the duration is not known, and the scan is taken for one of a moment.
     frame_id : str or None
         Name of its frame.
     stamp : any
@@ -133,6 +133,11 @@ class Scan:
     sweep_s: float | None = None
     frame_id: str | None = None
     stamp: Any = None
+
+    @property
+    def moment(self) -> float:
+        """The share of the sweep at which the pose is: that of the first beam, or one of a moment, the middle."""
+        return 0.5 if self.sweep_s is None else 0.0
 
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
@@ -197,7 +202,7 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
         Of one place.
     factor : float
     turn : float
-        Radians from the first beam to the last; the heading is that at the first one.
+        Radians from the first beam to the last.
     """
     sensor = np.array(scan.viewpoint or (0.0, 0.0))
     if factor != 1.0:
@@ -211,7 +216,7 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
         """Turn points by when they were seen."""
         away = points - centre
         bearings = way * (np.arctan2(away[:, 1], away[:, 0]) - first) % math.tau
-        angles = turn * (bearings / sweep)
+        angles = turn * (bearings / sweep - scan.moment)
         c, s = np.cos(angles), np.sin(angles)
         back = np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], axis=1)
         return np.asarray(back + centre)
@@ -220,5 +225,5 @@ def corrected_scan(scan: Scan, factor: float, turn: float) -> Scan:
     # A line through the sensor's sweep is seen bent: its middle and its ends are turned by the time of each.
     begins, finishes = turned(seen.segments.endpoints[:, :2]), turned(seen.segments.endpoints[:, 2:])
     measured = replace(seen, segments=Segments.derived(np.hstack([begins, finishes])), centroids=turned(seen.centroids))
-    angles = scan.beams.angles + turn * (np.abs(scan.beams.angles - first) / sweep)
+    angles = scan.beams.angles + turn * (np.abs(scan.beams.angles - first) / sweep - scan.moment)
     return replace(scan, measured=measured, beams=replace(scan.beams, angles=angles))

@@ -152,9 +152,7 @@ def change_pair(
     wall without pairs are exactly 0.
     """
     line = held.line
-    line.dx = wall.dx
-    line.dy = wall.dy
-    line.offset = wall.offset + held.shift
+    line.dx, line.dy, line.offset = wall.dx, wall.dy, wall.offset + held.shift
     joint_add(sums, line, seen, held.weight, sign)
     information = sign * held.weight * seen.spread
     angles.xx += information * line.dy * line.dy
