@@ -215,7 +215,7 @@ def in_frame(scan: Scan, mount: RigidTransform) -> Scan:
     viewpoint = scan.viewpoint
     there = None if viewpoint is None else tuple(mount.apply(np.array(viewpoint)).tolist())
     beams = None if scan.beams is None else scan.beams.moved(mount, viewpoint or (0.0, 0.0))
-    return Scan(MeasuredSegments.from_segments(ends, one.sigma, points, moments), there, beams)
+    return Scan(MeasuredSegments.from_segments(ends, one.sigma, points, moments), there, beams, sweep_s=scan.sweep_s)
 
 
 def mounted(scan: Scan, mount: RigidTransform) -> Scan:
