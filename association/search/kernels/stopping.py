@@ -14,7 +14,7 @@ from ...tables import Drawing
 def draw_bases(drawing: Drawing, needed: float, hit: float, allowed: float, bases: Integers) -> int:
     """Draw the next bases, until the stopping rule ends it or `bases` is full; return how many.
 
-    What a base that is drawn says of the sets that were not found: see `Bases`.
+    `Bases` says why no more have to be drawn.
 
     Parameters
     ----------
