@@ -22,14 +22,15 @@ from .test_running import SMALL, Here
 @pytest.mark.parametrize("odometry", [True, False])
 def test_the_motion_during_scans_counts(tmp_path: Path, odometry: bool) -> None:
     write_drive(tmp_path, odometry=odometry)
-    associate_many([tmp_path / "robot_mcap"], tmp_path / "room.json", tmp_path / "out.parquet", SMALL, Here())
+    told = associate_many([tmp_path / "robot_mcap"], tmp_path / "room.json", tmp_path / "out.parquet", SMALL, Here())
+    assert ("motion" in [note.code for note in told.notes]) is not odometry
     found = rows(tmp_path / "out.parquet")
     for row, robot in zip(found, robots(), strict=True):
         sensor, sigma = robot.compose(MOUNT), math.sqrt(row["covariance"][8])
         wrong = abs(math.remainder(row["theta"] - sensor.theta, math.tau))
         assert row["usable"]
         assert wrong < 2.0 * sigma or wrong < 0.01
-        assert (sigma > 0.04) is not odometry
+        assert (math.sqrt(row["covariance"][0]) > 0.25 * SECONDS * 0.9) is not odometry
 
 
 @pytest.mark.parametrize("flipped", [False, True])
