@@ -153,8 +153,7 @@ def motion_warning(seen: MountedScan) -> AssociationWarning | None:
         "motion_unknown",
         f"{told}. The motion of the sensor during this time is unknown, so the scan may be distorted. The covariance "
         f"allows for {SPEED:g} m/s, and for the rotation that the walls allow. Send the motion: over HTTP as "
-        "`twist`, 0 for a sensor at rest; "
-        "in a log and in ROS 2 as odometry.",
+        "`twist`, 0 for a sensor at rest; in a log and in ROS 2 as odometry.",
     )
 
 

@@ -33,12 +33,12 @@ class Views:
         Position of each sensor, metres in the scan frame; nan where the view is not from one place.
     of_segment, of_beam : (n,), (m,)
         The view of each segment and of each beam.
-    root : (3 v, 3 u)
+    root : (3 v, u)
         Uncertainty of the poses: their errors, of additive (x, y, theta) in the scan frame, are `root` times u
         independent standard normal variates. No columns where all are exact.
-    found : (3 u,)
+    found : (u,)
         The estimates of these variates, as far as the poses already include them.
-    spread : (3 u, 3 u)
+    spread : (u, u)
         Covariance of the variates that remains.
     """
 

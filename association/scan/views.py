@@ -39,7 +39,8 @@ class View:
         Error by a motion that is not known and that all views share, as scanners of one robot do: additive
         (x, y, theta) of this view's pose in the scan's frame, metres and radians, for one standard deviation of the
         speed along x and y and of the turn rate, by columns. Proportional to the duration of the view. Views that are
-        relative to this one do not have it. None: no such error.
+        relative to this one do not have it. Of a single view the turn rate does not count: the walls show the rotation.
+        None: no such error.
     """
 
     scan: Scan
