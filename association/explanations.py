@@ -146,13 +146,8 @@ def _explain(context: SearchContext, scale: float, turn: float) -> Explanations:
     best = next((one for one in ranked if one.inside), None)
     complete = context.can_look and not context.deadline.passed
     report = candidates.report if complete else candidates.report.cut_short()
-    return Explanations(
-        ranked,
-        None if best is None else answer_of(context, best, scaled=scale != 1.0, turned=turn != 0.0),
-        report,
-        scale,
-        turn,
-    )
+    answer = None if best is None else answer_of(context, best, scaled=scale != 1.0, turned=turn != 0.0)
+    return Explanations(ranked, answer, report, scale, turn)
 
 
 def answer_of(context: SearchContext, best: ConsensusSet, *, scaled: bool, turned: bool) -> Answer | None:

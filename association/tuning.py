@@ -77,12 +77,12 @@ FARTHER = 1.5
 
 LEAST_OFF_WALLS = 0.01  # m, tables; walls of maps that are declared with less are not compared with walls farther off
 MOST_SEARCHES = 3  # tables; with factors and rotations
-SUGGESTED = 1.5  # deviations, tables; the scan is searched again with a scale or a rotation that differs by so much
+SUGGESTED = 1.5  # deviations, tables; the scan is searched again with a scale that differs by so much
 LEAST_FACTOR, MOST_FACTOR = 0.004, 0.08  # tables; a scan is searched again with a factor that is so far from one
 # Nats, by which such a factor has to explain more: 1 map in 100 is off its scale, by up to `MOST_FACTOR` either way, of
 # which a scan shows one part in ten. Of 1,089 scans in maps to scale 9 are searched so, in place of 42.
 OFF_SCALE = 7.0
-DOUBTING_DEVIATIONS = 3.0  # geometry; a distortion beyond them is reported
+DOUBTING_DEVIATIONS = 3.0  # geometry; a distortion beyond them is reported, and a rotation during the scan is believed
 LEAST_TURN = math.radians(0.6)  # tables; likewise, if its sensor turned by more during the scan
 
 # --- Reporting --------------------------------------------------------------------------------------------------------

@@ -137,9 +137,9 @@ def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool, turned
 
     1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is
        known.
-    2. If the columns together do not differ from 0, the scan was not corrected, and its sensor may not have moved,
-       solve without them: always on, they widen the deviations on exact maps by a third. Without the rotation, where
-       that is in doubt.
+    2. Solve without the columns if together they do not differ from 0, the scan was not corrected, and its sensor is
+       taken to be at rest: always on, they widen the deviations on exact maps by a third. Where only the rotation is in
+       doubt, solve without that.
     3. Leave out each wall in turn.
     """
     seen = observations_of(context, best.matches)

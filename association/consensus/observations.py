@@ -88,12 +88,11 @@ def observations_of(context: SearchContext, matches: Records) -> Observations | 
 def _set_times(context: SearchContext, lines: Records) -> None:
     """Set when lines were seen, by their bearings from the first beam on, and how that changes along them."""
     scan = context.scan
-    several = scan.views is not None and len(scan.views) > 1
-    if scan.beams is None or several or not scan.ordered or len(scan.beams.angles) < 2:
+    if not scan.timed or scan.beams is None:
         return
     first, last = float(scan.beams.angles[0]), float(scan.beams.angles[-1])
     sweep = last - first
-    if scan.sweep_s == 0.0 or not abs(sweep) > 0.0:
+    if not abs(sweep) > 0.0:
         return
     x, y, dx, dy = floats(lines, "centroid_x", "centroid_y", "dx", "dy")
     x, y = x - context.sensor[0], y - context.sensor[1]

@@ -135,6 +135,12 @@ class Scan:
     stamp: Any = None
 
     @property
+    def timed(self) -> bool:
+        """Return whether it is known in which order its points were seen, while the sensor may have turned."""
+        one = self.views is None or len(self.views) == 1
+        return one and self.beams is not None and self.ordered and len(self.beams.angles) > 1 and self.sweep_s != 0.0
+
+    @property
     def moment(self) -> float:
         """The share of the sweep at which the pose is: that of the first beam, or one of a moment, the middle."""
         return 0.5 if self.sweep_s is None else 0.0

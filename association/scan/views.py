@@ -39,8 +39,8 @@ class View:
         Error by a motion that is not known and that all views share, as scanners of one robot do: additive
         (x, y, theta) of this view's pose in the scan's frame, metres and radians, for one standard deviation of the
         speed along x and y and of the turn rate, by columns. Proportional to the duration of the view. Views that are
-        relative to this one do not have it. Of a single view the turn rate does not count: the walls show the rotation.
-        None: no such error.
+        relative to this one do not have it. Of a single view of ranges whose duration is known the turn rate does not
+        count, for the walls show the rotation. None: no such error.
     """
 
     scan: Scan
@@ -230,5 +230,6 @@ def _motion_root(views: Sequence[View]) -> Floats:
         return np.zeros((3 * len(views), 0))
     nothing = np.zeros((3, 3))
     parts = [nothing if view.motion is None else view.motion * (longest / view.motion[2, 2]) for view in views]
-    # Of one view the walls show the rotation.
-    return np.concatenate(parts) if len(views) > 1 else parts[0][:, :2]
+    # Where the order of its beams and their duration are known, the walls show the rotation of a single view.
+    shown = len(views) == 1 and views[0].scan.timed and views[0].scan.sweep_s is not None
+    return parts[0][:, :2] if shown else np.concatenate(parts)

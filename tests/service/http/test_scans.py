@@ -76,6 +76,8 @@ def test_what_is_not_known_is_warned_of_and_allowed_for(client: httpx.Client) ->
             assert max(deviations(answer)) < 0.005
         for message in warned(answer, NULLS):
             assert message.startswith("360 of 720 ranges are null, and none exceeds range_max.")
+    blind = answered(client, "/v1/associate", map=MAP, scan={"views": [{**TIMED, "pose": ORIGIN, "viewpoint": None}]})
+    assert deviations(blind)[2] == pytest.approx(0.05, rel=0.1), "of whose beams nothing is known, so of its rotation"
     alone = answered(client, "/v1/associate", map=MAP, scan=TIMED)
     assert alone["covariance"] == told[0]["result"]["covariance"]
 
