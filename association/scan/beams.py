@@ -13,7 +13,7 @@ from registration.layout import Floats, Records
 
 from ..layout import BEAM
 from ..tuning import FAR, FARTHER, MAX_RAYS, MOST_BEAMS, RAY_SPACING
-from .tuning import END_MARGIN
+from .tuning import END_MARGIN, PROBE
 
 Indices = NDArray[np.intp]
 
@@ -62,24 +62,35 @@ def beams_of_ranges(ranges: Ranges, viewpoint: tuple[float, float], views: Indic
 
 
 def rays_to_lines(seen: Records, viewpoints: Floats, weights: Floats) -> BeamSet:
-    """Return rays to evenly spread points of what each view shows, (k,) of `SIGHTING`; none of views without a place.
+    """Return rays to evenly spread points of what each view shows, (k,) of `SIGHTING`; none of views without place."""
+    seen, ends = _points_on(seen[~np.isnan(viewpoints[seen["sensor"], 0])])
+    return _rays_between(seen, viewpoints[seen["sensor"]], ends, weights[seen["sensor"]])
 
-    They keep away from the ends of a segment, where its neighbours are.
-    """
-    seen = seen[~np.isnan(viewpoints[seen["sensor"], 0])]
+
+def probes(seen: Records) -> tuple[BeamSet, BeamSet]:
+    """Return short rays to the same points, from the left of each segment and from the right."""
+    seen, ends = _points_on(seen)
+    across, weights = PROBE * np.stack([-seen["dy"], seen["dx"]], axis=1), np.ones(len(seen))
+    return _rays_between(seen, ends + across, ends, weights), _rays_between(seen, ends - across, ends, weights)
+
+
+def _points_on(seen: Records) -> tuple[Records, Floats]:
+    """Return points of segments, with the segment of each, away from the ends, where its neighbours are."""
     counts = np.clip(np.ceil(seen["length"] / RAY_SPACING), 1, MAX_RAYS).astype(np.intp)
     of = np.repeat(np.arange(len(seen)), counts)
     number = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
     one = seen[of]
     along = ((number + 0.5) / counts[of] - 0.5) * np.maximum(0.0, one["length"] - 2.0 * END_MARGIN)
-    ends = np.stack([one["x"] + along * one["dx"], one["y"] + along * one["dy"]], axis=1)
-    begins = viewpoints[one["sensor"]]
+    return one, np.stack([one["x"] + along * one["dx"], one["y"] + along * one["dy"]], axis=1)
+
+
+def _rays_between(seen: Records, begins: Floats, ends: Floats, weights: Floats) -> BeamSet:
     way = ends - begins
     ranges = np.hypot(way[:, 0], way[:, 1])
     rows = _rows(begins, way / np.maximum(ranges, 1e-12)[:, None], ranges)
-    farthest = float((ranges + 0.5 * one["length"]).max(initial=0.0))
-    line, sensor = np.ascontiguousarray(one["row"]), np.ascontiguousarray(one["sensor"])
-    return BeamSet(rows, line, sensor, weights[sensor], max(FAR, FARTHER * farthest))
+    farthest = float((ranges + 0.5 * seen["length"]).max(initial=0.0))
+    line, sensor = np.ascontiguousarray(seen["row"]), np.ascontiguousarray(seen["sensor"])
+    return BeamSet(rows, line, sensor, weights, max(FAR, FARTHER * farthest))
 
 
 def together(one: BeamSet, other: BeamSet) -> BeamSet:

@@ -49,20 +49,15 @@ class ScanLines:
     model : (1,) of `MODEL`
     sightings : (k,) of `SIGHTING`
         The part of them that each view shows, view by view; of one view the rows themselves.
-    given : (segments,) of `LINE_PARTS`, or None
-        The segments that they were made from, of a scan of one view.
     """
 
     row_of: Indices
     rows: Records
     model: Records
     sightings: Records
-    given: Records | None = None
 
     @classmethod
-    def of(
-        cls, scan: Scan, map_sigma: float | None, options: AssociationOptions, given: Records | None = None
-    ) -> ScanLines:
+    def of(cls, scan: Scan, map_sigma: float | None, options: AssociationOptions) -> ScanLines:
         """Join the segments that continue or repeat one another, and order them by their information; ties by index.
 
         Parameters
@@ -72,17 +67,14 @@ class ScanLines:
             Standard deviation of the map's lines, metres; None where it is not known.
         options : AssociationOptions
             If a tolerance is wider than the sigmas' own gate, the map is taken to be that far off.
-        given : (segments,) of `LINE_PARTS`, or None
-            Of other lines of the same scan, where there are any.
         """
         measured = scan.measured
         variances, model = variances_of(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
-            given = _given(measured) if given is None else given
-            row_of, lines = join_lines(given, JOINTS, measured.counted, options.oriented)
+            row_of, lines = join_lines(_given(measured), JOINTS, measured.counted, options.oriented)
             model = _with_sensor(model, scan, lines)
             rows, seen = describe_lines(lines, variances, model)
-            return cls(row_of, rows, model, seen, given)
+            return cls(row_of, rows, model, seen)
         part_of, parts, views = parts_of(measured, scan.views, directed=options.oriented)
         line_row, lines = _joined_views(parts, scan.views, directed=options.oriented)
         model = _with_sensor(model, scan, lines)

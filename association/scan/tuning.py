@@ -57,3 +57,4 @@ OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie
 # --- Beams of segments ------------------------------------------------------------------------------------------------
 
 END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
+PROBE = 0.3  # m, tables; length of rays to a segment of which it is not known from where it was seen

@@ -8,29 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from registration.layout import Floats
+from registration.layout import Floats, Records
 
 from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.ranking import score
 from ..consensus.tuning import BEAMS_PASSED, BEAMS_READ, BLOCKED, BLOCKING_LENGTH, BLOCKING_RAYS, NEAR, SIGHT_TOLERANCE
 from ..context import SearchContext
-from ..scan.beams import rays_to_lines, together
+from ..scan.beams import BeamSet, probes, together
 from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .kernels.things import compare_things
-from .tuning import (
-    COMPARED,
-    COUNTED,
-    LEAST_THING,
-    LOOSE_BEAMS,
-    LOOSE_FACTOR,
-    MOVED_BEFORE,
-    OF_A_THING,
-    OF_SHARE,
-    SEEN_BEFORE,
-    UNCOUNTED,
-)
+from .tuning import COMPARED, COUNTED, LOOSE_BEAMS, LOOSE_FACTOR, UNCOUNTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +31,12 @@ class Comparison:
     others : tuple of ConsensusSet
     gaps : float64
         By how much the evidence is greater than that of each other, nats.
-    by_things : float64
-        The same thing by thing alone, whatever share of the score the other lacks.
     counted : float64
         Weight of each, 0 to 1: 1 where the search cannot have missed one as good.
     """
 
     others: tuple[ConsensusSet, ...]
     gaps: Floats
-    by_things: Floats
     counted: Floats
 
     @property
@@ -69,73 +55,70 @@ def compare(
 ) -> Comparison:
     """Compare an explanation with the next ones, thing by thing, with walls off by as much as they may be.
 
-    Each explanation is matched again with wide gates, since of many similar places the one that fits best shows smaller
-    errors of walls than there are. Then the evidence of each place in view is compared: what its scan lines score, and
-    what its beams do. Neighbouring places at which it differs are one thing. A thing may have been moved, whichever
-    explanation it speaks for, and on whichever side it is missing: so it counts `OF_A_THING` at most, less where more
-    of the scan is not on the map, and one thing alone never decides. An alternative that lacks a large share s of the
-    score is no similar place, whatever was moved: it has ``OF_SHARE s^2`` less, as far as things speak against it.
+    Each explanation is refined again with wide gates, since of many similar places the one that fits best shows smaller
+    errors of walls than there are; near ones that explain a part of the walls each become one. Then the evidence of
+    each place in view is compared: whether a scan line has a wall of its direction there, and what the beams read.
+    Neighbouring places at which it differs are one thing. A thing may have been moved, whichever explanation it speaks
+    for, and on whichever side it is missing: so it counts `OF_A_THING` at most, and one thing alone never decides.
     """
     others = tuple(others[:COMPARED])
     if not others:
-        return Comparison((), *np.zeros((3, 0)))
+        return Comparison((), *np.zeros((2, 0)))
     sets = (best, *others)
     posteriors, scores = np.array([(one.posterior, one.score) for one in sets]).T
-    counted = np.clip((_ratios(posteriors) - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
-    by_share = OF_SHARE * (1.0 - np.clip(_ratios(scores), 0.0, 1.0)) ** 2
+    ratios = posteriors[1:] / posteriors[0] if posteriors[0] > 0.0 else np.ones(len(others))
+    counted = np.clip((ratios - UNCOUNTED) / (COUNTED - UNCOUNTED), 0.0, 1.0)
     priors = posteriors[0] - scores[0] - (posteriors - scores)[1:]
-    by_things, most = _compare_things(context, sets, wall_sigma)
-    gaps = np.minimum(most, by_things + by_share)
-    return Comparison(others, gaps + priors, by_things + priors, counted)
+    return Comparison(others, _compare_things(context, sets, wall_sigma) + priors, counted)
 
 
-def _ratios(values: Floats) -> Floats:
-    """Return the ratio of each other value to the first one, 1 where that is not positive."""
-    return values[1:] / values[0] if values[0] > 0.0 else np.ones(len(values) - 1)
-
-
-def _compare_things(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> tuple[Floats, Floats]:
-    """Return by how much the first explanation has more evidence than each other, and the most that it may have."""
+def _compare_things(context: SearchContext, sets: Sequence[ConsensusSet], wall_sigma: float) -> Floats:
+    """Return by how much the first explanation has more evidence than each other, nats."""
     sigma = _loose_sigma(context, wall_sigma)
-    loose = context if sigma is None else context.with_scan(
-        context.scan, ScanLines.of(context.scan, sigma, context.options, context.lines.given)
-    )  # fmt: skip
-    wider = 1.0 if sigma is None else max(1.0, LOOSE_BEAMS * math.hypot(sigma, MODEL_OFFSET) / NEAR)
+    wider, loose = 1.0 / LOOSE_BEAMS, context
+    if sigma is not None:
+        wider = math.hypot(sigma, MODEL_OFFSET) / NEAR
+        loose = context.with_scan(context.scan, ScanLines.of(context.scan, sigma, context.options))
     estimates = np.concatenate([one.estimate for one in sets])
-    _, matches = score(loose, estimates)
+    score(loose, estimates)
     lines = context.rays_to_lines
     seen = len(lines) > 0 or context.with_beams
-    if not seen:  # from where is not known: the lines alone are evidence, and they are where they are
-        sightings = context.lines.sightings
-        lines = rays_to_lines(sightings, np.zeros_like(context.viewpoints), np.ones(len(context.viewpoints)))
+    if not seen:
+        lines, behind = probes(context.lines.sightings)
     beams = together(lines, context.beams) if context.with_beams else lines
     table = cast(context, beams, estimates)
     ranges = beams.rows["range"]
     passes = seen & (table["wall"] >= 0) & (table["distance"] < ranges - SIGHT_TOLERANCE)
     distances = np.where(passes, table["distance"], np.where(np.isfinite(ranges), ranges, beams.reach))
-    # The score of each scan line, for each of the rays to it.
-    rays = np.maximum(1, np.bincount(lines.line, minlength=matches.shape[1]))
-    of_rays = (np.where(matches["wall"] >= 0, matches["score"], 0.0) / rays)[:, lines.line]
+    of_lines = _of_lines(context, lines, table[:, : len(lines)], estimates["theta"], wider)
+    if not seen:
+        table_behind = cast(context, behind, estimates)
+        of_lines = np.maximum(of_lines, _of_lines(context, behind, table_behind, estimates["theta"], wider))
     if context.with_beams:
-        read = evidence_of(context, context.beams, table[:, len(lines) :], wider)
+        read = evidence_of(context, context.beams, table[:, len(lines) :], max(1.0, LOOSE_BEAMS * wider))
         weights = context.beams.weights / max(1e-9, float(context.beams.weights.sum()))
-        values = np.hstack([of_rays, weights * (BEAMS_READ * read.read - BEAMS_PASSED * read.passed)])
+        values = np.hstack([of_lines, weights * (BEAMS_READ * read.read - BEAMS_PASSED * read.passed)])
     else:
         rows = context.index.obstacles.walls[table["wall"]]
         lengths = np.minimum(BLOCKING_LENGTH, rows["end"] - rows["begin"])
-        values = of_rays - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
-    return compare_things(values, distances, beams.rows, _of_a_thing(context, sets[0]))
+        values = of_lines - np.where(passes, BLOCKED * lengths / BLOCKING_RAYS, 0.0)
+    return compare_things(values, distances, beams.rows)
 
 
-def _of_a_thing(context: SearchContext, best: ConsensusSet) -> float:
-    """Return the most that a thing counts, nats: the log odds that it was not moved.
+def _of_lines(context: SearchContext, rays: BeamSet, table: Records, headings: Floats, wider: float) -> Floats:
+    """Return the evidence of each ray to a scan line at each pose, (k, m) nats.
 
-    A scan of which much is not on the map was taken where much has moved.
+    It is the ray's part of the line's gain, as far as it ends on a wall of the direction of the line.
     """
-    things = context.lines.rows["length"] > LEAST_THING
-    moved = int((things & (best.parts < 0.5)).sum())
-    share = (moved + MOVED_BEFORE) / (int(things.sum()) + SEEN_BEFORE)
-    return min(OF_A_THING, math.log((1.0 - share) / share)) if share < 0.5 else 0.0
+    lines, walls = context.lines.rows[rays.line], context.index.obstacles.walls[table["wall"]]
+    c, s = np.cos(headings)[:, None], np.sin(headings)[:, None]
+    dx, dy = c * lines["dx"] - s * lines["dy"], s * lines["dx"] + c * lines["dy"]
+    gates = context.gates[0]
+    gate = np.clip(gates["sigmas"] * np.sqrt(lines["angle_variance"]), gates["least_angle"], gates["greatest_angle"])
+    cosines = dx * walls["dx"] + dy * walls["dy"]
+    along = (cosines if context.options.oriented else np.abs(cosines)) >= np.cos(gate)
+    part = np.where(along, lines["gain"] / np.bincount(rays.line)[rays.line], 0.0)
+    return np.asarray(part * evidence_of(context, rays, table, wider).read)
 
 
 def _loose_sigma(context: SearchContext, wall_sigma: float) -> float | None:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from registration.layout import Records
+
 from ..consensus.beams import cast, evidence_of
 from ..consensus.consensus_set import ConsensusSet
 from ..consensus.estimator import Estimate
@@ -19,14 +21,18 @@ from .alternatives import Comparison
 from .tuning import (
     CROWD_TEMPERATURE,
     LEAST_MISFIT,
+    LEAST_THING,
     LIKE_WALLS,
     MAX_GAP,
     MOST_DEVIATION,
     MOST_MISFIT,
     MOST_NULL,
     MOST_UNMATCHED,
+    MOVED_BEFORE,
     NULL_ENOUGH,
     NULL_FRACTION,
+    OF_A_THING,
+    SEEN_BEFORE,
 )
 
 FOR, AGAINST, EITHER = 1, -1, 0
@@ -59,8 +65,9 @@ class Features(NamedTuple):
     Attributes
     ----------
     uniqueness : float
-        Minus the logarithm of the evidence of all alternatives over its own, at a high temperature, nats; at most that
-        of the places that the other walls of the map make: on a small map it says little that there is no other one.
+        Minus the logarithm of the evidence of all alternatives over its own, at a high temperature, which is higher
+        where much has moved, nats; at most that of the places that the other walls of the map make: on a small map it
+        says little that there is no other one.
     deviation : float
         Standard deviation of the sensor's place along its weakest direction without the wall that fixes it most, m.
     unmatched : float
@@ -107,7 +114,8 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
     unmatched = float(left @ np.interp(lines["length"], LIKE_WALLS, (0.0, 1.0)))
     offsets = best.matches["offset"] ** 2 / lines["plain_variance"]
     misfit = float(best.parts @ offsets) / max(1e-9, float(best.parts.sum()))
-    crowd = comparison.counted * np.exp(-np.maximum(0.0, comparison.by_things) / CROWD_TEMPERATURE)
+    alike = np.exp(-_unmoved(lines, best) * np.maximum(0.0, comparison.gaps) / CROWD_TEMPERATURE)
+    crowd = comparison.counted * alike
     walls = float(estimate.leverages.own.sum())
     places = max(1.0, (len(context.index.walls.rows) - walls) / max(1.0, walls))
     agreement, blocked, nearer = _of_beams(context, best)
@@ -123,6 +131,16 @@ def describe(context: SearchContext, best: ConsensusSet, estimate: Estimate, com
         null_gap=0.0,
     )
     return with_null(Described(features, comparison, 0.0), best, 0.0)
+
+
+def _unmoved(lines: Records, best: ConsensusSet) -> float:
+    """Return how much is known to be where the map has it, 0 to 1, by the log odds that a thing was not moved.
+
+    A scan of which much is not on the map was taken where much has moved, or on another map.
+    """
+    things = lines["length"] > LEAST_THING
+    moved = int((things & (best.parts < 0.5)).sum()) + MOVED_BEFORE
+    return min(1.0, max(0.0, math.log((int(things.sum()) + SEEN_BEFORE) / moved - 1.0) / OF_A_THING))
 
 
 def with_null(described: Described, best: ConsensusSet, null: float) -> Described:

@@ -5,18 +5,13 @@ from __future__ import annotations
 # --- Alternatives: compared by things, with walls off by more ---------------------------------------------------------
 
 COMPARED = 12  # alternatives, tables
-# Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least, and
+# Explanations are refined again with gates as wide as walls may be off: by `LOOSE_WALLS` at least, and
 LOOSE_FACTOR = 4.0  # tables; times as much as they seem to be: of many similar places the one that fits best shows less
-LOOSE_BEAMS = 3.0  # tables; standard deviations of the walls within which a beam reads one then
+LOOSE_BEAMS = 3.0  # tables; times as much for single beams
 # The most that each thing counts, for the answer or against it: it was moved. Alone, it leaves a probability of 0.94.
 OF_A_THING = 2.75  # nats
-OF_SHARE = 33.0  # nats, tables; for all of the score, which an alternative may lack, by the square of the share
-LEAST_THING = 0.3  # m; shorter scan lines are not counted as things.
-# Counted as seen, and as moved, before the first line. Measured: of strong differences to another pose, 2 % speak
-# against the truth where all lines are matched, 14 % with 1 to 3 unmatched lines, 25 % with 4 to 6, 36 % with more.
-SEEN_BEFORE, MOVED_BEFORE = 8.0, 0.5  # tables
-THING_WIDTH = 3.5  # m, tables; of doors, niches, cupboards, closed openings; wider things count as several
-THINGS_APART = 1.0  # m, tables; what differs at places that are nearer is one thing
+THING_WIDTH = 2.0  # m, tables; of doors, niches, cupboards, closed openings; wider things count as several
+THINGS_APART = 1.2  # m, tables; what differs at places that are nearer is one thing
 LEAST_OF_BEAM = 0.05  # nats, tables; a beam that speaks less against an alternative does not count
 UNCOUNTED, COUNTED = 0.3, 0.75  # of the best value, tables; worse alternatives are found by chance, and do not count
 
@@ -31,6 +26,10 @@ NULL_ALLOWED = 0.01  # tables; probability of having missed a better one: it is 
 
 MAX_GAP = 60.0  # nats, tables
 CROWD_TEMPERATURE = 4.0  # nats, tables
+LEAST_THING = 0.3  # m; shorter scan lines are not counted as things.
+# Counted as seen, and as moved, before the first line. Measured: of strong differences to another pose, 2 % speak
+# against the truth where all lines are matched, 14 % with 1 to 3 unmatched lines, 25 % with 4 to 6, 36 % with more.
+SEEN_BEFORE, MOVED_BEFORE = 8.0, 0.5  # tables
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 MOST_DEVIATION = 1.0  # m, tables
 LIKE_WALLS = (0.8, 1.6)  # m, tables; scan lines of that length begin to count as walls, and count in full

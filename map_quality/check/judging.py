@@ -208,17 +208,18 @@ def _moved(samples: Sequence[Sample]) -> Iterator[Finding]:
     if not len(moves):
         return
     # In a rotation the places far from the origin move most: agree about all three at the median.
-    x, y, sine, cosine = np.median(np.column_stack([moves[:, :2], np.sin(moves[:, 2]), np.cos(moves[:, 2])]), axis=0)
+    columns = np.column_stack([moves[:, :2], np.sin(moves[:, 2]), np.cos(moves[:, 2])])
+    x, y, sine, cosine = np.median(columns, axis=0)
     turn = math.atan2(sine, cosine)
-    away = np.hypot(*(moves[:, :2] - [x, y]).T)
     turned = np.abs(np.remainder(moves[:, 2] - turn + np.pi, math.tau) - np.pi)
-    same = int(((away < 2.0 * tuning.MOVED_METRES) & (turned < tuning.MOVED_RADIANS)).sum())
+    agree = (np.hypot(moves[:, 0] - x, moves[:, 1] - y) < 2.0 * tuning.MOVED_METRES) & (turned < tuning.MOVED_RADIANS)
     is_moved = math.hypot(x, y) >= tuning.MOVED_METRES or abs(turn) >= tuning.MOVED_RADIANS
-    if same <= tuning.MANY * len(moves) or not is_moved:
+    if agree.sum() <= tuning.MANY * len(moves) or not is_moved:
         return
+    x, y, sine, cosine = columns[agree].mean(axis=0)
     yield Finding(
         "moved",
-        f"{same} of {len(moves)} scans have poses that differ from the given ones by the same transform: the map's "
-        f"frame is theirs rotated by {math.degrees(turn):.3g} degrees and moved by ({x:.3g}, {y:.3g}) m. Correct the "
-        "map's origin, or the poses.",
+        f"{agree.sum()} of {len(moves)} scans have poses that differ from the given ones by the same transform: the "
+        f"map's frame is theirs rotated by {math.degrees(math.atan2(sine, cosine)):.3g} degrees and moved by ({x:.3g}, "
+        f"{y:.3g}) m. Correct the map's origin, or the poses.",
     )

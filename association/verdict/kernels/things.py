@@ -15,13 +15,11 @@ from ..tuning import LEAST_OF_BEAM, OF_A_THING, THING_WIDTH, THINGS_APART
 
 
 @kernel
-def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing: float) -> tuple[Floats, Floats]:
-    """Return by how much the first explanation has more evidence than each other, and the most that it may have, nats.
-
-    The first is the sum of all things, of which each counts `of_a_thing` at most, the second that of the things that
-    speak for the first explanation, of which each counts `OF_A_THING` at most.
+def compare_things(values: Floats, distances: Floats, beams: Records) -> Floats:
+    """Return by how much the first explanation has more evidence than each other, nats: the sum of all things.
 
     Places at which two explanations differ are one thing if they are no farther than `THINGS_APART` from one another.
+    Of each `THING_WIDTH` of it a thing counts `OF_A_THING` at most.
 
     Parameters
     ----------
@@ -31,10 +29,8 @@ def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing
         From the sensor to the thing that a value speaks of, metres.
     beams : (m,) of `BEAM`
         From where each place is seen, and its direction.
-    of_a_thing : float
-        The most that a thing counts, nats.
     """
-    gaps, most = np.zeros(len(values) - 1), np.zeros(len(values) - 1)
+    gaps = np.zeros(len(values) - 1)
     m = len(beams)
     x, y, more = np.empty(m), np.empty(m), np.empty(m)
     for other in range(1, len(values)):
@@ -69,7 +65,6 @@ def compare_things(values: Floats, distances: Floats, beams: Records, of_a_thing
         for one in range(count):
             if thing[one] == one:
                 width = math.hypot(high[one, 0] - low[one, 0], high[one, 1] - low[one, 1])
-                wide = max(1.0, width / THING_WIDTH)
-                gaps[other - 1] += min(of_a_thing * wide, max(-of_a_thing * wide, total[one]))
-                most[other - 1] += min(OF_A_THING * wide, max(0.0, total[one]))
-    return gaps, most
+                most = OF_A_THING * max(1.0, width / THING_WIDTH)
+                gaps[other - 1] += min(most, max(-most, total[one]))
+    return gaps

@@ -212,7 +212,7 @@ def test_things_are_connected_places(seed: int) -> None:
     beams, angles = np.zeros(m, BEAM), rng.uniform(-math.pi, math.pi, m)
     beams["dx"], beams["dy"] = np.cos(angles), np.sin(angles)
     values, distances = rng.normal(0.0, 2.0, (3, m)) * (rng.random((3, m)) < 0.5), rng.uniform(0.5, 5.0, (3, m))
-    of_a_thing, expected = float(rng.uniform(0.0, 3.0)), []
+    expected = []
     for other in (1, 2):
         more = values[0] - values[other]
         differs = np.abs(more) > LEAST_OF_BEAM
@@ -220,14 +220,12 @@ def test_things_are_connected_places(seed: int) -> None:
         places = (away * np.stack([np.cos(angles), np.sin(angles)])[:, differs]).T
         near = np.hypot(*np.moveaxis(places[:, None] - places, 2, 0)) <= THINGS_APART
         count, thing = connected_components(near, directed=False) if len(places) else (0, np.zeros(0, int))
-        gap = most = 0.0
+        gap = 0.0
         for one in range(count):
-            wide = max(1.0, math.hypot(*np.ptp(places[thing == one], axis=0)) / THING_WIDTH)
-            total = float(more[differs][thing == one].sum())
-            gap += float(np.clip(total, -of_a_thing * wide, of_a_thing * wide))
-            most += float(np.clip(total, 0.0, OF_A_THING * wide))
-        expected.append((gap, most))
-    assert np.allclose(compare_things(values, distances, beams, of_a_thing), np.transpose(expected))
+            most = OF_A_THING * max(1.0, math.hypot(*np.ptp(places[thing == one], axis=0)) / THING_WIDTH)
+            gap += float(np.clip(more[differs][thing == one].sum(), -most, most))
+        expected.append(gap)
+    assert np.allclose(compare_things(values, distances, beams), expected)
 
 
 @given(seed=SEEDS)
