@@ -318,7 +318,6 @@ def test_scans_of_another_unit_than_the_map_or_their_limits(scans: list[Scan], s
     assert report.findings[0].message.endswith(said)
 
 
-@pytest.mark.xfail(strict=True, reason="one scan does not show a mistake")
 def test_a_single_sample_shows_a_mistake() -> None:
     index, (_, scan) = index_of(reversed_ends(faces())), sampled()[0]
     assert "reversed" in codes(concluded(index, [try_sample(index, scan, Deadline(), oriented=True)]))
