@@ -138,8 +138,8 @@ def estimate(context: SearchContext, best: ConsensusSet, *, scaled: bool, turned
     1. Solve for all unknowns by Gauss-Newton; the variance of walls' errors is what their residuals show, unless it is
        known.
     2. Solve without the columns if together they do not differ from 0, the scan was not corrected, and its sensor is
-       taken to be at rest: always on, they widen the deviations on exact maps by a third. Where only the rotation is in
-       doubt, solve without that.
+       taken to be at rest: always on, they widen the deviations on exact maps by a third. Where only the
+       rotation is in doubt, solve without the column of the rotation.
     3. Leave out each wall in turn.
     """
     seen = observations_of(context, best.matches)

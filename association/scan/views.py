@@ -230,6 +230,6 @@ def _motion_root(views: Sequence[View]) -> Floats:
         return np.zeros((3 * len(views), 0))
     nothing = np.zeros((3, 3))
     parts = [nothing if view.motion is None else view.motion * (longest / view.motion[2, 2]) for view in views]
-    # Where the order of its beams and their duration are known, the walls show the rotation of a single view.
+    # The walls show the rotation of a single view if the order and the duration of the beams are known.
     shown = len(views) == 1 and views[0].scan.timed and views[0].scan.sweep_s is not None
     return parts[0][:, :2] if shown else np.concatenate(parts)
